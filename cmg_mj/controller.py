@@ -1,0 +1,223 @@
+"""The law, and the controller: sensors -> tilt -> observer -> law -> gimbal rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from cmg_mj.elementwise import Scalar, clip, where
+from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.observers.protocol import Estimate, Measurement, Observer
+from cmg_mj.reduced import ReducedModel
+from cmg_mj.sensors import Ideal, SampledSensor, Sensors, normals
+from cmg_mj.tilt import RadialTilt
+from cmg_mj.timing import whole_steps
+
+TABLE_2_GAINS = (35.0, 4.0, -1.0, 0.3)
+"""K_e of aranovskiy2020 Table 2, on [x1, x2, x3, x_e]."""
+
+Feedback = Literal["observer", "fog", "truth"]
+Angles = Literal["measured", "estimated"]
+
+
+def lqr_gains(model: ReducedModel, state_cost: Sequence[float], input_cost: float) -> tuple[float, ...]:
+    """Solve for the gains of (8) with python-control.
+
+    Args:
+        model: The reduced model.
+        state_cost: Weights of x1, x2, x3, x_e, (4,), not negative.
+        input_cost: Weight of u, positive.
+
+    Returns:
+        K_e, (4,).
+
+    Raises:
+        InputError: The weights do not make a stabilising gain.
+    """
+    import control  # 1.5 s of import, needed only here
+
+    try:
+        K, _, poles = control.lqr(model.A_e, model.B_e, np.diag(state_cost), np.array([[input_cost]]))
+    except Exception as error:
+        raise InputError(f"controller.lqr: no stabilising gain for these weights ({error})") from error
+    if not np.all(np.isfinite(K)) or np.max(np.real(poles)) >= 0.0:
+        raise InputError("controller.lqr: no stabilising gain for these weights (give x_e a positive weight)")
+    return tuple(float(k) for k in np.ravel(K))
+
+
+@dataclass(frozen=True)
+class Law:
+    """u = -K_e [y1, x2, y2, x_e], x_e' = -x3 (aranovskiy2020 (8)), with the rate limit and anti-windup.
+
+    While the command is limited, the integrator takes no step that would push it further into the limit.
+
+    Attributes:
+        dt: Control period [s].
+        gains: K_e, (4,).
+        rate_limit: Largest gimbal rate [rad/s].
+    """
+
+    dt: float
+    gains: tuple[float, float, float, float] = TABLE_2_GAINS
+    rate_limit: float = 4.7
+
+    def __call__(self, x1: Scalar, x2: Scalar, x3: Scalar, x_e: Scalar) -> tuple[Scalar, Scalar]:
+        """Command and the next integrator state.
+
+        Args:
+            x1: Tilt [rad].
+            x2: Tilt rate [rad/s].
+            x3: Gimbal angle [rad].
+            x_e: Integrator [rad s].
+
+        Returns:
+            The gimbal rate u [rad/s] to hold for a period, and x_e at the next tick.
+        """
+        k1, k2, k3, k4 = self.gains
+        limit = self.rate_limit
+        demanded = -(k1 * x1 + k2 * x2 + k3 * x3 + k4 * x_e)
+        u = clip(demanded, -limit, limit)
+        # The integrator moves the demand at the rate k4 x3.
+        winding = (u != demanded) & (k4 * x3 * demanded > 0.0)
+        return u, where(winding, x_e, x_e - self.dt * x3)
+
+
+class Tick(NamedTuple):
+    """All that one control period measured and decided (floats, or arrays (n_worlds,))."""
+
+    y1: Scalar
+    y2: Scalar
+    fog: Scalar
+    u: Scalar
+    x_e: Scalar
+    estimates: Sequence[Estimate]
+    """The observer's estimate, then those of the companions."""
+
+
+class Controller:
+    """Runs the sensors, the observer and the law, tick after tick.
+
+    It does not know MuJoCo: `update` takes the number of the physics step and the ideal readings at that step.
+
+    Args:
+        observer: The observer whose estimate the law uses.
+        law: The control law; its `dt` is the control period.
+        tilt: The tilt estimate.
+        sensors: What stands between the ideal readings and the controller.
+        directions: For each gimbal +1 or -1: the sign of u that it is given.
+        gimbal_zero: For each gimbal the angle at which y2 = 0 [rad].
+        timestep: Physics step [s].
+        seed: Seed of the sensors' noise.
+        worlds: Numbers of the worlds, or None for one world on floats.
+        feedback: Which rate the law uses: the observer's, the gyro's or the true one.
+        angles: Whether the law uses y1, y2 as (8) says or the estimates, as the text after (10) says.
+        companions: Observers that ride along open loop, by name.
+
+    Raises:
+        InputError: A rate or latency does not fit the physics step.
+    """
+
+    def __init__(
+        self,
+        observer: Observer,
+        law: Law,
+        tilt: RadialTilt,
+        sensors: Sensors,
+        *,
+        directions: Sequence[float],
+        gimbal_zero: Sequence[float],
+        timestep: float,
+        seed: int = 0,
+        worlds: Sequence[int] | None = None,
+        feedback: Feedback = "observer",
+        angles: Angles = "measured",
+        companions: Mapping[str, Observer] | None = None,
+    ) -> None:
+        self.observer = observer
+        self.law = law
+        self.tilt = tilt
+        self.sensors = sensors
+        self.directions = tuple(directions)
+        self.gimbal_zero = tuple(gimbal_zero)
+        self.timestep = timestep
+        self.seed = seed
+        self.worlds = worlds
+        self.feedback: Feedback = feedback
+        self.angles: Angles = angles
+        self.companions = dict(companions or {})
+        self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
+        self._observers = [observer, *self.companions.values()]
+        # y2 = sum of share * encoder - offset: half the difference of the encoders of a scissored pair.
+        self._shares = [direction / len(self.directions) for direction in self.directions]
+        self._offset = sum(share * zero for share, zero in zip(self._shares, self.gimbal_zero, strict=True))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the next update is the first tick of a run with the same seed."""
+        kinds = ("accelerometer", "encoder", "fog")
+        sampled = [
+            SampledSensor(
+                sensor, self.timestep, normals(self.seed, self.worlds, stream, sensor.channels), f"sensors.{kind}"
+            )
+            for stream, (kind, sensor) in enumerate((kind, getattr(self.sensors, kind)) for kind in kinds)
+        ]
+        self._accelerometer, self._encoder, self._fog = self._sampled = sampled
+        self._states: list[Any] | None = None
+        self._x_e: Scalar = 0.0
+        self.tick: Tick | None = None
+        self.beat = math.gcd(self.period, *(sensor.period for sensor in sampled))
+        """Physics steps between the moments at which anything may be due."""
+
+    def update(self, step: int, ideal: Ideal) -> bool:
+        """Take the samples and the control decision that are due at a physics step.
+
+        Args:
+            step: Number of the physics step, a multiple of `beat`.
+            ideal: The ideal readings at that step.
+
+        Returns:
+            Whether a control tick was due; `tick` then is its record.
+
+        Raises:
+            RunStopped: An observer returned a number that is not finite.
+        """
+        for sensor in self._sampled:
+            if step % sensor.period == 0:
+                sensor.sample(step, ideal)
+        if step % self.period:
+            return False
+        y1 = self.tilt(*self._accelerometer.read(step))
+        encoders = self._encoder.read(step)
+        fog = self._fog.read(step)
+        y2 = -self._offset
+        for share, angle in zip(self._shares, encoders, strict=True):
+            y2 = y2 + share * angle
+        y = Measurement(y1, y2)
+        if self._states is None:
+            self._states = [observer.init(y) for observer in self._observers]
+            estimates = [Estimate(y1, 0.0 * y1, y2)] * len(self._observers)
+            self._x_e = 0.0 * y1
+        else:
+            assert self.tick is not None
+            u = self.tick.u
+            stepped = [o.step(s, y, u) for o, s in zip(self._observers, self._states, strict=True)]
+            self._states = [state for state, _ in stepped]
+            estimates = [estimate for _, estimate in stepped]
+        x1, x2, x3 = estimates[0][:3]
+        if self.angles == "measured":
+            x1, x3 = y1, y2
+        if self.feedback != "observer":
+            x2 = fog if self.feedback == "fog" else ideal.rate
+        x_e = self._x_e
+        u, self._x_e = self.law(x1, x2, x3, x_e)
+        if type(u) is float and u != u:
+            self._complain(estimates, step)
+        self.tick = Tick(y1, y2, fog, u, x_e, estimates)
+        return True
+
+    def _complain(self, estimates: Sequence[Estimate], step: int) -> None:
+        raise RunStopped(f"observer {type(self.observer).__name__} returned NaN at t = {step * self.timestep:g} s")

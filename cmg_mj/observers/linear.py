@@ -1,0 +1,46 @@
+"""The linear differentiator, aranovskiy2020 (9)."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar
+from cmg_mj.observers.hold import FilterState, Rows, second_order_rows, second_order_step
+from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
+from cmg_mj.reduced import ReducedModel
+
+
+@dataclass(frozen=True, config=CONFIG)
+class LinearDifferentiator:
+    """G(s) = s/(tau s + 1)^2: model-free, aranovskiy2020 (9), sokolov2019 (8).
+
+    Discretised exactly for a measurement that runs straight between samples: on a ramp the estimate converges to the
+    slope itself.
+
+    Attributes:
+        dt: Sample period [s].
+        model: The reduced model (not used: this observer is model-free).
+        tau: Time constant [s]. Default: Table 2.
+    """
+
+    dt: Positive
+    model: ReducedModel
+    tau: Positive = 0.02
+
+    @cached_property
+    def _rows(self) -> Rows:
+        tau = self.tau
+        A = np.array([[0.0, 1.0], [-1.0 / tau**2, -2.0 / tau]])
+        return second_order_rows(A, np.array([[0.0], [1.0 / tau**2]]), self.dt)
+
+    def init(self, y: Measurement) -> FilterState:
+        """Start at rest at the measured tilt."""
+        return FilterState(y.y1, 0.0 * y.y1, y.y1)
+
+    def step(self, state: FilterState, y: Measurement, u: Scalar) -> tuple[FilterState, Estimate]:
+        """Advance by one sample period."""
+        state = second_order_step(self._rows, state, y[0])
+        return state, Estimate(state[0], state[1], y[1])

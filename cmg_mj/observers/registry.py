@@ -1,0 +1,89 @@
+"""Observers by name, and a user's own by dotted path."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from typing import Any
+
+from pydantic import ValidationError
+
+from cmg_mj.errors import InputError, nearest
+from cmg_mj.observers.protocol import Observer
+from cmg_mj.reduced import ReducedModel
+
+OBSERVERS = {
+    "linear": "cmg_mj.observers.linear:LinearDifferentiator",
+    "ltv": "cmg_mj.observers.ltv:LinearTimeVarying",
+    "homogeneous": "cmg_mj.observers.homogeneous:Homogeneous",
+    "luenberger": "cmg_mj.observers.luenberger:Luenberger",
+    "finite_difference": "cmg_mj.observers.finite_difference:FiniteDifference",
+    "super_twisting": "cmg_mj.observers.super_twisting:SuperTwisting",
+    "linear_high_gain": "cmg_mj.observers.linear_high_gain:LinearHighGain",
+}
+"""Name a user types -> dotted path of the class."""
+
+
+def observer_class(kind: str) -> type:
+    """Find an observer's class.
+
+    Args:
+        kind: A name of `OBSERVERS`, or `package.module:Class`.
+
+    Returns:
+        The class.
+
+    Raises:
+        InputError: There is no such observer, or its module cannot be imported.
+    """
+    if ":" not in kind and kind not in OBSERVERS:
+        raise InputError(
+            f"observer.kind = {kind!r}: no such observer; {nearest(kind, OBSERVERS)}, or your own as package.module:Class"
+        )
+    path = OBSERVERS.get(kind, kind)
+    module_name, _, class_name = path.partition(":")
+    try:
+        found = getattr(importlib.import_module(module_name), class_name)
+    except Exception as error:  # a user's module may fail in any way while it is imported
+        raise InputError(f"observer.kind = {kind!r}: cannot be imported: {type(error).__name__}: {error}") from error
+    if not (inspect.isclass(found) and callable(getattr(found, "init", None)) and callable(getattr(found, "step", None))):
+        raise InputError(f"observer.kind = {kind!r}: must be a class with the methods init(y) and step(state, y, u)")
+    return found
+
+
+def make_observer(kind: str, dt: float, model: ReducedModel, **parameters: Any) -> Observer:
+    """Construct an observer.
+
+    Args:
+        kind: A name of `OBSERVERS`, or `package.module:Class`.
+        dt: Sample period [s].
+        model: The reduced model read off the plant.
+        **parameters: The observer's design parameters; those left out keep their defaults.
+
+    Returns:
+        The observer.
+
+    Raises:
+        InputError: Unknown observer or parameter, or a parameter that the observer refuses.
+    """
+    cls = observer_class(kind)
+    allowed = [name for name in inspect.signature(cls).parameters if name not in ("dt", "model")]
+    for name in parameters:
+        if name not in allowed and not _takes_any(cls):
+            what = nearest(name, allowed) if allowed else "it has none"
+            raise InputError(f"observer.{name}: {kind} has no such parameter; {what}")
+    try:
+        return cls(dt=dt, model=model, **parameters)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(["observer", *(str(part) for part in first["loc"])])
+        given = "" if first["type"] == "value_error" else f" = {first['input']!r}"
+        message = first["msg"].removeprefix("Value error, ")
+        raise InputError(f"{where}{given}: {message} (observer {kind})") from error
+    except Exception as error:  # a user's own class may refuse its parameters in its own way
+        raise InputError(f"observer {kind}: {type(error).__name__}: {error}") from error
+
+
+def _takes_any(cls: type) -> bool:
+    kinds = [p.kind for p in inspect.signature(cls).parameters.values()]
+    return inspect.Parameter.VAR_KEYWORD in kinds

@@ -1,0 +1,367 @@
+"""MJCF -> compiled model: load, vary, resolve names once, read the reduced model's parameters off it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass as plain_dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Literal
+
+import mujoco
+import numpy as np
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar
+from cmg_mj.errors import InputError, nearest
+from cmg_mj.reduced import ReducedModel
+from cmg_mj.resources import find
+from cmg_mj.sensors import Ideal
+from cmg_mj.tilt import RadialTilt
+
+NonNegative = Annotated[float, Field(ge=0.0)]
+Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
+KEYFRAME = "equilibrium"
+QUARTER_TURN = math.pi / 2.0
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class PlantSettings:
+    """Which rig, and how it differs from its model file. What is left out is as the file says.
+
+    Attributes:
+        model: A bundled MJCF by name, or a path.
+        equilibrium_bias_deg: e: the frame's centre of mass is turned about the pivot by this angle [deg].
+        initial_tilt_deg: x1(0), from the true equilibrium [deg].
+        timestep_s: Physics step [s].
+        integrator: MuJoCo's integrator. Fast flywheels need RK4.
+        lock_thrust_bearing: Take the yaw joint out.
+        gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
+        gimbal_friction_n_m: Dry friction of each gimbal [N m].
+        gimbal_damping_n_m_s: Viscous friction of each gimbal [N m s/rad].
+        tilt_friction_n_m: Dry friction of the tilt joint [N m].
+        tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
+        flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
+    """
+
+    model: str = "scissored_pair.xml"
+    equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 0.5
+    initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 1.0
+    timestep_s: Annotated[float, Field(gt=0.0, le=0.1)] = 0.001
+    integrator: Integrator = "RK4"
+    lock_thrust_bearing: bool = False
+    gimbal_armature_kg_m2: NonNegative | None = None
+    gimbal_friction_n_m: NonNegative | None = None
+    gimbal_damping_n_m_s: NonNegative | None = None
+    tilt_friction_n_m: NonNegative | None = None
+    tilt_damping_n_m_s: NonNegative | None = None
+    flywheel_imbalance_kg_m: float = 0.0
+
+
+@plain_dataclass(frozen=True)
+class Cube:
+    """Addresses of one module in the compiled model.
+
+    Attributes:
+        name: Its prefix, `cube1`.
+        gimbal: Address of the gimbal angle in qpos, and of its rate in qvel (hinges only: they agree).
+        flywheel: The same for the flywheel.
+        servo: The gimbal servo's control.
+        motor: The flywheel motor's control.
+        direction: +1 or -1: the sign of u its gimbal is given, so that all cubes push the same way.
+        gimbal_zero: Gimbal angle at which the spin axis is upright, x3 = 0 [rad].
+        speed: Nominal flywheel speed, signed [rad/s].
+    """
+
+    name: str
+    gimbal: int
+    flywheel: int
+    servo: int
+    motor: int
+    direction: float
+    gimbal_zero: float
+    speed: float
+
+
+class Plant:
+    """A compiled rig with its names resolved.
+
+    Attributes:
+        settings: What it was made from.
+        model: The compiled model. Do not change it: the plant may be shared.
+        reduced: Parameters of the reduced model, read off the file as it is, without bias or friction, which
+            the controller does not know.
+        cubes: Addresses of the modules.
+        tilt: Address of q_b in qpos and qvel.
+        yaw: Address of q_a, or None if the thrust bearing is locked.
+        tilt_zero: q_b at which the radial line is upright [rad].
+        bias: e [rad].
+        radial_tilt: The tilt estimate for this rig's accelerometers.
+    """
+
+    def __init__(self, settings: PlantSettings, path: Path) -> None:
+        self.settings = settings
+        self.path = path
+        self.bias = math.radians(settings.equilibrium_bias_deg)
+        spec = _parse(path)
+        if settings.lock_thrust_bearing:
+            _lock(spec, path)
+        self.model = _compile(spec, path)
+        self._resolve()
+        self.reduced = self._read_reduced()
+        self._vary()
+
+    # --- names ---------------------------------------------------------------------------------------------
+
+    def _resolve(self) -> None:
+        model = self.model
+        if any(kind != int(mujoco.mjtJoint.mjJNT_HINGE) for kind in model.jnt_type):
+            raise InputError(f"{self.path}: every joint must be a hinge")
+        names = [model.joint(i).name for i in range(model.njnt)]
+        self.tilt = self._id("joint", "tilt")
+        self.yaw = names.index("yaw") if "yaw" in names else None
+        self.key = self._id("key", KEYFRAME)
+        self.tilt_zero = float(model.key_qpos[self.key, self.tilt])
+        prefixes = [name.removesuffix("/gimbal") for name in names if name.endswith("/gimbal")]
+        if not prefixes:
+            raise InputError(f"{self.path}: no joint 'cube1/gimbal': a rig needs at least one cube attached with its prefix")
+        self.frame = int(model.jnt_bodyid[self.tilt])
+        self._accelerometers = [self._accelerometer(f"accelerometer_{which}") for which in ("inner", "outer")]
+        radii = [radius for _, radius in self._accelerometers]
+        if not 0.0 < radii[0] < radii[1]:
+            raise InputError(f"{self.path}: accelerometer_outer must lie farther from the tilt axis than accelerometer_inner")
+        self.radial_tilt = RadialTilt(*radii)
+        self._id("sensor", "fog")
+        self.cubes = tuple(self._cube(prefix) for prefix in prefixes)
+        self.servos = [cube.servo for cube in self.cubes]
+        self.directions = [cube.direction for cube in self.cubes]
+        self._gimbals = [cube.gimbal for cube in self.cubes]
+        self._shares = [cube.direction / len(self.cubes) for cube in self.cubes]
+        self._specific_forces = [address + axis for address, _ in self._accelerometers for axis in (0, 2)]
+
+    def _id(self, kind: str, name: str) -> int:
+        model = self.model
+        found = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
+        if found < 0:
+            count = {"joint": model.njnt, "actuator": model.nu, "sensor": model.nsensor, "key": model.nkey}[kind]
+            existing = [getattr(model, kind)(i).name for i in range(count)]
+            raise InputError(f"{self.path}: the model has no {kind} {name!r}; {nearest(name, existing)}")
+        return int(found)
+
+    def _accelerometer(self, name: str) -> tuple[int, float]:
+        """Address in sensordata, and distance of the site from the tilt axis."""
+        model = self.model
+        sensor = self._id("sensor", name)
+        site = int(model.sensor_objid[sensor])
+        is_one = model.sensor_type[sensor] == int(mujoco.mjtSensor.mjSENS_ACCELEROMETER)
+        if not is_one or model.site_bodyid[site] != self.frame:
+            raise InputError(f"{self.path}: sensor {name!r} must be an accelerometer at a site of the body with the joint 'tilt'")
+        x, _, z = model.site_pos[site] - model.jnt_pos[self.tilt]
+        return int(model.sensor_adr[sensor]), float(math.hypot(x, z))
+
+    def _cube(self, prefix: str) -> Cube:
+        model = self.model
+        gimbal = self._id("joint", f"{prefix}/gimbal")
+        flywheel = self._id("joint", f"{prefix}/flywheel")
+        servo = self._id("actuator", f"{prefix}/gimbal_servo")
+        motor = self._id("actuator", f"{prefix}/flywheel_motor")
+        encoder = self._id("sensor", f"{prefix}/gimbal_encoder")
+        is_position = model.sensor_type[encoder] == int(mujoco.mjtSensor.mjSENS_JOINTPOS)
+        if not is_position or model.sensor_objid[encoder] != gimbal:
+            raise InputError(f"{self.path}: sensor '{prefix}/gimbal_encoder' must be the jointpos of '{prefix}/gimbal'")
+        zero = float(model.key_qpos[self.key, gimbal])
+        speed = float(model.key_ctrl[self.key, motor])
+        if speed == 0.0:
+            raise InputError(f"{self.path}: keyframe {KEYFRAME!r} must give '{prefix}/flywheel_motor' a speed")
+        # A quarter turn back, the flywheel's momentum lies along the tilt axis; u > 0 turns it away from there.
+        inertia = self._mass_matrix({gimbal: zero - QUARTER_TURN})
+        direction = math.copysign(1.0, inertia[self.tilt, flywheel] * speed)
+        return Cube(prefix, gimbal, flywheel, servo, motor, direction, zero, speed)
+
+    # --- the reduced model ---------------------------------------------------------------------------------
+
+    def _mass_matrix(self, angles: dict[int, float]) -> np.ndarray:
+        """Mass matrix at the keyframe with some joint angles replaced, (nv, nv)."""
+        model = self.model
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, self.key)
+        for joint, angle in angles.items():
+            data.qpos[joint] = angle
+        mujoco.mj_forward(model, data)
+        dense = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, dense)
+        return dense
+
+    def _read_reduced(self) -> ReducedModel:
+        """Read J1, J2, J_d, omega_d and m g l/sqrt(2) off the model's inertia and gravity, a share per cube."""
+        n = len(self.cubes)
+        upright = self._mass_matrix({})
+        turned = self._mass_matrix({c.gimbal: c.gimbal_zero - c.direction * QUARTER_TURN for c in self.cubes})
+        J1 = upright[self.tilt, self.tilt] / n
+        J2 = turned[self.tilt, self.tilt] / n - J1
+        J_d = sum(abs(turned[self.tilt, c.flywheel]) for c in self.cubes) / n
+        momentum = sum(turned[self.tilt, c.flywheel] * c.speed for c in self.cubes)
+        data = mujoco.MjData(self.model)
+        mujoco.mj_resetDataKeyframe(self.model, data, self.key)
+        data.qvel[:] = 0.0
+        data.qpos[self.tilt] = self.tilt_zero + QUARTER_TURN
+        mujoco.mj_forward(self.model, data)
+        gravity_torque = -data.qfrc_bias[self.tilt] / n
+        if gravity_torque <= 0.0:
+            raise InputError(f"{self.path}: at the keyframe {KEYFRAME!r} the rig must stand upright, its mass above the tilt axis")
+        return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque))
+
+    # --- variations ----------------------------------------------------------------------------------------
+
+    def _vary(self) -> None:
+        model, settings = self.model, self.settings
+        model.opt.timestep = settings.timestep_s
+        model.opt.integrator = _INTEGRATORS[settings.integrator]
+        # A plant that diverges must say so, not start again from its reference pose.
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        gimbals = self._gimbals
+        for field, joints, value in (
+            (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),
+            (model.dof_frictionloss, gimbals, settings.gimbal_friction_n_m),
+            (model.dof_damping, gimbals, settings.gimbal_damping_n_m_s),
+            (model.dof_frictionloss, [self.tilt], settings.tilt_friction_n_m),
+            (model.dof_damping, [self.tilt], settings.tilt_damping_n_m_s),
+        ):
+            if value is not None:
+                field[joints] = value
+        if self.bias:
+            self._shift(self.frame, self._bias_shift())
+        if settings.flywheel_imbalance_kg_m:
+            for cube in self.cubes:
+                body = int(model.jnt_bodyid[cube.flywheel])
+                self._shift(body, np.array([settings.flywheel_imbalance_kg_m / model.body_mass[body], 0.0, 0.0]))
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+
+    def _bias_shift(self) -> np.ndarray:
+        """How far the frame's centre of mass moves so that the whole rig's turns about the pivot by e [m], (3,).
+
+        The first moment of all that tilts is turned, not lengthened: gravity's torque keeps its amplitude.
+        """
+        model = self.model
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, self.key)
+        mujoco.mj_forward(model, data)
+        to_frame = data.xmat[self.frame].reshape(3, 3).T
+        centre = to_frame @ (data.subtree_com[self.frame] - data.xanchor[self.tilt])
+        c, s = math.cos(self.bias), math.sin(self.bias)
+        turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+        return model.body_subtreemass[self.frame] / model.body_mass[self.frame] * (turn @ centre - centre)
+
+    def _shift(self, body: int, offset: np.ndarray) -> None:
+        """Move a body's centre of mass, and clear the shortcuts the compiler took because it was elsewhere."""
+        model = self.model
+        model.body_ipos[body] += offset
+        model.body_sameframe[body] = 0
+        model.geom_sameframe[model.geom_bodyid == body] = 0
+        model.site_sameframe[model.site_bodyid == body] = 0
+
+    # --- running -------------------------------------------------------------------------------------------
+
+    def initialise(self, data: mujoco.MjData) -> None:
+        """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg from the equilibrium."""
+        mujoco.mj_resetDataKeyframe(self.model, data, self.key)
+        data.qpos[self.tilt] = self.tilt_zero - self.bias + math.radians(self.settings.initial_tilt_deg)
+        mujoco.mj_forward(self.model, data)
+
+    def new_data(self) -> mujoco.MjData:
+        """Fresh simulation data at the scenario's initial state, accelerometers included."""
+        data = mujoco.MjData(self.model)
+        self.initialise(data)
+        return data
+
+    def ideal(self, qpos: Sequence[Scalar], qvel: Sequence[Scalar], sensordata: Sequence[Scalar]) -> Ideal:
+        """What perfect sensors show: encoders and gyro the present state, accelerometers the last physics step.
+
+        Encoders and gyro are read off the joints they sit on, because after a step MuJoCo's own sensordata
+        is still that of the state before it. On the frame, the gyro's tilt axis shows exactly q_b'.
+
+        Args:
+            qpos: Joint angles [rad].
+            qvel: Joint rates [rad/s].
+            sensordata: MuJoCo's sensor readings.
+
+        Returns:
+            The ideal readings, of the elements' own type (float, or array (n_worlds,)).
+        """
+        i, j, k, m = self._specific_forces
+        return Ideal(
+            (sensordata[i], sensordata[j], sensordata[k], sensordata[m]),
+            [qpos[gimbal] for gimbal in self._gimbals],
+            qvel[self.tilt],
+        )
+
+    def gimbal_angle(self, qpos: Sequence[Scalar]) -> Scalar:
+        """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""
+        angle = 0.0
+        for cube, share in zip(self.cubes, self._shares, strict=True):
+            angle = angle + share * (qpos[cube.gimbal] - cube.gimbal_zero)
+        return angle
+
+    @cached_property
+    def joint_names(self) -> list[str]:
+        """Names of the joints in the order of qpos."""
+        return [self.model.joint(i).name for i in range(self.model.njnt)]
+
+
+_INTEGRATORS = {
+    "RK4": int(mujoco.mjtIntegrator.mjINT_RK4),
+    "Euler": int(mujoco.mjtIntegrator.mjINT_EULER),
+    "implicit": int(mujoco.mjtIntegrator.mjINT_IMPLICIT),
+    "implicitfast": int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST),
+    "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
+}
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _parse(path: Path) -> mujoco.MjSpec:
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
+
+
+def _compile(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise InputError(f"{path}: does not compile: {_one_line(error)}") from error
+
+
+def _lock(spec: mujoco.MjSpec, path: Path) -> None:
+    """Take the yaw joint out, and its entry out of every keyframe."""
+    names = [joint.name for joint in spec.joints]
+    if "yaw" not in names:
+        raise InputError(f"plant.lock_thrust_bearing = true: {path} has no joint 'yaw' to lock")
+    index = names.index("yaw")
+    spec.delete(spec.joint("yaw"))
+    for key in spec.keys:
+        key.qpos = np.delete(np.array(key.qpos), index)
+        key.qvel = np.delete(np.array(key.qvel), index)
+
+
+def load_plant(settings: PlantSettings | None = None, beside: Path | None = None, **fields: object) -> Plant:
+    """Load a rig.
+
+    Args:
+        settings: Its settings; or give them as keyword arguments.
+        beside: A folder that a relative model path may start from.
+        **fields: Fields of `PlantSettings`.
+
+    Returns:
+        The compiled plant.
+
+    Raises:
+        InputError: The file does not exist, does not compile, or lacks a joint, actuator, sensor or keyframe.
+    """
+    settings = settings or PlantSettings(**fields)  # type: ignore[arg-type]
+    return Plant(settings, find("models", settings.model, ".xml", "plant.model", beside))

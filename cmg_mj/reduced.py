@@ -1,0 +1,97 @@
+"""The papers' reduced model: one inverted pendulum, one gimbal angle, the gimbal rate as its input.
+
+aranovskiy2020 (2)-(6); sokolov2019 (1)-(5) is the same model with other numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cmg_mj.elementwise import Scalar, cos, sin
+
+if TYPE_CHECKING:
+    import control
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """Parameters of the reduced model, each for one gimbal's share of the rig.
+
+    State x = [x1, x2, x3]: tilt from the equilibrium [rad], tilt rate [rad/s], gimbal angle from
+    the spin axis' upright position [rad]. Input u: gimbal rate [rad/s].
+
+    Attributes:
+        J1: I_d + J_b + K_c + m l^2/2 [kg m^2], the tilt inertia at x3 = 0.
+        J2: J_c - I_d + J_d - K_c [kg m^2], what the gimbal angle adds to it.
+        J_d: Flywheel's spin inertia [kg m^2].
+        omega_d: Flywheel's nominal speed [rad/s].
+        gravity_torque: m g l/sqrt(2) [N m], the gravity torque at a tilt of 90 degrees.
+    """
+
+    J1: float
+    J2: float
+    J_d: float
+    omega_d: float
+    gravity_torque: float
+
+    def tilt_inertia(self, x3: Scalar) -> Scalar:
+        """J1 + J2 sin^2 x3 [kg m^2], the denominator of (4)."""
+        return self.J1 + self.J2 * sin(x3) ** 2
+
+    def tilt_acceleration(self, x1: Scalar, x2: Scalar, x3: Scalar, u: Scalar) -> Scalar:
+        """f2(x, u) [rad/s^2], the second line of (4)."""
+        gyroscopic = u * (self.J_d * self.omega_d * cos(x3) - self.J2 * x2 * sin(2.0 * x3))
+        return (gyroscopic + self.gravity_torque * sin(x1)) / self.tilt_inertia(x3)
+
+    @property
+    def A(self) -> np.ndarray:
+        """State matrix of the linearisation (6), (3, 3)."""
+        return np.array([[0.0, 1.0, 0.0], [self.gravity_torque / self.J1, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+    @property
+    def B(self) -> np.ndarray:
+        """Input matrix of the linearisation (6), (3, 1)."""
+        return np.array([[0.0], [self.J_d * self.omega_d / self.J1], [1.0]])
+
+    @property
+    def C(self) -> np.ndarray:
+        """Output matrix, (2, 3): tilt and gimbal angle are measured."""
+        return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+    @property
+    def A_e(self) -> np.ndarray:
+        """A with the integrator x_e' = -x3 appended, (4, 4)."""
+        A_e = np.zeros((4, 4))
+        A_e[:3, :3] = self.A
+        A_e[3, 2] = -1.0
+        return A_e
+
+    @property
+    def B_e(self) -> np.ndarray:
+        """B with the integrator appended, (4, 1)."""
+        return np.vstack([self.B, [[0.0]]])
+
+    def linear_system(self) -> control.StateSpace:
+        """The linearisation (6) with the measured outputs, for python-control."""
+        import control
+
+        return control.ss(
+            self.A, self.B, self.C, np.zeros((2, 1)), inputs=["u"], outputs=["y1", "y2"], states=["x1", "x2", "x3"]
+        )
+
+    def nonlinear_system(self) -> control.NonlinearIOSystem:
+        """The reduced model (4) itself, for python-control."""
+        import control
+
+        def update(t: float, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:
+            return np.array([x[1], self.tilt_acceleration(x[0], x[1], x[2], u[0]), u[0]])
+
+        def output(t: float, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:
+            return np.array([x[0], x[2]])
+
+        return control.nlsys(
+            update, output, inputs=["u"], outputs=["y1", "y2"], states=["x1", "x2", "x3"], name="reduced_cmg"
+        )

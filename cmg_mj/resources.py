@@ -1,0 +1,47 @@
+"""Where the bundled models and scenarios are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cmg_mj.errors import InputError, nearest
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def folder(name: str) -> Path:
+    """The bundled folder `models` or `scenarios`: inside the wheel, or beside the package in a checkout."""
+    inside = _PACKAGE / name
+    return inside if inside.is_dir() else _PACKAGE.parent / name
+
+
+def bundled(name: str) -> list[str]:
+    """Names of the bundled files of a folder, without their endings."""
+    return sorted(path.stem for path in folder(name).iterdir() if path.suffix in (".xml", ".toml"))
+
+
+def find(kind: str, name: str, suffix: str, field: str, beside: Path | None = None) -> Path:
+    """Find a file that the user names by path or, if it is bundled, by name.
+
+    Args:
+        kind: The bundled folder.
+        name: What the user wrote.
+        suffix: The file's ending, which a bundled name may leave out.
+        field: What to call it in the error.
+        beside: A folder that relative paths may start from as well as from the current one.
+
+    Returns:
+        The file's path.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    candidates = [Path(name)]
+    if beside is not None:
+        candidates.append(beside / name)
+    if "/" not in name and "\\" not in name:
+        candidates.append(folder(kind) / (name if name.endswith(suffix) else name + suffix))
+    for path in candidates:
+        if path.is_file():
+            return path
+    raise InputError(f"{field} = {name!r}: no such file, nor a bundled one; {nearest(name, bundled(kind))}")

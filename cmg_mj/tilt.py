@@ -1,0 +1,46 @@
+"""Tilt from two accelerometers on one radial line through the pivot.
+
+S. Trimpe and R. D'Andrea, "Accelerometer-based tilt estimation of a rigid body with only rotational
+degrees of freedom", ICRA 2010 (reference [8] of aranovskiy2020).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar, atan2
+
+
+@dataclass(frozen=True)
+class RadialTilt:
+    """Two accelerometers at distances r_inner < r_outer from the pivot, on one ray.
+
+    A body turning about a fixed point moves a point r n of that ray with the acceleration r W n, W the
+    same for both (W = skew(alpha) + skew(omega)^2). Angular acceleration and centripetal terms are therefore
+    proportional to r, and the combination below is gravity alone, whatever the motion.
+
+    Attributes:
+        r_inner: Distance of the inner accelerometer from the pivot [m].
+        r_outer: Distance of the outer accelerometer from the pivot [m].
+    """
+
+    r_inner: float
+    r_outer: float
+
+    def __call__(self, inner_x: Scalar, inner_z: Scalar, outer_x: Scalar, outer_z: Scalar) -> Scalar:
+        """Tilt y1 = q_b + pi/4 from the specific forces of both accelerometers.
+
+        Args:
+            inner_x: Inner accelerometer, tangential axis [m/s^2].
+            inner_z: Inner accelerometer, radial axis, outward [m/s^2].
+            outer_x: Outer accelerometer, tangential axis [m/s^2].
+            outer_z: Outer accelerometer, radial axis, outward [m/s^2].
+
+        Returns:
+            Tilt of the radial line from the vertical [rad].
+        """
+        span = self.r_outer - self.r_inner
+        w_inner, w_outer = self.r_outer / span, self.r_inner / span
+        gravity_x = w_inner * inner_x - w_outer * outer_x
+        gravity_z = w_inner * inner_z - w_outer * outer_z
+        return atan2(-gravity_x, gravity_z)
