@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -112,7 +112,7 @@ class Controller:
         gimbal_zero: For each gimbal the angle at which y2 = 0 [rad].
         timestep: Physics step [s].
         seed: Seed of the sensors' noise.
-        worlds: Numbers of the worlds, or None for one world on floats.
+        worlds: The number of one world, on floats, or the numbers of many, on arrays.
         feedback: Which rate the law uses: the observer's, the gyro's or the true one.
         angles: Whether the law uses y1, y2 as (8) says or the estimates, as the text after (10) says.
         companions: Observers that ride along open loop, by name.
@@ -132,7 +132,7 @@ class Controller:
         gimbal_zero: Sequence[float],
         timestep: float,
         seed: int = 0,
-        worlds: Sequence[int] | None = None,
+        worlds: int | Sequence[int] = 0,
         feedback: Feedback = "observer",
         angles: Angles = "measured",
         companions: Mapping[str, Observer] | None = None,
@@ -149,6 +149,7 @@ class Controller:
         self.feedback: Feedback = feedback
         self.angles: Angles = angles
         self.companions = dict(companions or {})
+        self._single = isinstance(worlds, int)
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         self._observers = [observer, *self.companions.values()]
         # y2 = sum of share * encoder - offset: half the difference of the encoders of a scissored pair.
@@ -203,10 +204,7 @@ class Controller:
             self._x_e = 0.0 * y1
         else:
             assert self.tick is not None
-            u = self.tick.u
-            stepped = [o.step(s, y, u) for o, s in zip(self._observers, self._states, strict=True)]
-            self._states = [state for state, _ in stepped]
-            estimates = [estimate for _, estimate in stepped]
+            estimates = self._observe(y, self.tick.u, step)
         x1, x2, x3 = estimates[0][:3]
         if self.angles == "measured":
             x1, x3 = y1, y2
@@ -214,10 +212,25 @@ class Controller:
             x2 = fog if self.feedback == "fog" else ideal.rate
         x_e = self._x_e
         u, self._x_e = self.law(x1, x2, x3, x_e)
-        if type(u) is float and u != u:
-            self._complain(estimates, step)
         self.tick = Tick(y1, y2, fog, u, x_e, estimates)
         return True
 
-    def _complain(self, estimates: Sequence[Estimate], step: int) -> None:
-        raise RunStopped(f"observer {type(self.observer).__name__} returned NaN at t = {step * self.timestep:g} s")
+    def _observe(self, y: Measurement, u: Scalar, step: int) -> list[Estimate]:
+        """Advance every observer by one sample."""
+        states, estimates = self._states, []
+        assert states is not None
+        for i, observer in enumerate(self._observers):
+            try:
+                states[i], estimate = observer.step(states[i], y, u)
+                x1, x2, x3 = estimate[:3]
+                if self._single:
+                    x1, x2, x3 = float(x1), float(x2), float(x3)
+            except Exception as error:  # a user's observer may fail in any way
+                self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
+            estimates.append(Estimate(x1, x2, x3))
+        if self._single and 0.0 * estimates[0].x2 != 0.0:  # NaN and infinity alike; many worlds are judged one by one
+            self._blame(self.observer, f"returned the estimate {estimates[0].x2} for x2", step)
+        return estimates
+
+    def _blame(self, observer: Observer, what: str, step: int, cause: Exception | None = None) -> NoReturn:
+        raise RunStopped(f"observer {type(observer).__name__} {what} at t = {step * self.timestep:g} s") from cause

@@ -171,12 +171,12 @@ class Sensors:
     fog: Fog = Field(default_factory=Fog)
 
 
-def normals(seed: int, worlds: Sequence[int] | None, stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
+def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
     """Standard normal numbers, sample after sample, that depend on (seed, world, stream) alone.
 
     Args:
         seed: The run's seed.
-        worlds: Numbers of the worlds, or None for world 0 on floats.
+        worlds: The number of one world, on floats, or the numbers of many, on arrays.
         stream: Which sensor.
         channels: Numbers a sample.
 
@@ -187,13 +187,14 @@ def normals(seed: int, worlds: Sequence[int] | None, stream: int, channels: int)
     if channels == 0:
         while True:
             yield ()
+    single = isinstance(worlds, int)
     generators = [
         np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(world, stream)))
-        for world in ([0] if worlds is None else worlds)
+        for world in ([worlds] if single else worlds)
     ]
     while True:
         drawn = np.stack([g.standard_normal((block, channels)) for g in generators], axis=-1)
-        yield from drawn[:, :, 0].tolist() if worlds is None else drawn
+        yield from drawn[:, :, 0].tolist() if single else drawn
 
 
 class SampledSensor:

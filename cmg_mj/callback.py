@@ -1,0 +1,112 @@
+"""The Controller in a user's own loop, and as MuJoCo's control callback."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import mujoco
+
+from cmg_mj.controller import Controller
+from cmg_mj.plant import Plant
+
+
+def control(plant: Plant, controller: Controller, data: mujoco.MjData) -> bool:
+    """Sample what is due at this physics step, and set the servos' commands if it is a control tick.
+
+    Call it before every `mujoco.mj_step`. At the first step the accelerometers are computed here, so that it
+    does not matter whether `mj_forward` was called before.
+
+    Args:
+        plant: The rig.
+        controller: Its controller.
+        data: The simulation.
+
+    Returns:
+        Whether a control tick was due.
+    """
+    step = round(data.time / plant.model.opt.timestep)
+    if step % controller.beat:
+        return False
+    sensordata = data.sensordata if step else _first_readings(plant, data)
+    ideal = plant.ideal(data.qpos.tolist(), data.qvel.tolist(), sensordata.tolist())
+    if not controller.update(step, ideal):
+        return False
+    assert controller.tick is not None
+    for cube in plant.cubes:
+        data.ctrl[cube.servo] = cube.direction * controller.tick.u
+    return True
+
+
+def _first_readings(plant: Plant, data: mujoco.MjData):
+    """Accelerometers at the start: MuJoCo shows zeros until a first forward pass."""
+    scratch = mujoco.MjData(plant.model)
+    mujoco.mj_copyState(plant.model, data, scratch, int(mujoco.mjtState.mjSTATE_INTEGRATION))
+    previous = mujoco.get_mjcb_control()
+    mujoco.set_mjcb_control(None)
+    try:
+        mujoco.mj_forward(plant.model, scratch)
+    finally:
+        mujoco.set_mjcb_control(previous)
+    return scratch.sensordata
+
+
+class ControlCallback:
+    """Callable as `mjcb_control`: advances the controller exactly once a control period.
+
+    MuJoCo calls back once a step, in RK4 four times: at t, twice at t + h/2, and at t + h, the last one bearing the
+    same time as the first of the next step. Only the first call of a step is a sampling instant. Calls from
+    `mj_forward` repeat an instant and change nothing. If time runs backwards (a reset), the controller starts afresh.
+
+    Args:
+        plant: The rig.
+        controller: Its controller.
+    """
+
+    def __init__(self, plant: Plant, controller: Controller) -> None:
+        self.plant = plant
+        self.controller = controller
+        self._instant: float | None = None
+        self._half_stages = 0
+
+    def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        h, t = model.opt.timestep, data.time
+        if self._instant is not None:
+            ahead = (t - self._instant) / h
+            if abs(ahead) < 0.25:  # a repeated forward pass at this instant
+                self._half_stages = 0
+                return
+            if 0.25 < ahead < 0.75:  # RK4's second and third stage
+                self._half_stages += 1
+                return
+            if self._half_stages >= 2 and 0.75 < ahead < 1.25:  # RK4's fourth stage; the next call is the next step's first
+                self._half_stages = 0
+                return
+            if ahead < 0.0:
+                self.controller.reset()
+        self._half_stages = 0
+        self._instant = t
+        control(self.plant, self.controller, data)
+
+
+@contextmanager
+def installed(plant: Plant, controller: Controller) -> Iterator[ControlCallback]:
+    """Install the controller as MuJoCo's control callback, and take it out again even on an exception.
+
+    `mjcb_control` is one pointer for the whole process: while it is installed, only this plant may be stepped.
+    What was installed before comes back.
+
+    Args:
+        plant: The rig.
+        controller: A fresh controller for it.
+
+    Yields:
+        The callback.
+    """
+    callback = ControlCallback(plant, controller)
+    previous = mujoco.get_mjcb_control()
+    mujoco.set_mjcb_control(callback)
+    try:
+        yield callback
+    finally:
+        mujoco.set_mjcb_control(previous)

@@ -1,0 +1,28 @@
+"""A push: a torque on the frame about the tilt axis, for a while."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class Push:
+    """A torque from outside.
+
+    Attributes:
+        start_s: When it begins [s].
+        duration_s: How long it lasts [s].
+        torque_n_m: Torque about the tilt axis [N m].
+    """
+
+    start_s: Annotated[float, Field(ge=0.0)]
+    duration_s: Annotated[float, Field(gt=0.0)] = 0.1
+    torque_n_m: float = 1.0
+
+    @property
+    def end_s(self) -> float:
+        """When it ends [s]."""
+        return self.start_s + self.duration_s
