@@ -79,7 +79,9 @@ class ControlCallback:
             if 0.25 < ahead < 0.75:  # RK4's second and third stage
                 self._half_stages += 1
                 return
-            if self._half_stages >= 2 and 0.75 < ahead < 1.25:  # RK4's fourth stage; the next call is the next step's first
+            if (
+                self._half_stages >= 2 and 0.75 < ahead < 1.25
+            ):  # RK4's fourth stage; the next call is the next step's first
                 self._half_stages = 0
                 return
             if ahead < 0.0:

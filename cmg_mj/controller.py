@@ -162,7 +162,10 @@ class Controller:
         kinds = ("accelerometer", "encoder", "fog")
         sampled = [
             SampledSensor(
-                sensor, self.timestep, normals(self.seed, self.worlds, stream, sensor.channels), f"sensors.{kind}"
+                sensor,
+                self.timestep,
+                normals(self.seed, self.worlds, stream, sensor.channels),
+                f"sensors.{kind}",
             )
             for stream, (kind, sensor) in enumerate((kind, getattr(self.sensors, kind)) for kind in kinds)
         ]
@@ -222,14 +225,13 @@ class Controller:
         for i, observer in enumerate(self._observers):
             try:
                 states[i], estimate = observer.step(states[i], y, u)
-                x1, x2, x3 = estimate[:3]
-                if self._single:
-                    x1, x2, x3 = float(x1), float(x2), float(x3)
+                if self._single and type(estimate[1]) is not float:
+                    estimate = Estimate(*(float(part) for part in estimate[:3]))
             except Exception as error:  # a user's observer may fail in any way
                 self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
-            estimates.append(Estimate(x1, x2, x3))
-        if self._single and 0.0 * estimates[0].x2 != 0.0:  # NaN and infinity alike; many worlds are judged one by one
-            self._blame(self.observer, f"returned the estimate {estimates[0].x2} for x2", step)
+            estimates.append(estimate)
+        if self._single and 0.0 * estimates[0][1] != 0.0:  # NaN and infinity alike; many worlds are judged one by one
+            self._blame(self.observer, f"returned {estimates[0][1]} for x2", step)
         return estimates
 
     def _blame(self, observer: Observer, what: str, step: int, cause: Exception | None = None) -> NoReturn:

@@ -19,6 +19,8 @@ import numpy as np
 # of float and ndarray are what every formula here consists of.
 Scalar = Any
 
+SMALLEST = 1e-200  # below this a number counts as zero where it is divided by
+
 
 def sin(x: Scalar) -> Scalar:
     """Sine, elementwise."""
@@ -39,8 +41,11 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     """Angle of the point (x, y) [rad], elementwise."""
     if type(y) is float:
         return math.atan2(y, x)
-    # `np.arctan2` may take a vector instruction that rounds differently from the C library.
-    return np.array([math.atan2(b, a) for b, a in zip(y.tolist(), x.tolist(), strict=True)])
+    # `np.arctan2` may take a vector instruction that rounds differently from the C library; the complex
+    # logarithm takes its angle from the library.
+    point = np.empty(np.shape(y), dtype=complex)
+    point.real, point.imag = x, y
+    return np.log(point).imag
 
 
 def sign(x: Scalar) -> Scalar:
@@ -48,19 +53,28 @@ def sign(x: Scalar) -> Scalar:
     return float((x > 0.0) - (x < 0.0)) if type(x) is float else np.sign(x)
 
 
-def signed_power(x: Scalar, exponent: float) -> Scalar:
-    """Return `|x|^exponent sign(x)`, written as x between a ceiling and a floor bracket in aranovskiy2020 (11)."""
+def signed_powers(x: Scalar, exponent: float) -> tuple[Scalar, Scalar]:
+    """Return [x]^a and [x]^(2a - 1), where [x]^a = |x|^a sign(x), as aranovskiy2020 (11) needs them.
+
+    The second is the first one's square over |x|: one power instead of two.
+    """
     if type(x) is float:
-        return math.copysign(abs(x) ** exponent, x)
+        size = abs(x)
+        if size < SMALLEST:
+            return 0.0 * x, 0.0 * x
+        power = size**exponent
+        return math.copysign(power, x), math.copysign(power * power / size, x)
     # `np.power` may take a vector instruction that rounds differently from the C library; `np.float_power` does not.
-    return np.copysign(np.float_power(np.abs(x), exponent), x)
+    size = np.abs(x)
+    power = np.where(size < SMALLEST, 0.0, np.float_power(size, exponent))
+    return np.copysign(power, x), np.copysign(power * power / np.maximum(size, SMALLEST), x)
 
 
 def clip(x: Scalar, low: float, high: float) -> Scalar:
     """Limit x to [low, high], elementwise."""
     if type(x) is float:
         return low if x < low else high if x > high else x
-    return np.clip(x, low, high)
+    return np.minimum(np.maximum(x, low), high)  # np.clip takes longer
 
 
 def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
@@ -70,6 +84,14 @@ def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     return np.where(condition, a, b)
 
 
-def quantise(x: Scalar, step: float) -> Scalar:
-    """Round x to the nearest multiple of step (half to even, as both `round` and `np.rint` do)."""
-    return round(x / step) * step if type(x) is float else np.rint(x / step) * step
+def digitise(x: Scalar, limit: float, step: float) -> Scalar:
+    """Saturate x at +-limit and round it to the nearest multiple of step (no rounding if step is 0).
+
+    Ties go to the even multiple, in `round` as in `np.rint`.
+    """
+    if type(x) is float:
+        if not -limit < x < limit:
+            x = math.copysign(limit, x)
+        return round(x / step) * step if step else x
+    x = np.minimum(np.maximum(x, -limit), limit)
+    return np.rint(x / step) * step if step else x

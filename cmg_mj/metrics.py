@@ -63,7 +63,13 @@ class Metrics:
         self._last_tick = np.full(n_worlds, -1)
 
     def update(
-        self, x1: np.ndarray, x2: np.ndarray, x3: np.ndarray, u: np.ndarray, fog: np.ndarray, rates: Sequence[np.ndarray]
+        self,
+        x1: np.ndarray,
+        x2: np.ndarray,
+        x3: np.ndarray,
+        u: np.ndarray,
+        fog: np.ndarray,
+        rates: Sequence[np.ndarray],
     ) -> None:
         """Add the next ticks.
 

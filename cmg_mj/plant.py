@@ -126,12 +126,16 @@ class Plant:
         self.tilt_zero = float(model.key_qpos[self.key, self.tilt])
         prefixes = [name.removesuffix("/gimbal") for name in names if name.endswith("/gimbal")]
         if not prefixes:
-            raise InputError(f"{self.path}: no joint 'cube1/gimbal': a rig needs at least one cube attached with its prefix")
+            raise InputError(
+                f"{self.path}: no joint 'cube1/gimbal': a rig needs at least one cube attached with its prefix"
+            )
         self.frame = int(model.jnt_bodyid[self.tilt])
         self._accelerometers = [self._accelerometer(f"accelerometer_{which}") for which in ("inner", "outer")]
         radii = [radius for _, radius in self._accelerometers]
         if not 0.0 < radii[0] < radii[1]:
-            raise InputError(f"{self.path}: accelerometer_outer must lie farther from the tilt axis than accelerometer_inner")
+            raise InputError(
+                f"{self.path}: accelerometer_outer must lie farther from the tilt axis than accelerometer_inner"
+            )
         self.radial_tilt = RadialTilt(*radii)
         self._id("sensor", "fog")
         self.cubes = tuple(self._cube(prefix) for prefix in prefixes)
@@ -157,7 +161,9 @@ class Plant:
         site = int(model.sensor_objid[sensor])
         is_one = model.sensor_type[sensor] == int(mujoco.mjtSensor.mjSENS_ACCELEROMETER)
         if not is_one or model.site_bodyid[site] != self.frame:
-            raise InputError(f"{self.path}: sensor {name!r} must be an accelerometer at a site of the body with the joint 'tilt'")
+            raise InputError(
+                f"{self.path}: sensor {name!r} must be an accelerometer at a site of the body with the joint 'tilt'"
+            )
         x, _, z = model.site_pos[site] - model.jnt_pos[self.tilt]
         return int(model.sensor_adr[sensor]), float(math.hypot(x, z))
 
@@ -210,7 +216,9 @@ class Plant:
         mujoco.mj_forward(self.model, data)
         gravity_torque = -data.qfrc_bias[self.tilt] / n
         if gravity_torque <= 0.0:
-            raise InputError(f"{self.path}: at the keyframe {KEYFRAME!r} the rig must stand upright, its mass above the tilt axis")
+            raise InputError(
+                f"{self.path}: at the keyframe {KEYFRAME!r} the rig must stand upright, its mass above the tilt axis"
+            )
         return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque))
 
     # --- variations ----------------------------------------------------------------------------------------
@@ -290,12 +298,12 @@ class Plant:
         Returns:
             The ideal readings, of the elements' own type (float, or array (n_worlds,)).
         """
-        i, j, k, m = self._specific_forces
-        return Ideal(
-            (sensordata[i], sensordata[j], sensordata[k], sensordata[m]),
-            [qpos[gimbal] for gimbal in self._gimbals],
-            qvel[self.tilt],
-        )
+        if isinstance(sensordata, np.ndarray):
+            forces: Sequence[Scalar] = sensordata[self._specific_forces]
+        else:
+            i, j, k, m = self._specific_forces
+            forces = (sensordata[i], sensordata[j], sensordata[k], sensordata[m])
+        return Ideal(forces, [qpos[gimbal] for gimbal in self._gimbals], qvel[self.tilt])
 
     def gimbal_angle(self, qpos: Sequence[Scalar]) -> Scalar:
         """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""

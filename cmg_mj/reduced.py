@@ -37,14 +37,24 @@ class ReducedModel:
     omega_d: float
     gravity_torque: float
 
-    def tilt_inertia(self, x3: Scalar) -> Scalar:
-        """J1 + J2 sin^2 x3 [kg m^2], the denominator of (4)."""
-        return self.J1 + self.J2 * sin(x3) ** 2
+    def terms(self, x1: Scalar, x3: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+        """Parts of f2 in (4) that the angles decide: f2 = drift + u (gain - damping x2).
+
+        Returns:
+            drift [rad/s^2], gain [1/s], damping [1].
+        """
+        s, c = sin(x3), cos(x3)
+        D = self.J1 + self.J2 * s * s
+        return (
+            self.gravity_torque * sin(x1) / D,
+            self.J_d * self.omega_d * c / D,
+            self.J2 * 2.0 * s * c / D,
+        )
 
     def tilt_acceleration(self, x1: Scalar, x2: Scalar, x3: Scalar, u: Scalar) -> Scalar:
         """f2(x, u) [rad/s^2], the second line of (4)."""
-        gyroscopic = u * (self.J_d * self.omega_d * cos(x3) - self.J2 * x2 * sin(2.0 * x3))
-        return (gyroscopic + self.gravity_torque * sin(x1)) / self.tilt_inertia(x3)
+        drift, gain, damping = self.terms(x1, x3)
+        return drift + u * (gain - damping * x2)
 
     @property
     def A(self) -> np.ndarray:
@@ -79,7 +89,13 @@ class ReducedModel:
         import control
 
         return control.ss(
-            self.A, self.B, self.C, np.zeros((2, 1)), inputs=["u"], outputs=["y1", "y2"], states=["x1", "x2", "x3"]
+            self.A,
+            self.B,
+            self.C,
+            np.zeros((2, 1)),
+            inputs=["u"],
+            outputs=["y1", "y2"],
+            states=["x1", "x2", "x3"],
         )
 
     def nonlinear_system(self) -> control.NonlinearIOSystem:

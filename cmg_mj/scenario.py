@@ -197,7 +197,10 @@ class Experiment:
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
         fields = TypeAdapter(Scenario).dump_python(self.scenario, mode="json", exclude_none=True)
-        if self.scenario.plant.model not in (self.plant.path.name, self.plant.path.stem) or Path(self.scenario.plant.model).is_file():
+        if (
+            self.scenario.plant.model not in (self.plant.path.name, self.plant.path.stem)
+            or Path(self.scenario.plant.model).is_file()
+        ):
             fields["plant"]["model"] = str(self.plant.path.resolve())
         fields["controller"]["gains"] = list(self.law.gains)
         fields["controller"].pop("lqr", None)
@@ -297,7 +300,9 @@ def prepare(scenario: Scenario) -> Experiment:
     experiment.controller()
     for i, push in enumerate(scenario.push):
         if push.start_s >= scenario.duration_s:
-            raise InputError(f"push.{i}.start_s = {push.start_s:g}: the run ends at duration_s = {scenario.duration_s:g}")
+            raise InputError(
+                f"push.{i}.start_s = {push.start_s:g}: the run ends at duration_s = {scenario.duration_s:g}"
+            )
     return experiment
 
 
@@ -320,13 +325,17 @@ def _override(fields: dict[str, Any], setting: str) -> None:
         else:
             raise InputError(f"--set {setting!r}: there is no {'.'.join(sections)} to set a field of")
     if not isinstance(place, dict):
-        raise InputError(f"--set {setting!r}: {'.'.join(sections)} is not a section; write for example push.0.torque_n_m=2.0")
+        raise InputError(
+            f"--set {setting!r}: {'.'.join(sections)} is not a section; write for example push.0.torque_n_m=2.0"
+        )
     place[field] = value
 
 
 def _complaint(detail: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
     """One wrong field in words: where, what was given, what is allowed."""
-    location = [part for part in detail["loc"] if not str(part).startswith(("tuple[", "list[", "literal[", "function-"))]
+    location = [
+        part for part in detail["loc"] if not str(part).startswith(("tuple[", "list[", "literal[", "function-"))
+    ]
     where = ".".join(str(part) for part in location)
     kind = detail["type"]
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.elementwise import Scalar, clip, quantise
+from cmg_mj.elementwise import Scalar, clip, digitise
 from cmg_mj.timing import whole_steps
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
@@ -29,7 +29,7 @@ class Ideal(NamedTuple):
     """What perfect sensors would show at one instant (floats, or arrays (n_worlds,))."""
 
     accelerations: Sequence[Scalar]
-    """Specific force: inner x, inner z, outer x, outer z [m/s^2]."""
+    """Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
     gimbals: Sequence[Scalar]
     """Gimbal angles, one a gimbal [rad]."""
     rate: Scalar
@@ -71,16 +71,21 @@ class Accelerometer:
         sigma = self.sigma
         limit = self.range_g * STANDARD_GRAVITY
         step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
-        bias_inner, bias_outer = (b * 1e-3 * STANDARD_GRAVITY for b in self.bias_mg)
-
-        def axis(force: Scalar, normal: Scalar) -> Scalar:
-            reading = clip(force + sigma * normal, -limit, limit)
-            return quantise(reading, step) if step else reading
+        inner, outer = (b * 1e-3 * STANDARD_GRAVITY for b in self.bias_mg)
+        bias = np.array([[inner], [0.0], [outer], [0.0]])
 
         def measure(ideal: Ideal, normal: Sequence[Scalar]) -> Sequence[Scalar]:
-            ix, iz, ox, oz = ideal.accelerations
+            forces = ideal.accelerations
+            if isinstance(forces, np.ndarray):
+                return digitise(forces + bias + sigma * np.asarray(normal), limit, step)
+            ix, iz, ox, oz = forces
             n0, n1, n2, n3 = normal
-            return axis(ix + bias_inner, n0), axis(iz, n1), axis(ox + bias_outer, n2), axis(oz, n3)
+            return (
+                digitise(ix + inner + sigma * n0, limit, step),
+                digitise(iz + sigma * n1, limit, step),
+                digitise(ox + outer + sigma * n2, limit, step),
+                digitise(oz + sigma * n3, limit, step),
+            )
 
         return measure
 
@@ -106,7 +111,7 @@ class Encoder:
         if not self.counts_per_revolution:
             return lambda ideal, normal: ideal.gimbals
         step = 2.0 * math.pi / self.counts_per_revolution
-        return lambda ideal, normal: [quantise(angle, step) for angle in ideal.gimbals]
+        return lambda ideal, normal: [digitise(angle, math.inf, step) for angle in ideal.gimbals]
 
 
 @dataclass(frozen=True, config=CONFIG)

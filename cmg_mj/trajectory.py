@@ -13,7 +13,17 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 
-SIGNALS = ("x1_rad", "x2_rad_s", "x3_rad", "y1_rad", "y2_rad", "fog_rad_s", "u_rad_s", "x_e_rad_s", "push_n_m")
+SIGNALS = (
+    "x1_rad",
+    "x2_rad_s",
+    "x3_rad",
+    "y1_rad",
+    "y2_rad",
+    "fog_rad_s",
+    "u_rad_s",
+    "x_e_rad_s",
+    "push_n_m",
+)
 """Columns of every trajectory after `time_s`: true state, measurements, gyro, command, integrator [rad s], push."""
 
 ESTIMATES = ("x1_rad", "x2_rad_s", "x3_rad")
@@ -52,7 +62,9 @@ class Trajectory:
     @property
     def observers(self) -> list[str]:
         """Names of the observers whose estimates are recorded: the one in the loop, then the companions."""
-        return [name.split("/")[1] for name in self.columns if name.startswith("estimate/") and name.endswith("/x2_rad_s")]
+        return [
+            name.split("/")[1] for name in self.columns if name.startswith("estimate/") and name.endswith("/x2_rad_s")
+        ]
 
     @property
     def joints(self) -> list[str]:

@@ -7,18 +7,18 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.elementwise import Scalar, cos, signed_power, sin
+from cmg_mj.elementwise import Scalar, signed_powers
 from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
 from cmg_mj.reduced import ReducedModel
 
 
 class State(NamedTuple):
-    """The estimate and the last measurement."""
+    """The estimate, the last measurement, and the model's terms there."""
 
     x1: Scalar
     x2: Scalar
-    y1: Scalar
-    y2: Scalar
+    y: Measurement
+    terms: tuple[Scalar, Scalar, Scalar]
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -44,43 +44,38 @@ class Homogeneous:
 
     def init(self, y: Measurement) -> State:
         """Start at rest at the measured tilt."""
-        return State(y.y1, 0.0 * y.y1, y.y1, y.y2)
-
-    def _model(self, y1: Scalar, y2: Scalar, u: Scalar) -> tuple[Scalar, Scalar]:
-        """The model's part of x2' as (a, c): a - c x2, so that each measurement is looked up once."""
-        m = self.model
-        s, c = sin(y2), cos(y2)
-        D = m.J1 + m.J2 * s * s
-        drive = (u * m.J_d * m.omega_d * c + m.gravity_torque * sin(y1)) / D
-        return drive, u * m.J2 * 2.0 * s * c / D
+        return State(y.y1, 0.0 * y.y1, y, self.model.terms(*y))
 
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
         """Advance by one sample period."""
         h, k1, k2, alpha = self.dt, self.k1, self.k2, self.alpha
-        beta = 2.0 * alpha - 1.0
-        x1, x2, y1_before, y2_before = state
+        x1, x2, (y1_before, y2_before), (drift, gain, damping) = state
         y1, y2 = y
         y1_middle = 0.5 * (y1_before + y1)
-        a0, c0 = self._model(y1_before, y2_before, u)
-        am, cm = self._model(y1_middle, 0.5 * (y2_before + y2), u)
-        a1, c1 = self._model(y1, y2, u)
+        middle = self.model.terms(y1_middle, 0.5 * (y2_before + y2))
+        end = self.model.terms(y1, y2)
 
-        e = x1 - y1_before
-        p1 = x2 - k1 * signed_power(e, alpha)
-        p2 = a0 - c0 * x2 - k2 * signed_power(e, beta)
+        e_alpha, e_beta = signed_powers(x1 - y1_before, alpha)
+        p1 = x2 - k1 * e_alpha
+        p2 = drift + u * (gain - damping * x2) - k2 * e_beta
+
+        drift, gain, damping = middle
         w = x2 + 0.5 * h * p2
-        e = x1 + 0.5 * h * p1 - y1_middle
-        q1 = w - k1 * signed_power(e, alpha)
-        q2 = am - cm * w - k2 * signed_power(e, beta)
+        e_alpha, e_beta = signed_powers(x1 + 0.5 * h * p1 - y1_middle, alpha)
+        q1 = w - k1 * e_alpha
+        q2 = drift + u * (gain - damping * w) - k2 * e_beta
+
         w = x2 + 0.5 * h * q2
-        e = x1 + 0.5 * h * q1 - y1_middle
-        r1 = w - k1 * signed_power(e, alpha)
-        r2 = am - cm * w - k2 * signed_power(e, beta)
+        e_alpha, e_beta = signed_powers(x1 + 0.5 * h * q1 - y1_middle, alpha)
+        r1 = w - k1 * e_alpha
+        r2 = drift + u * (gain - damping * w) - k2 * e_beta
+
+        drift, gain, damping = end
         w = x2 + h * r2
-        e = x1 + h * r1 - y1
-        s1 = w - k1 * signed_power(e, alpha)
-        s2 = a1 - c1 * w - k2 * signed_power(e, beta)
+        e_alpha, e_beta = signed_powers(x1 + h * r1 - y1, alpha)
+        s1 = w - k1 * e_alpha
+        s2 = drift + u * (gain - damping * w) - k2 * e_beta
 
         x1 = x1 + h / 6.0 * (p1 + 2.0 * (q1 + r1) + s1)
         x2 = x2 + h / 6.0 * (p2 + 2.0 * (q2 + r2) + s2)
-        return State(x1, x2, y1, y2), Estimate(x1, x2, y2)
+        return State(x1, x2, y, end), Estimate(x1, x2, y2)

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.elementwise import Scalar, cos, sin
+from cmg_mj.elementwise import Scalar
 from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
 from cmg_mj.reduced import ReducedModel
 
 
 class State(NamedTuple):
-    """The estimate, the independent entries of the Riccati matrix H, and the last measurement."""
+    """The estimate, the independent entries of the Riccati matrix H, the last measurement, the model's terms there."""
 
     x1: Scalar
     x2: Scalar
@@ -23,8 +23,8 @@ class State(NamedTuple):
     h12: Scalar
     h22: Scalar
     h33: Scalar
-    y1: Scalar
-    y2: Scalar
+    y: Measurement
+    terms: tuple[Scalar, Scalar, Scalar]
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -57,15 +57,7 @@ class LinearTimeVarying:
         """Start at rest at the measured angles, with H = H_0."""
         zero = 0.0 * y.y1
         h11, h22, h33 = self.H0
-        return State(y.y1, zero, y.y2, h11 + zero, zero, h22 + zero, h33 + zero, y.y1, y.y2)
-
-    def _model(self, y1: Scalar, y2: Scalar, u: Scalar) -> tuple[Scalar, Scalar]:
-        """The entry a of A' and the entry b2 of the known input at one measurement."""
-        m = self.model
-        s, c = sin(y2), cos(y2)
-        D = m.J1 + m.J2 * s * s
-        drive = (u * m.J_d * m.omega_d * c + m.gravity_torque * sin(y1)) / D
-        return -u * m.J2 * 2.0 * s * c / D, drive
+        return State(y.y1, zero, y.y2, h11 + zero, zero, h22 + zero, h33 + zero, y, self.model.terms(*y))
 
     @cached_property
     def _pieces(self) -> int:
@@ -133,12 +125,15 @@ class LinearTimeVarying:
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
         """Advance by one sample period."""
         h = self.dt
-        x1, x2, x3, h11, h12, h22, h33, y1_before, y2_before = state
+        x1, x2, x3, h11, h12, h22, h33, (y1_before, y2_before), begin = state
         y1, y2 = y
         y1_middle, y2_middle = 0.5 * (y1_before + y1), 0.5 * (y2_before + y2)
-        a0, b0 = self._model(y1_before, y2_before, u)
-        am, bm = self._model(y1_middle, y2_middle, u)
-        a1, b1 = self._model(y1, y2, u)
+        middle = self.model.terms(y1_middle, y2_middle)
+        end = self.model.terms(y1, y2)
+        # f2 = a x2 + b: the entry a of A', and the known input b.
+        (a0, b0), (am, bm), (a1, b1) = (
+            (-u * damping, drift + u * gain) for drift, gain, damping in (begin, middle, end)
+        )
 
         m11, m12, m22 = h11, h12, h22
         piece = h / 2.0 / self._pieces
@@ -166,4 +161,4 @@ class LinearTimeVarying:
         x1 = x1 + h / 6.0 * (p1 + 2.0 * (q1 + r1) + s1)
         x2 = x2 + h / 6.0 * (p2 + 2.0 * (q2 + r2) + s2)
         x3 = x3 + h / 6.0 * (p3 + 2.0 * (q3 + r3) + s3)
-        return State(x1, x2, x3, n11, n12, n22, n33, y1, y2), Estimate(x1, x2, x3)
+        return State(x1, x2, x3, n11, n12, n22, n33, y, end), Estimate(x1, x2, x3)

@@ -38,7 +38,11 @@ class Luenberger:
 
     dt: Positive
     model: ReducedModel
-    L: tuple[tuple[float, float], tuple[float, float], tuple[float, float]] = ((20.0, 0.0), (150.0, 0.0), (0.0, 20.0))
+    L: tuple[tuple[float, float], tuple[float, float], tuple[float, float]] = (
+        (20.0, 0.0),
+        (150.0, 0.0),
+        (0.0, 20.0),
+    )
 
     def __post_init__(self) -> None:
         poles = np.linalg.eigvals(self.error_matrix)
@@ -67,6 +71,7 @@ class Luenberger:
         p1, p2, p3, p4, p5 = state
         y1, y2 = y
         x1, x2, x3 = [
-            a * p1 + b * p2 + c * p3 + d * p4 + e * p5 + f * y1 + g * y2 + h * u for a, b, c, d, e, f, g, h in self._rows
+            a * p1 + b * p2 + c * p3 + d * p4 + e * p5 + f * y1 + g * y2 + h * u
+            for a, b, c, d, e, f, g, h in self._rows
         ]
         return State(x1, x2, x3, y1, y2), Estimate(x1, x2, x3)

@@ -46,7 +46,9 @@ def observer_class(kind: str) -> type:
         found = getattr(importlib.import_module(module_name), class_name)
     except Exception as error:  # a user's module may fail in any way while it is imported
         raise InputError(f"observer.kind = {kind!r}: cannot be imported: {type(error).__name__}: {error}") from error
-    if not (inspect.isclass(found) and callable(getattr(found, "init", None)) and callable(getattr(found, "step", None))):
+    if not (
+        inspect.isclass(found) and callable(getattr(found, "init", None)) and callable(getattr(found, "step", None))
+    ):
         raise InputError(f"observer.kind = {kind!r}: must be a class with the methods init(y) and step(state, y, u)")
     return found
 

@@ -1,0 +1,101 @@
+"""Trajectory -> .rrd, to be looked at in rerun. No other part of the package imports rerun."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+
+import rerun as rr
+
+from cmg_mj.metrics import MetricsSettings
+from cmg_mj.plant import Plant
+from cmg_mj.push import Push
+from cmg_mj.recording.blueprint import blueprint
+from cmg_mj.recording.recorded import Recorded
+from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, log_rig
+from cmg_mj.recording.signals import Branch, log_phases, log_series, series
+from cmg_mj.recording.summary import markdown, scenario_page
+from cmg_mj.trajectory import whole_file
+
+__all__ = ["Recorded", "write_recording"]
+
+
+def write_recording(
+    path: Path,
+    plant: Plant,
+    runs: Sequence[Recorded],
+    *,
+    title: str = "",
+    pushes: Sequence[Push] = (),
+    settings: MetricsSettings | None = None,
+    rate_limit_rad_s: float | None = None,
+    scenario_toml: str = "",
+) -> None:
+    """Write one run, or several to be compared, as a rerun recording; whole or not at all.
+
+    Args:
+        path: The file, `recording.rrd`.
+        plant: The rig of all runs.
+        runs: The runs; each has a branch of its own, by its name.
+        title: The experiment's title.
+        pushes: Torques from outside, the same in all runs.
+        settings: What counts as settled.
+        rate_limit_rad_s: Largest gimbal rate, if it is to be shown [rad/s].
+        scenario_toml: The resolved scenario.
+
+    Raises:
+        ValueError: There is no run, or two have the same name.
+    """
+    names = [run.name for run in runs]
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"a recording needs runs of different names, not {names}")
+    settings = settings or MetricsSettings()
+    branches = [_branch(run, plant, settings, rate_limit_rad_s) for run in runs]
+    notes = f"In the 3-D view the flywheels turn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed."
+    # The viewer remembers a layout by application: recordings with other branches must not share it.
+    application = f"cmg-mj {' '.join(names)}"
+    with whole_file(path) as temporary, _strict(), rr.RecordingStream(application) as rec:
+        rec.save(temporary, default_blueprint=blueprint(plant, branches))
+        rec.set_log_time_enabled(False)
+        rec.set_log_tick_enabled(False)
+        rec.send_recording_name(f"{title or 'Run'}: {', '.join(names)}")
+        _log_properties(rec, runs, title)
+        end = max(run.outcome.time_s for run in runs)
+        for branch in branches:
+            log_rig(rec, branch.path, plant, branch.run, pushes)
+            log_series(rec, branch)
+            log_phases(rec, branch, pushes, settings, end)
+        _log_page(rec, "summary", markdown(title, runs, pushes, settings, notes))
+        _log_page(rec, "scenario", scenario_page(scenario_toml))
+
+
+def _branch(run: Recorded, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> Branch:
+    rows = {row.path: row for row in series(run, plant, settings, rate_limit)}
+    return Branch(f"/{rr.escape_entity_path_part(run.name)}", run, rows)
+
+
+def _log_page(rec: rr.RecordingStream, path: str, page: str) -> None:
+    rec.log(path, rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+def _log_properties(rec: rr.RecordingStream, runs: Sequence[Recorded], title: str) -> None:
+    """What a catalogue of recordings can be searched by."""
+    versions = {name: version(name) for name in ("cmg_mj", "mujoco")}
+    rec.send_property("experiment", rr.AnyValues(title=title, runs=[run.name for run in runs], **versions))
+    for run in runs:
+        numbers = {key: value for key, value in run.summary.items() if isinstance(value, float)}
+        outcome = {"outcome": run.outcome.kind, "time_s": run.outcome.time_s}
+        rec.send_property(rr.escape_entity_path_part(run.name), rr.AnyValues(**outcome, **numbers))
+
+
+@contextmanager
+def _strict() -> Iterator[None]:
+    """Let rerun raise where it would only warn."""
+    before = rr.strict_mode()
+    rr.set_strict_mode(True)
+    try:
+        yield
+    finally:
+        rr.set_strict_mode(before)

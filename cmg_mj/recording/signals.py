@@ -1,0 +1,190 @@
+"""The run as time series: what is plotted, under which name, in which unit and colour."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+
+from cmg_mj.metrics import MetricsSettings
+from cmg_mj.plant import Plant
+from cmg_mj.push import Push
+from cmg_mj.recording.recorded import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Recorded, phases
+from cmg_mj.recording.timeline import TIMELINE, column, instant
+
+Color = tuple[int, int, int]
+
+TRUTH: Color = (165, 165, 165)
+SENSOR: Color = (95, 130, 190)
+LIMIT: Color = (120, 120, 120)
+CONTROLLER: Color = (204, 121, 167)
+CUBES: tuple[Color, ...] = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (204, 121, 167))
+
+OBSERVERS: dict[str, Color] = {
+    "homogeneous": (230, 97, 0),
+    "ltv": (86, 180, 233),
+    "linear": (0, 170, 120),
+    "luenberger": (214, 120, 180),
+    "adaptive": (230, 175, 20),
+    "high_gain": (70, 110, 240),
+    "finite_difference": (165, 110, 80),
+    "super_twisting": (150, 115, 215),
+    "linear_high_gain": (130, 185, 60),
+}
+"""An observer has the same colour in every recording. Mostly Okabe and Ito's, which the colour-blind can tell apart."""
+
+OTHERS: tuple[Color, ...] = ((240, 228, 66), (0, 190, 200), (220, 60, 80), (240, 160, 130))
+"""Colours of observers that are not bundled, in order of appearance."""
+
+PHASES: dict[str, Color] = {
+    BALANCING: (0, 114, 178),
+    PUSH: (213, 94, 0),
+    RECOVERING: (200, 140, 0),
+    SETTLED: (0, 130, 96),
+    **dict.fromkeys(ENDINGS.values(), (170, 40, 60)),
+}
+
+
+NO_PHASE = ""
+"""Ends the lane."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """One entity of scalars.
+
+    Attributes:
+        path: Below the run's branch.
+        name: In the legend; for several lines the same name.
+        time: (n,) [s].
+        values: (n,) or (n, n_lines), in the unit that the plot's title names.
+        color: Of its lines.
+        width: Of its lines.
+    """
+
+    path: str
+    name: str
+    time: np.ndarray
+    values: np.ndarray
+    color: Color
+    width: float = 1.5
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A run and its place in the recording.
+
+    Attributes:
+        path: Where everything of the run is found.
+        run: The run.
+        series: Its time series by their path below the branch.
+    """
+
+    path: str
+    run: Recorded
+    series: dict[str, Series]
+
+
+def colors_of(names: Iterable[str]) -> dict[str, Color]:
+    """The colour of each observer."""
+    names = list(dict.fromkeys(names))
+    strangers = [name for name in names if name not in OBSERVERS]
+    return {name: OBSERVERS.get(name) or OTHERS[strangers.index(name) % len(OTHERS)] for name in names}
+
+
+def series(run: Recorded, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> list[Series]:
+    """All time series of one run.
+
+    Args:
+        run: The run.
+        plant: The rig.
+        settings: The settle band.
+        rate_limit: Largest gimbal rate [rad/s], if it is known.
+
+    Returns:
+        The series: tilt and gimbal angles in degrees, rates in rad/s, the integrator in rad s.
+    """
+    t = run.trajectory
+    time = t["time_s"]
+    rows = [
+        Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), SENSOR, 1.0),
+        Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), TRUTH, 2.5),
+        _bounds("tilt/settle_band", "settle band", time, settings.settle_band_deg),
+        Series("rate/true", "true", time, t["x2_rad_s"], TRUTH, 3.0),
+        Series("rate/gyro", "gyro", time, t["fog_rad_s"], SENSOR, 1.0),
+    ]
+    for name, color in colors_of(t.observers).items():
+        part = rr.escape_entity_path_part(name)
+        estimate = t[f"estimate/{name}/x2_rad_s"]
+        rows += [
+            Series(f"rate_estimate/{part}", name, time, estimate, color),
+            Series(f"rate_error/{part}", name, time, estimate - t["x2_rad_s"], color),
+        ]
+    rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
+    if rate_limit is not None:
+        rows.append(_bounds("command/limit", "rate limit", time, rate_limit))
+    for i, cube in enumerate(plant.cubes):
+        color = CUBES[i % len(CUBES)]
+        part = rr.escape_entity_path_part(cube.name)
+        angle = t[f"angle/{cube.name}/gimbal_rad"] - cube.gimbal_zero
+        speed = t[f"rate/{cube.name}/flywheel_rad_s"] * np.sign(cube.speed)
+        width = 3.0 if i == 0 and len(plant.cubes) > 1 else 1.5  # the cubes' speeds agree: one must shine through
+        way = "" if cube.speed > 0.0 else " (spins backwards)"
+        rows += [
+            Series(f"gimbal/{part}", cube.name, time, np.degrees(angle), color),
+            Series(f"flywheel/{part}", cube.name + way, time, speed, color, width),
+        ]
+    rows.append(Series("integrator/x_e", "x_e", time, t["x_e_rad_s"], CONTROLLER))
+    return rows
+
+
+def log_series(rec: rr.RecordingStream, branch: Branch) -> None:
+    """Record the time series of a run, a column each.
+
+    Args:
+        rec: The recording.
+        branch: The run.
+    """
+    for row in branch.series.values():
+        path = f"{branch.path}/{row.path}"
+        n = 1 if row.values.ndim == 1 else row.values.shape[1]
+        style = rr.SeriesLines(colors=[row.color] * n, widths=[row.width] * n, names=[row.name] * n)
+        rec.log(path, style, static=True)
+        if len(row.time):
+            rec.send_columns(path, [column(row.time)], rr.Scalars.columns(scalars=row.values))
+
+
+def log_phases(
+    rec: rr.RecordingStream,
+    branch: Branch,
+    pushes: Sequence[Push],
+    settings: MetricsSettings,
+    until_s: float,
+) -> None:
+    """Record what the rig is doing as a lane of states.
+
+    Args:
+        rec: The recording.
+        branch: The run.
+        pushes: Torques from outside.
+        settings: The settle band.
+        until_s: Until when a fall is shown; at least a little longer than the run, or it could not be seen [s].
+    """
+    path, outcome = f"{branch.path}/phase", branch.run.outcome
+    states = rr.StateConfiguration(values=list(PHASES), colors=list(PHASES.values()))
+    rec.log(path, states, static=True)
+    steps = phases(branch.run, pushes, settings)
+    if outcome.kind in ENDINGS:
+        steps.append((max(until_s, 1.05 * outcome.time_s, outcome.time_s + 0.1), NO_PHASE))
+    for time, name in steps:
+        rec.set_time(TIMELINE, duration=instant(time))
+        rec.log(path, rr.StateChange(state=name))
+    rec.reset_time()
+
+
+def _bounds(path: str, name: str, time: np.ndarray, bound: float) -> Series:
+    """Two horizontal lines at +-bound."""
+    ends = time[[0, -1]] if len(time) > 1 else time
+    return Series(path, name, ends, np.tile([bound, -bound], (len(ends), 1)), LIMIT, 1.0)

@@ -1,0 +1,115 @@
+"""Physics on its own: one world on floats, or many on arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+
+from cmg_mj.elementwise import Scalar
+from cmg_mj.plant import Plant
+
+
+class Worlds(Protocol):
+    """Physics, one world or many."""
+
+    def read(self) -> tuple[Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]]:
+        """Joint angles, joint rates and sensordata, each indexed by its address first."""
+        ...
+
+    def command(self, u: Scalar) -> None:
+        """Set the gimbal rate until the next command."""
+        ...
+
+    def push(self, torque: float) -> None:
+        """Set the torque on the frame until the next push."""
+        ...
+
+    def advance(self, steps: int) -> None:
+        """Take physics steps."""
+        ...
+
+
+class OneWorld:
+    """One world on floats."""
+
+    def __init__(self, plant: Plant) -> None:
+        self.model = plant.model
+        self.data = plant.new_data()
+        self._qpos, self._qvel, self._sensordata = self.data.qpos, self.data.qvel, self.data.sensordata
+        self._ctrl, self._applied = self.data.ctrl, self.data.qfrc_applied
+        self._servos = list(zip(plant.servos, plant.directions, strict=True))
+        self._tilt = plant.tilt
+
+    def read(self) -> tuple[Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]]:
+        """Joint angles, joint rates and sensordata as floats."""
+        return self._qpos.tolist(), self._qvel.tolist(), self._sensordata.tolist()
+
+    def command(self, u: Scalar) -> None:
+        """Set the gimbal rate, each cube in its direction."""
+        ctrl = self._ctrl
+        for servo, direction in self._servos:
+            ctrl[servo] = direction * u
+
+    def push(self, torque: float) -> None:
+        """Set the torque on the frame."""
+        self._applied[self._tilt] = torque
+
+    def advance(self, steps: int) -> None:
+        """Take physics steps."""
+        mujoco.mj_step(self.model, self.data, steps)
+
+
+class ManyWorlds:
+    """Many worlds on arrays, stepped by MuJoCo's own thread pool.
+
+    Attributes:
+        running: Which worlds are still stepped, (n_worlds,).
+    """
+
+    def __init__(self, plants: Sequence[Plant]) -> None:
+        first = plants[0]
+        self.batch = Batch(first.model, len(plants))
+        if any(plant is not first for plant in plants):
+            self.batch.set_models([plant.model for plant in plants])
+        b = self.batch
+        self._qpos, self._qvel, self._ctrl = b.bind("qpos"), b.bind("qvel"), b.bind("ctrl")
+        self._applied, self._sensordata = b.bind("qfrc_applied"), b.bind("sensordata")
+        act = b.bind("act")
+        starts = {plant: plant.new_data() for plant in set(plants)}
+        for i, plant in enumerate(plants):
+            data = starts[plant]
+            self._qpos[i], self._qvel[i], self._ctrl[i], act[i] = data.qpos, data.qvel, data.ctrl, data.act
+        b.forward()
+        self._servos = first.servos
+        self._directions = np.array(first.directions)
+        self._tilt = first.tilt
+        self.running = np.ones(len(plants), dtype=bool)
+        self._all_run = True
+
+    def read(self) -> tuple[Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]]:
+        """Joint angles, joint rates and sensordata, each (n, n_worlds)."""
+        return self._qpos.T.copy(), self._qvel.T.copy(), self._sensordata.T.copy()
+
+    def command(self, u: Scalar) -> None:
+        """Set the gimbal rates, each cube in its direction."""
+        self._ctrl[:, self._servos] = np.multiply.outer(u, self._directions)
+
+    def push(self, torque: float) -> None:
+        """Set the torque on every frame."""
+        self._applied[:, self._tilt] = torque
+
+    def stop(self, worlds: np.ndarray) -> None:
+        """Step these worlds no more."""
+        self.running &= ~worlds
+        self._all_run = False
+
+    def advance(self, steps: int) -> None:
+        """Take physics steps. A world in which MuJoCo raises keeps its state and is found not to move on."""
+        try:
+            self.batch.step(None if self._all_run else self.running, nstep=steps)
+        except SimulationError as error:
+            self._qpos[error.ids, self._tilt] = np.nan
