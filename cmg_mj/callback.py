@@ -70,6 +70,7 @@ class ControlCallback:
         self._half_stages = 0
 
     def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Take the control decision if this call is the first at a sampling instant."""
         h, t = model.opt.timestep, data.time
         if self._instant is not None:
             ahead = (t - self._instant) / h

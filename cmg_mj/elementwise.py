@@ -3,9 +3,9 @@
 NumPy's functions cost a microsecond on a float, `math`'s fifty nanoseconds, and `math` refuses arrays.
 Observers and sensors call these instead, so that one formula serves one world and many at full speed.
 
-Both branches must round alike. Between two readings that quantisation makes equal, nothing holds an unstable plant
-together: a difference in the last bit grows by a factor e every 0.13 s until it flips a count, and a batch would no longer
-be the same as its single runs.
+Both branches must round alike. While quantisation makes two readings equal, nothing holds two runs of an unstable
+plant together: a difference in the last bit grows by a factor e every 0.13 s until it flips a count, and a batch
+would no longer be the same as its single runs.
 """
 
 from __future__ import annotations

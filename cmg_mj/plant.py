@@ -273,7 +273,7 @@ class Plant:
     # --- running -------------------------------------------------------------------------------------------
 
     def initialise(self, data: mujoco.MjData) -> None:
-        """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg from the equilibrium."""
+        """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""
         mujoco.mj_resetDataKeyframe(self.model, data, self.key)
         data.qpos[self.tilt] = self.tilt_zero - self.bias + math.radians(self.settings.initial_tilt_deg)
         mujoco.mj_forward(self.model, data)

@@ -208,7 +208,7 @@ class Experiment:
         fields["observer"] = {"kind": self.scenario.observer.kind, **self._observer_parameters()}
         names = ("cmg_mj", "mujoco", "numpy", "scipy")
         fields["versions"] = {name: version(name) for name in names} | {"python": platform.python_version()}
-        return fields
+        return _plain(fields)
 
     def _observer_parameters(self) -> dict[str, Any]:
         observer: Any = self.scenario.observer.make(self.law.dt, self.plant.reduced)
@@ -220,7 +220,7 @@ class Experiment:
     def save(self, path: Path) -> None:
         """Write the resolved scenario as TOML: running that file again gives the same run."""
         with whole_file(path) as temporary:
-            temporary.write_text(tomli_w.dumps(_plain(self.resolved())))
+            temporary.write_text(tomli_w.dumps(self.resolved()))
 
 
 def _plain(value: Any) -> Any:

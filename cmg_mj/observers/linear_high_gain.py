@@ -21,7 +21,8 @@ from cmg_mj.reduced import ReducedModel
 class LinearHighGain:
     """x1' = x2 + (a1/eps)(y1 - x1), x2' = (a2/eps^2)(y1 - x1): model-free.
 
-    Its estimate of the rate is s/((eps^2/a2) s^2 + (a1 eps/a2) s + 1) y1; with a1 = 2, a2 = 1 that is (9) with tau = eps.
+    Its estimate of the rate is s/((eps^2/a2) s^2 + (a1 eps/a2) s + 1) y1, which with a1 = 2, a2 = 1 is (9) with
+    tau = eps.
     Discretised exactly for a measurement that runs straight between samples.
 
     Attributes:

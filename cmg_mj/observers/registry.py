@@ -38,7 +38,8 @@ def observer_class(kind: str) -> type:
     """
     if ":" not in kind and kind not in OBSERVERS:
         raise InputError(
-            f"observer.kind = {kind!r}: no such observer; {nearest(kind, OBSERVERS)}, or your own as package.module:Class"
+            f"observer.kind = {kind!r}: no such observer; {nearest(kind, OBSERVERS)}, "
+            "or your own as package.module:Class"
         )
     path = OBSERVERS.get(kind, kind)
     module_name, _, class_name = path.partition(":")

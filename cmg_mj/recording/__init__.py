@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import rerun as rr
 
@@ -82,12 +83,13 @@ def _log_page(rec: rr.RecordingStream, path: str, page: str) -> None:
 
 def _log_properties(rec: rr.RecordingStream, runs: Sequence[Recorded], title: str) -> None:
     """What a catalogue of recordings can be searched by."""
-    versions = {name: version(name) for name in ("cmg_mj", "mujoco")}
-    rec.send_property("experiment", rr.AnyValues(title=title, runs=[run.name for run in runs], **versions))
+    experiment: dict[str, Any] = {name: version(name) for name in ("cmg_mj", "mujoco")}
+    experiment |= {"title": title, "runs": [run.name for run in runs]}
+    rec.send_property("experiment", rr.AnyValues(**experiment))
     for run in runs:
-        numbers = {key: value for key, value in run.summary.items() if isinstance(value, float)}
-        outcome = {"outcome": run.outcome.kind, "time_s": run.outcome.time_s}
-        rec.send_property(rr.escape_entity_path_part(run.name), rr.AnyValues(**outcome, **numbers))
+        numbers: dict[str, Any] = {key: value for key, value in run.summary.items() if isinstance(value, float)}
+        numbers |= {"outcome": run.outcome.kind, "time_s": run.outcome.time_s}
+        rec.send_property(rr.escape_entity_path_part(run.name), rr.AnyValues(**numbers))
 
 
 @contextmanager

@@ -24,19 +24,21 @@ class Plot:
         title: What it shows and in which unit.
         entities: Paths below the run's branch, folders with their slash.
         height: Share of its column.
-        legend: Where the legend hides least.
+        corner: Where the legend hides least.
+        needs_legend: Whether it has a legend even if that is long, because it explains the colours of all plots.
     """
 
     title: str
     entities: tuple[str, ...]
     height: float
-    legend: rrb.Corner2D = rrb.Corner2D.RightTop
+    corner: rrb.Corner2D = rrb.Corner2D.RightTop
+    needs_legend: bool = False
 
 
 _LOW = rrb.Corner2D.RightBottom
 TILT_PLOTS = (
     Plot("Tilt [deg]", ("tilt/",), 2.0),
-    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 3.0),
+    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 3.0, needs_legend=True),
     Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), 2.0, _LOW),
 )
 ACTUATOR_PLOTS = (
@@ -46,7 +48,7 @@ ACTUATOR_PLOTS = (
     Plot("Integrator [rad s]", ("integrator/",), 1.8, _LOW),
 )
 COMPARED_TILT_PLOTS = (
-    Plot("Tilt, true [deg]", ("tilt/true",), 1.0),
+    Plot("Tilt, true [deg]", ("tilt/true",), 1.0, needs_legend=True),
     Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/{observer}",), 1.0, _LOW),
 )
 COMPARED_ACTUATOR_PLOTS = (
@@ -61,6 +63,8 @@ EYE = (1.45, -1.6, 0.6)
 BACKGROUND = (58, 63, 71)
 LANE, COLUMN, MOST_LANES = 40.0, 820.0, 8
 """Height of a lane of phases and of a column of plots [pixels], and how many lanes are seen without scrolling."""
+MOST_LEGENDS = 4
+"""More lines than this are explained once, not in every plot."""
 
 
 def blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint:
@@ -160,7 +164,7 @@ def _plot(plot: Plot, branch: Branch) -> rrb.View:
         name=plot.title,
         axis_x=_time_axis(),
         axis_y=_frame(yardstick, shown) if "rate" in plot.entities[0] else None,
-        plot_legend=rrb.PlotLegend(corner=plot.legend),
+        plot_legend=_legend(plot, len(shown)),
     )
 
 
@@ -186,7 +190,7 @@ def _overlay(plot: Plot, branches: Sequence[Branch], cube: str) -> rrb.View:
         overrides=overrides,  # type: ignore[arg-type]
         axis_x=_time_axis(),
         axis_y=_frame(standing, shown),
-        plot_legend=rrb.PlotLegend(corner=plot.legend),
+        plot_legend=_legend(plot, len(shown)),
     )
 
 
@@ -210,6 +214,10 @@ def _frame(yardstick: Sequence[np.ndarray], shown: Sequence[np.ndarray]) -> rrb.
     if reach == 0.0 or (lowest >= low - reach and highest <= high + reach):
         return None
     return rrb.ScalarAxis(range=(max(lowest, low - reach), min(highest, high + reach)))
+
+
+def _legend(plot: Plot, lines: int) -> rrb.PlotLegend:
+    return rrb.PlotLegend(corner=plot.corner, visible=plot.needs_legend or lines <= MOST_LEGENDS)
 
 
 def _time_axis() -> rrb.TimeAxis:

@@ -117,10 +117,11 @@ def series(run: Recorded, plant: Plant, settings: MetricsSettings, rate_limit: f
     ]
     for name, color in colors_of(t.observers).items():
         part = rr.escape_entity_path_part(name)
+        width = 1.5 if name == t.observers[0] else 1.0
         estimate = t[f"estimate/{name}/x2_rad_s"]
         rows += [
-            Series(f"rate_estimate/{part}", name, time, estimate, color),
-            Series(f"rate_error/{part}", name, time, estimate - t["x2_rad_s"], color),
+            Series(f"rate_estimate/{part}", name, time, estimate, color, width),
+            Series(f"rate_error/{part}", name, time, estimate - t["x2_rad_s"], color, width),
         ]
     rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
     if rate_limit is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmg_mj.metrics import MetricsSettings
@@ -20,6 +20,18 @@ METRICS = {
 }
 """The summary's numbers, in words and with their unit."""
 
+SHORT = {
+    "settle_time_s": "Settle [s]",
+    "velocity_rms_error_rad_s": "Rate error [rad/s]",
+    "tilt_rms_deg": "Tilt [deg]",
+    "gimbal_peak_deg": "Gimbal [deg]",
+    "command_rms_rad_s": "Command [rad/s]",
+}
+"""Those that find room when each run is a row."""
+
+MOST_COLUMNS = 3
+"""More runs than this are rows."""
+
 
 def markdown(
     title: str, runs: Sequence[Recorded], pushes: Sequence[Push], settings: MetricsSettings, notes: str
@@ -28,7 +40,7 @@ def markdown(
 
     Args:
         title: The experiment's title.
-        runs: The runs, a column each.
+        runs: The runs.
         pushes: Torques from outside.
         settings: The settle band.
         notes: A last paragraph.
@@ -36,27 +48,15 @@ def markdown(
     Returns:
         The page.
     """
-    lines = [
-        f"# {title or 'Run'}",
-        "",
-        "| | " + " | ".join(run.name for run in runs) + " |",
-        "|---|" + "---:|" * len(runs),
-        "| Outcome | " + " | ".join(_outcome(run) for run in runs) + " |",
-    ]
-    for key, words in METRICS.items():
-        lines.append(f"| {words} | " + " | ".join(_number(key, run.summary.get(key)) for run in runs) + " |")
-    lines += [
-        "",
-        _pushes(pushes),
-        "",
-        f"Settled: the tilt stays within ±{settings.settle_band_deg:g}° to the end.",
-    ]
+    table = _by_column(runs) if len(runs) <= MOST_COLUMNS else _by_row(runs)
+    band = f"Settled: the tilt stays within ±{settings.settle_band_deg:g}° to the end."
+    lines = [f"# {title or 'Run'}", "", *table, "", _pushes(pushes), "", band]
     for run in runs:
+        if run.outcome.reason:
+            lines += ["", f"**{run.name}**: {run.outcome.reason}"]
         companions = run.summary.get("companions")
         if companions:
             lines += ["", *_companions(run.name, companions)]
-        if run.outcome.reason:
-            lines += ["", f"**{run.name}**: {run.outcome.reason}"]
     return "\n".join([*lines, "", notes, ""])
 
 
@@ -65,20 +65,35 @@ def scenario_page(toml: str) -> str:
     return f"# Scenario\n\n```toml\n{toml.strip()}\n```\n"
 
 
-def _companions(name: str, companions: dict[str, Any]) -> list[str]:
-    lines = [
-        f"Riding along in the run of {name}, open loop:",
-        "",
-        "| | Rate error, RMS [rad/s] |",
-        "|---|---:|",
+def _by_column(runs: Sequence[Recorded]) -> list[str]:
+    """A table with a column a run."""
+    lines = [_row("", *(run.name for run in runs)), "|---|" + "---:|" * len(runs)]
+    lines.append(_row("Outcome", *map(_outcome, runs)))
+    return lines + [
+        _row(words, *(_number(key, run.summary.get(key)) for run in runs)) for key, words in METRICS.items()
     ]
-    for companion, numbers in companions.items():
-        lines.append(f"| {companion} | {_number('', numbers.get('velocity_rms_error_rad_s'))} |")
-    return lines
+
+
+def _by_row(runs: Sequence[Recorded]) -> list[str]:
+    """A table with a row a run."""
+    lines = [_row("", "Outcome", *SHORT.values()), "|---|---|" + "---:|" * len(SHORT)]
+    return lines + [
+        _row(run.name, _outcome(run), *(_number(key, run.summary.get(key)) for key in SHORT)) for run in runs
+    ]
+
+
+def _companions(name: str, companions: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    key = "velocity_rms_error_rad_s"
+    lines = [f"Riding along open loop in the run of {name}:", "", _row("", METRICS[key]), "|---|---:|"]
+    return lines + [_row(companion, _number(key, of.get(key))) for companion, of in companions.items()]
+
+
+def _row(*cells: str) -> str:
+    return "| " + " | ".join(cells) + " |"
 
 
 def _outcome(run: Recorded) -> str:
-    return f"**{run.outcome.kind}** at {run.outcome.time_s:.4g} s"
+    return f"{run.outcome.kind} at {run.outcome.time_s:.4g} s"
 
 
 def _number(key: str, value: float | None) -> str:
@@ -90,6 +105,5 @@ def _number(key: str, value: float | None) -> str:
 def _pushes(pushes: Sequence[Push]) -> str:
     if not pushes:
         return "No push."
-    return (
-        "Pushes: " + "; ".join(f"{p.torque_n_m:+g} N m for {p.duration_s:g} s at {p.start_s:g} s" for p in pushes) + "."
-    )
+    listed = (f"{p.torque_n_m:+g} N m for {p.duration_s:g} s at {p.start_s:g} s" for p in pushes)
+    return "Pushes: " + "; ".join(listed) + "."

@@ -1,0 +1,151 @@
+"""How fast the closed loop is, against bare MuJoCo in the same run."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import mujoco
+from mujoco.batch import Batch
+from rich import box
+from rich.table import Table
+
+from cmg_mj.scenario import Experiment, Scenario, parse_scenario, prepare
+
+CONTROL_RATES_HZ = (200.0, 1000.0)
+BARS = {200.0: (1.5, 0.9), 1000.0: (3.0, 0.75)}
+"""Control rate -> at most so many times bare mj_step (one world), at least this share of Batch (many worlds)."""
+REPEATS = 7
+ONE_WORLD_S = 4.0
+MANY_WORLDS_S = 1.0
+
+
+def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float], None]) -> dict[str, Any]:
+    """Time every observer at every control rate.
+
+    All sensors sample at the control rate. Closed loop and bare stepping alternate; each repeat gives one
+    ratio, and the median ratio is reported, because the speed of a shared machine drifts.
+
+    Args:
+        observers: Names of the observers.
+        worlds: Worlds of the batch.
+        on_progress: Called with the share done.
+
+    Returns:
+        The figures, as `--json` prints them.
+
+    Raises:
+        InputError: An observer does not exist.
+    """
+    cases = [(observer, rate) for observer in observers for rate in CONTROL_RATES_HZ]
+    experiments = [
+        (prepare(_scenario(observer, rate, ONE_WORLD_S)), prepare(_scenario(observer, rate, MANY_WORLDS_S)))
+        for observer, rate in cases
+    ]
+    rows = []
+    for i, ((observer, rate), (one, many)) in enumerate(zip(cases, experiments, strict=True)):
+        single = [(_bare_one(one), _closed_one(one)) for _ in range(REPEATS)]
+        on_progress((i + 0.5) / len(cases))
+        batch = [(_bare_many(many, worlds), _closed_many(many, worlds)) for _ in range(REPEATS)]
+        on_progress((i + 1.0) / len(cases))
+        slower, share = BARS[rate]
+        rows.append(
+            {
+                "observer": observer,
+                "control_rate_hz": rate,
+                "bare_step_us": statistics.median(bare for bare, _ in single),
+                "closed_loop_step_us": statistics.median(closed for _, closed in single),
+                "closed_loop_over_bare": statistics.median(closed / bare for bare, closed in single),
+                "closed_loop_over_bare_bar": slower,
+                "batch_world_step_us": statistics.median(bare for bare, _ in batch),
+                "closed_loop_batch_world_step_us": statistics.median(closed for _, closed in batch),
+                "closed_loop_share_of_batch": statistics.median(bare / closed for bare, closed in batch),
+                "closed_loop_share_of_batch_bar": share,
+            }
+        )
+    return {"worlds": worlds, "processors": os.cpu_count(), "mujoco": mujoco.__version__, "figures": rows}
+
+
+def bench_table(figures: dict[str, Any]) -> Table:
+    """The table that `cmg-mj bench` prints."""
+    table = Table(
+        title=f"Microseconds a physics step, {figures['processors']} processors; ratios are medians of {REPEATS} pairs",
+        box=box.SIMPLE_HEAD,
+        title_justify="left",
+    )
+    for heading in ("observer", "control\n[Hz]", "bare\nmj_step", "closed\nloop", "ratio", "bar"):
+        table.add_column(heading, justify="left" if heading == "observer" else "right")
+    for heading in (f"Batch of\n{figures['worlds']}", "closed\nloop", "share", "bar"):
+        table.add_column(heading, justify="right")
+    for row in figures["figures"]:
+        table.add_row(
+            row["observer"],
+            f"{row['control_rate_hz']:g}",
+            f"{row['bare_step_us']:.2f}",
+            f"{row['closed_loop_step_us']:.2f}",
+            f"{row['closed_loop_over_bare']:.2f}",
+            f"<= {row['closed_loop_over_bare_bar']:g}",
+            f"{row['batch_world_step_us']:.2f}",
+            f"{row['closed_loop_batch_world_step_us']:.2f}",
+            f"{row['closed_loop_share_of_batch']:.2f}",
+            f">= {row['closed_loop_share_of_batch_bar']:g}",
+        )
+    return table
+
+
+def _scenario(observer: str, rate: float, duration_s: float) -> Scenario:
+    sensors = {kind: {"rate_hz": rate} for kind in ("accelerometer", "encoder", "fog")}
+    return parse_scenario(
+        {
+            "duration_s": duration_s,
+            "plant": {"equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.2},
+            "controller": {"rate_hz": rate},
+            "observer": {"kind": observer},
+            "sensors": sensors,
+            # An observer that cannot hold the rig must not end the measurement: a fall does not stop a run below 89 deg.
+            "metrics": {"fall_angle_deg": 89.0},
+        }
+    )
+
+
+def _bare_one(experiment: Experiment) -> float:
+    """Microseconds a step of mj_step alone."""
+    data = experiment.plant.new_data()
+    steps = round(experiment.scenario.duration_s / experiment.plant.model.opt.timestep)
+    start = time.perf_counter()
+    mujoco.mj_step(experiment.plant.model, data, steps)
+    return (time.perf_counter() - start) / steps * 1e6
+
+
+def _closed_one(experiment: Experiment) -> float:
+    """Microseconds a step of a whole run, its trajectory and summary included."""
+    start = time.perf_counter()
+    result = experiment.run()
+    return (time.perf_counter() - start) / _steps(experiment, result.seconds) * 1e6
+
+
+def _bare_many(experiment: Experiment, worlds: int) -> float:
+    """Microseconds a world-step of Batch alone, at its best: many steps a call."""
+    model = experiment.plant.model
+    data = experiment.plant.new_data()
+    batch = Batch(model, worlds)
+    for field in ("qpos", "qvel", "act", "ctrl"):
+        batch.bind(field)[:] = getattr(data, field)
+    steps = round(experiment.scenario.duration_s / model.opt.timestep)
+    start = time.perf_counter()
+    batch.step(nstep=steps)
+    return (time.perf_counter() - start) / steps / worlds * 1e6
+
+
+def _closed_many(experiment: Experiment, worlds: int) -> float:
+    """Microseconds a world-step of a batch run without trajectory."""
+    start = time.perf_counter()
+    result = experiment.run_many(worlds, keep_trajectory=False)
+    return (time.perf_counter() - start) / _steps(experiment, result.seconds) / worlds * 1e6
+
+
+def _steps(experiment: Experiment, seconds: float) -> float:
+    return seconds / experiment.plant.model.opt.timestep
