@@ -43,9 +43,7 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
         return math.atan2(y, x)
     # `np.arctan2` may take a vector instruction that rounds differently from the C library; the complex
     # logarithm takes its angle from the library.
-    point = np.empty(np.shape(y), dtype=complex)
-    point.real, point.imag = x, y
-    return np.log(point).imag
+    return np.log(x + 1j * y).imag
 
 
 def sign(x: Scalar) -> Scalar:

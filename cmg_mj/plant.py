@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass as plain_dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
@@ -284,16 +284,16 @@ class Plant:
         self.initialise(data)
         return data
 
-    def ideal(self, qpos: Sequence[Scalar], qvel: Sequence[Scalar], sensordata: Sequence[Scalar]) -> Ideal:
+    def ideal(self, qpos: Any, qvel: Any, sensordata: Any) -> Ideal:
         """What perfect sensors show: encoders and gyro the present state, accelerometers the last physics step.
 
         Encoders and gyro are read off the joints they sit on, because after a step MuJoCo's own sensordata
         is still that of the state before it. On the frame, the gyro's tilt axis shows exactly q_b'.
 
         Args:
-            qpos: Joint angles [rad].
-            qvel: Joint rates [rad/s].
-            sensordata: MuJoCo's sensor readings.
+            qpos: Joint angles, indexed by address: floats, or an array (n_joints, n_worlds) [rad].
+            qvel: Joint rates, the same way [rad/s].
+            sensordata: MuJoCo's sensor readings, the same way.
 
         Returns:
             The ideal readings, of the elements' own type (float, or array (n_worlds,)).
@@ -305,7 +305,7 @@ class Plant:
             forces = (sensordata[i], sensordata[j], sensordata[k], sensordata[m])
         return Ideal(forces, [qpos[gimbal] for gimbal in self._gimbals], qvel[self.tilt])
 
-    def gimbal_angle(self, qpos: Sequence[Scalar]) -> Scalar:
+    def gimbal_angle(self, qpos: Any) -> Scalar:
         """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""
         angle = 0.0
         for cube, share in zip(self.cubes, self._shares, strict=True):

@@ -88,7 +88,7 @@ class ReducedModel:
         """The linearisation (6) with the measured outputs, for python-control."""
         import control
 
-        return control.ss(
+        return control.StateSpace(
             self.A,
             self.B,
             self.C,

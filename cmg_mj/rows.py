@@ -84,8 +84,8 @@ class Rows:
         x1 = q[self._rig.tilt] - self._rig.tilt_zero + self._bias
         x2 = v[self._rig.tilt]
         x3 = self._rig.gimbal_angle(q)
-        if not self._single:
-            ended = ~np.array(runnings)
+        ended = None if self._single else ~np.array(runnings)
+        if ended is not None:
             x1 = np.where(ended, np.nan, x1)
         self._metrics.update(x1, x2, x3, u, fog, [rate for _, rate, _ in estimated])
         if self._keep:
@@ -103,7 +103,7 @@ class Rows:
                 *q,
                 *v,
             ]
-            if not self._single:
+            if ended is not None:
                 columns = [np.where(ended, np.nan, column) for column in columns]
             self._pieces.append(columns)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import ConfigDict, Field
@@ -211,7 +211,7 @@ class SampledSensor:
         self._measure = sensor.meter()
         self._noise = noise
         self._on_the_way: deque = deque()
-        self._delivered = None
+        self._delivered: Any = None
 
     def sample(self, step: int, ideal: Ideal) -> None:
         """Take a sample at a physics step that is a multiple of `period`."""
@@ -222,7 +222,7 @@ class SampledSensor:
         if self.latency:
             self._on_the_way.append((step + self.latency, reading))
 
-    def read(self, step: int):
+    def read(self, step: int) -> Any:
         """The newest sample delivered by a physics step."""
         while self._on_the_way and self._on_the_way[0][0] <= step:
             self._delivered = self._on_the_way.popleft()[1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
@@ -12,11 +12,14 @@ from mujoco.batch import Batch, SimulationError
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant import Plant
 
+Reading = tuple[Any, Any, Any]
+"""Joint angles, joint rates, sensordata: lists of floats, or arrays (n, n_worlds)."""
+
 
 class Worlds(Protocol):
     """Physics, one world or many."""
 
-    def read(self) -> tuple[Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]]:
+    def read(self) -> Reading:
         """Joint angles, joint rates and sensordata, each indexed by its address first."""
         ...
 
@@ -44,7 +47,7 @@ class OneWorld:
         self._servos = list(zip(plant.servos, plant.directions, strict=True))
         self._tilt = plant.tilt
 
-    def read(self) -> tuple[Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]]:
+    def read(self) -> Reading:
         """Joint angles, joint rates and sensordata as floats."""
         return self._qpos.tolist(), self._qvel.tolist(), self._sensordata.tolist()
 
@@ -90,7 +93,7 @@ class ManyWorlds:
         self.running = np.ones(len(plants), dtype=bool)
         self._all_run = True
 
-    def read(self) -> tuple[Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]]:
+    def read(self) -> Reading:
         """Joint angles, joint rates and sensordata, each (n, n_worlds)."""
         return self._qpos.T.copy(), self._qvel.T.copy(), self._sensordata.T.copy()
 

@@ -25,7 +25,8 @@ class State(NamedTuple):
 class SuperTwisting:
     """z0' = z1 - l0 sqrt(L) |s|^(1/2) sign s, z1' = -l1 L sign s, s = z0 - y1: model-free.
 
-    Discretised implicitly, because an explicit step chatters with an amplitude of order L dt: with h = dt and b = z0 + h z1 - y1, the sliding variable after the step solves
+    Discretised implicitly, because an explicit step chatters with an amplitude of order L dt: with h = dt and
+    b = z0 + h z1 - y1, the sliding variable after the step solves
     s + h l0 sqrt(L) |s|^(1/2) sign s + h^2 l1 L sign s = b, sign being the set-valued one. Where
     |b| <= h^2 l1 L its solution is s = 0.
 

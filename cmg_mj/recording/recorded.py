@@ -67,14 +67,14 @@ def phases(run: Recorded, pushes: Sequence[Push], settings: MetricsSettings) -> 
     end = run.outcome.time_s
     steps = [(0.0, BALANCING)] if pushes and min(p.start_s for p in pushes) > 0.0 else []
     starts = sorted(push.start_s for push in pushes)
-    for start in starts:
-        steps.append((start, PUSH))
+    steps += [(start, PUSH) for start in starts]
     for calm in sorted({push.end_s for push in pushes}) if pushes else [0.0]:
         if any(p.start_s <= calm < p.end_s for p in pushes):
             continue  # another push is still on
         until = min((start for start in starts if start >= calm), default=end)
         steps += _recovery(run.trajectory, calm, min(until, end), math.radians(settings.settle_band_deg))
     steps = sorted((time, name) for time, name in steps if time < end)
+    steps = [step for i, step in enumerate(steps) if i == 0 or step[1] != steps[i - 1][1]]
     if run.outcome.kind in ENDINGS:
         steps.append((end, ENDINGS[run.outcome.kind]))
     return steps

@@ -141,12 +141,12 @@ def _log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant) -> None:
     parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
     for cube in plant.cubes:
         parents[int(model.jnt_bodyid[cube.flywheel])] = _slowed_path(branch, plant, cube)
-    for body, name, shape in _shapes(model):
+    for body, name, shape in shapes(model):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
         rec.log(f"{parents[body]}/{path}", shape, static=True)
 
 
-def _shapes(model: mujoco.MjModel) -> Iterator[tuple[int, str, Any]]:
+def shapes(model: mujoco.MjModel) -> Iterator[tuple[int, str, Any]]:
     """Body, name and shape of all that MuJoCo draws."""
     for i in range(model.ngeom):
         rgba = _rgba(model, i)
