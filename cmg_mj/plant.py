@@ -299,7 +299,7 @@ class Plant:
             The ideal readings, of the elements' own type (float, or array (n_worlds,)).
         """
         if isinstance(sensordata, np.ndarray):
-            forces: Sequence[Scalar] = sensordata[self._specific_forces]
+            forces: Any = sensordata[self._specific_forces]
         else:
             i, j, k, m = self._specific_forces
             forces = (sensordata[i], sensordata[j], sensordata[k], sensordata[m])

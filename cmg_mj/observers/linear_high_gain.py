@@ -35,7 +35,7 @@ class LinearHighGain:
 
     dt: Positive
     model: ReducedModel
-    epsilon: Positive = 0.02
+    epsilon: Positive = 0.0287
     a1: Positive = 1.4142135623730951
     a2: Positive = 1.0
 

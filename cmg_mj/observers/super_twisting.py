@@ -40,7 +40,7 @@ class SuperTwisting:
 
     dt: Positive
     model: ReducedModel
-    L: Positive = 10.0
+    L: Positive = 10.4
     l0: Positive = 1.5
     l1: Positive = 1.1
 

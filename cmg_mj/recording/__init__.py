@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
@@ -21,6 +23,9 @@ from cmg_mj.recording.summary import markdown, scenario_page
 from cmg_mj.trajectory import whole_file
 
 __all__ = ["Recorded", "write_recording"]
+
+LONGEST_LIST = 120
+"""Names of runs, put together, that still fit into an application's name [characters]."""
 
 
 def write_recording(
@@ -55,8 +60,7 @@ def write_recording(
     settings = settings or MetricsSettings()
     branches = [_branch(run, plant, settings, rate_limit_rad_s) for run in runs]
     notes = f"In the 3-D view the flywheels turn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed."
-    # The viewer remembers a layout by application: recordings with other branches must not share it.
-    application = f"cmg-mj {' '.join(names)}"
+    application = _application(names)
     with whole_file(path) as temporary, _strict(), rr.RecordingStream(application) as rec:
         rec.save(temporary, default_blueprint=blueprint(plant, branches))
         rec.set_log_time_enabled(False)
@@ -75,6 +79,17 @@ def write_recording(
 def _branch(run: Recorded, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> Branch:
     rows = {row.path: row for row in series(run, plant, settings, rate_limit)}
     return Branch(f"/{rr.escape_entity_path_part(run.name)}", run, rows)
+
+
+def _application(names: Sequence[str]) -> str:
+    """The viewer remembers a layout by application: recordings with other branches must not share it.
+
+    It may have about 180 characters, of which few are punctuation.
+    """
+    listed = " ".join(names)
+    if len(listed) > LONGEST_LIST:
+        listed = f"{len(names)} runs {zlib.crc32(listed.encode()):08x}"
+    return re.sub(r"[^\w -]", "-", f"cmg-mj {listed}", flags=re.ASCII)
 
 
 def _log_page(rec: rr.RecordingStream, path: str, page: str) -> None:

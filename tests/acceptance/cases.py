@@ -1,0 +1,60 @@
+"""What the acceptance tests run: the closed loop at 0.5 degrees of bias, and all observers riding along on the gyro's loop."""
+
+from __future__ import annotations
+
+import statistics
+from functools import cache
+
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.simulate import Result
+
+STANDING = {
+    # observer -> settings in which it stands: the headline push at 0.5 degrees of bias, unless it cannot
+    "homogeneous": (),
+    "ltv": (),
+    "linear": (),
+    "linear_high_gain": (),
+    "luenberger": ("plant.equilibrium_bias_deg=0.1",),
+    "finite_difference": ("plant.equilibrium_bias_deg=0.1",),
+    "super_twisting": ("observer.L=15.0",),
+}
+FALLING = ("luenberger",)
+"""Observers that let the rig fall under the headline push in every world, with their default parameters."""
+
+GROUP = 20
+
+
+@cache
+def closed_loop(observer: str, settings: tuple[str, ...], seed: int, worlds: int) -> Result:
+    """Push recovery with an observer in the loop."""
+    scenario = load_scenario("push_recovery", [f"observer.kind={observer}", *settings, f"seed={seed}"])
+    return prepare(scenario).run_many(worlds, keep_trajectory=False)
+
+
+@cache
+def ride_along(seed: int, worlds: int) -> Result:
+    """Observer tuning: the loop closed on the gyro."""
+    return prepare(load_scenario("observer_tuning", [f"seed={seed}"])).run_many(worlds, keep_trajectory=False)
+
+
+def closed_loop_figures(result: Result, first: int = 0) -> dict[str, float]:
+    """Figures of a group of GROUP worlds."""
+    group = result.summaries[first : first + GROUP]
+    return {
+        "velocity_rms_error_rad_s": statistics.fmean(s["velocity_rms_error_rad_s"] for s in group),
+        "tilt_rms_deg": statistics.fmean(s["tilt_rms_deg"] for s in group),
+        "command_rms_rad_s": statistics.fmean(s["command_rms_rad_s"] for s in group),
+        # A world that is outside the band at the very end has not settled within the run.
+        "settle_time_s": statistics.median(13.0 if s["settle_time_s"] is None else s["settle_time_s"] for s in group),
+    }
+
+
+def ride_along_figures(result: Result, first: int = 0) -> dict[str, float]:
+    """Each observer's velocity RMS error over a group of GROUP worlds."""
+    group = result.summaries[first : first + GROUP]
+    figures = {}
+    for name in OBSERVERS:
+        parts = [s["companions"][name] if name in s.get("companions", {}) else s for s in group]
+        figures[name] = statistics.fmean(part["velocity_rms_error_rad_s"] for part in parts)
+    return figures
