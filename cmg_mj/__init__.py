@@ -1,1 +1,80 @@
-"""cmg_mj."""
+"""A bench for gyroscopic stabilisation: a six-body MuJoCo scissored pair, real sensors, velocity observers.
+
+Names are imported when they are first used, so that the rooms without physics (observers, sensors, the law) can be used
+without MuJoCo.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cmg_mj.callback import control, installed
+    from cmg_mj.controller import Controller, Law, lqr_gains
+    from cmg_mj.errors import InputError, RunStopped
+    from cmg_mj.observers import OBSERVERS, Estimate, Measurement, Observer, make_observer
+    from cmg_mj.plant import Plant, PlantSettings, load_plant
+    from cmg_mj.push import Push
+    from cmg_mj.reduced import ReducedModel
+    from cmg_mj.scenario import Experiment, Scenario, load_scenario, parse_scenario, prepare
+    from cmg_mj.sensors import Accelerometer, Encoder, Fog, Sensors
+    from cmg_mj.simulate import Outcome, Result, simulate
+    from cmg_mj.tilt import RadialTilt
+    from cmg_mj.trajectory import Trajectory
+
+_HOMES = {
+    "callback": ("control", "installed"),
+    "controller": ("Controller", "Law", "lqr_gains"),
+    "errors": ("InputError", "RunStopped"),
+    "observers": ("OBSERVERS", "Estimate", "Measurement", "Observer", "make_observer"),
+    "plant": ("Plant", "PlantSettings", "load_plant"),
+    "push": ("Push",),
+    "reduced": ("ReducedModel",),
+    "scenario": ("Experiment", "Scenario", "load_scenario", "parse_scenario", "prepare"),
+    "sensors": ("Accelerometer", "Encoder", "Fog", "Sensors"),
+    "simulate": ("Outcome", "Result", "simulate"),
+    "tilt": ("RadialTilt",),
+    "trajectory": ("Trajectory",),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "OBSERVERS",
+    "Accelerometer",
+    "Controller",
+    "Encoder",
+    "Estimate",
+    "Experiment",
+    "Fog",
+    "InputError",
+    "Law",
+    "Measurement",
+    "Observer",
+    "Outcome",
+    "Plant",
+    "PlantSettings",
+    "Push",
+    "RadialTilt",
+    "ReducedModel",
+    "Result",
+    "RunStopped",
+    "Scenario",
+    "Sensors",
+    "Trajectory",
+    "control",
+    "installed",
+    "load_plant",
+    "load_scenario",
+    "lqr_gains",
+    "make_observer",
+    "parse_scenario",
+    "prepare",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(importlib.import_module(f"cmg_mj.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'cmg_mj' has no attribute {name!r}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass as plain_dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,11 +14,13 @@ import numpy as np
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.controller import Angles, Controller, Feedback, Law
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.observers import Observer, make_observer
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
-from cmg_mj.sensors import Ideal
+from cmg_mj.sensors import Ideal, Sensors
 from cmg_mj.tilt import RadialTilt
 
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -271,6 +273,56 @@ class Plant:
         model.site_sameframe[model.site_bodyid == body] = 0
 
     # --- running -------------------------------------------------------------------------------------------
+
+    def controller(
+        self,
+        observer: Observer | str = "homogeneous",
+        *,
+        law: Law | None = None,
+        sensors: Sensors | None = None,
+        seed: int = 0,
+        worlds: int | Sequence[int] = 0,
+        feedback: Feedback = "observer",
+        angles: Angles = "measured",
+        companions: Mapping[str, Observer] | None = None,
+        **parameters: Any,
+    ) -> Controller:
+        """A fresh controller for this rig.
+
+        Args:
+            observer: An observer, or its name (or package.module:Class).
+            law: The law; by default Table 2's gains at 200 Hz.
+            sensors: The sensors; by default those of the datasheets.
+            seed: Seed of the sensors' noise.
+            worlds: The number of one world, or the numbers of many: noise depends on (seed, number) alone.
+            feedback: Which rate the law uses: the observer's, the gyro's (`fog`) or the true one (`truth`).
+            angles: Whether the law uses the measured or the estimated angles.
+            companions: Observers that ride along open loop, by name.
+            **parameters: The observer's parameters, if it is given by name.
+
+        Returns:
+            The controller.
+
+        Raises:
+            InputError: The observer does not exist or refuses a parameter, or a rate does not fit the physics step.
+        """
+        law = law or Law(dt=0.005)
+        if isinstance(observer, str):
+            observer = make_observer(observer, law.dt, self.reduced, **parameters)
+        return Controller(
+            observer,
+            law,
+            self.radial_tilt,
+            sensors or Sensors(),
+            directions=self.directions,
+            gimbal_zero=[cube.gimbal_zero for cube in self.cubes],
+            timestep=self.model.opt.timestep,
+            seed=seed,
+            worlds=worlds,
+            feedback=feedback,
+            angles=angles,
+            companions=companions,
+        )
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""

@@ -149,14 +149,10 @@ class Experiment:
         """
         scenario, plant = self.scenario, self.plant
         dt, model = self.law.dt, plant.reduced
-        return Controller(
+        return plant.controller(
             scenario.observer.make(dt, model),
-            self.law,
-            plant.radial_tilt,
-            scenario.sensors,
-            directions=plant.directions,
-            gimbal_zero=[cube.gimbal_zero for cube in plant.cubes],
-            timestep=scenario.plant.timestep_s,
+            law=self.law,
+            sensors=scenario.sensors,
             seed=scenario.seed,
             worlds=worlds,
             feedback=scenario.controller.feedback,
