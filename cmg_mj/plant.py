@@ -255,6 +255,11 @@ class Plant:
         The first moment of all that tilts is turned, not lengthened: gravity's torque keeps its amplitude.
         """
         model = self.model
+        if model.body_mass[self.frame] <= 0.0:
+            raise InputError(
+                f"plant.equilibrium_bias_deg: {self.path}: the body with the joint 'tilt' needs a mass of its own to move "
+                "(give the model's compiler fusestatic=\"true\", so that the cubes' halves become part of it)"
+            )
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, self.key)
         mujoco.mj_forward(model, data)
@@ -265,12 +270,8 @@ class Plant:
         return model.body_subtreemass[self.frame] / model.body_mass[self.frame] * (turn @ centre - centre)
 
     def _shift(self, body: int, offset: np.ndarray) -> None:
-        """Move a body's centre of mass, and clear the shortcuts the compiler took because it was elsewhere."""
-        model = self.model
-        model.body_ipos[body] += offset
-        model.body_sameframe[body] = 0
-        model.geom_sameframe[model.geom_bodyid == body] = 0
-        model.site_sameframe[model.site_bodyid == body] = 0
+        """Move a body's centre of mass (mj_setConst, called once at the end, makes what follows from it)."""
+        self.model.body_ipos[body] += offset
 
     # --- running -------------------------------------------------------------------------------------------
 

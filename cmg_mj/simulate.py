@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -59,7 +59,6 @@ class Result:
     summaries: list[dict[str, Any]]
     trajectory: Trajectory | None = None
     seconds: float = 0.0
-    metadata: dict[str, Any] = field(default_factory=dict)
 
 
 def _stops(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, float]]:
@@ -130,7 +129,6 @@ def simulate(
     metrics = Metrics(observers, len(plants), dt, push_end, controller.law.rate_limit, settings)
     rows = Rows(plants, observers, metrics, dt, keep=keep_trajectory, single=single)
     ends: list[Outcome | None] = [None] * len(plants)
-    running = len(plants)
     native = driver == "native"
     torque = 0.0
     step = 0
@@ -154,13 +152,12 @@ def simulate(
                         for i in np.flatnonzero(down):
                             ends[i] = _fallen(float(lean[i]), step * timestep)
                         worlds.stop(down)
-                        running -= int(down.sum())
-                        if not running:
-                            break
+                    if not worlds.running.any():
+                        break
                 if native:
                     ticked = step % controller.beat == 0 and controller.update(step, rig.ideal(q, v, s))
-                    if ticked:
-                        worlds.command(controller.tick.u)  # type: ignore[union-attr]
+                    if ticked and controller.tick is not None:
+                        worlds.command(controller.tick.u)
                     worlds.advance(count)
                 else:
                     ticked = step % controller.period == 0
@@ -168,6 +165,11 @@ def simulate(
                 if ticked:
                     tick = controller.tick
                     assert tick is not None
+                    if not single and not np.isfinite(tick.estimates[0][1]).all():
+                        blind = ~np.isfinite(tick.estimates[0][1]) & worlds.running
+                        for i in np.flatnonzero(blind):
+                            ends[i] = Outcome("stopped", step * timestep, f"{observers[0]} returned no finite x2")
+                        worlds.stop(blind)
                     completed = rows.add(q, v, tick, torque, None if single else worlds.running.copy())
                     if completed and on_progress:
                         on_progress((step + count) * timestep)

@@ -1,7 +1,8 @@
-"""MuJoCo's side of every comparison: the compiled rig at a given state, and its motion from many states at once."""
+"""MuJoCo's side of every comparison: the compiled rig at given states, and its motion from them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from copy import copy
 from typing import NamedTuple
 
@@ -32,22 +33,22 @@ def passive(plant: Plant, *, gravity: bool = True) -> mujoco.MjModel:
     return model
 
 
-def at(
+def states(
     model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray | float = 0.0, applied: np.ndarray | float = 0.0
-) -> mujoco.MjData:
-    """Everything MuJoCo computes at one state, under torques applied at the joints."""
+) -> Iterator[mujoco.MjData]:
+    """All that MuJoCo computes at each row of qpos under torques at the joints. One MjData serves all."""
     data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    data.qvel[:] = qvel
-    data.qfrc_applied[:] = applied
-    mujoco.mj_forward(model, data)
-    return data
+    for q, v, tau in zip(*np.broadcast_arrays(qpos, qvel, applied), strict=True):
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = q, v, tau
+        mujoco.mj_forward(model, data)
+        yield data
 
 
-def mass_matrix(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
-    """The compiled rig's mass matrix, (n_joints, n_joints) [kg m^2]."""
-    dense = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, at(model, qpos), dense)
+def mass_matrices(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
+    """The compiled rig's mass matrix at each row of qpos, (n_states, n_joints, n_joints) [kg m^2]."""
+    dense = np.zeros((len(qpos), model.nv, model.nv))
+    for matrix, data in zip(dense, states(model, qpos), strict=True):
+        mujoco.mj_fullM(model, data, matrix)
     return dense
 
 

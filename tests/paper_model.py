@@ -1,13 +1,14 @@
 """The equations of motion as the papers derive them: by sympy, from T and P, with the numbers of Table 1.
 
-This is what MuJoCo is tested against, so nothing here is read off the models. Corrected against the print:
-in the angular velocity of C1 the gimbal rate stands in the first slot (as it does for C2, and as R_BC demands).
+This is what MuJoCo is tested against, so nothing here is read off the models. Corrected against the print: in
+the angular velocity of C1 the gimbal rate stands in the first slot, as it does for C2 and as R_BC demands.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import sympy as sp
@@ -22,16 +23,17 @@ omega_d = 314.0
 g = 9.81
 l_single = 0.13  # sokolov2019 Table I: from the pivot to the centre of mass of its one cube
 
-# aranovskiy2020 (2), (4)
+# aranovskiy2020 (2), (4); sokolov2019 (1) for one cube
 J1 = I_d + J_b + K_c + m * l**2 / 2
+J1_single = I_d + J_b + K_c + m * l_single**2
 J2 = J_c - I_d + J_d - K_c
-gravity_torque = m * g * l / np.sqrt(2.0)
+gravity_torque = m * g * l / math.sqrt(2.0)
 
 Function = Callable[..., np.ndarray]
 
 
 def R_AB(a: sp.Expr) -> sp.Matrix:
-    """Passive rotation about y; R_CD is the same."""
+    """Passive rotation about y. R_CD is the same."""
     return sp.Matrix([[sp.cos(a), 0, -sp.sin(a)], [0, 1, 0], [sp.sin(a), 0, sp.cos(a)]])
 
 
@@ -42,68 +44,85 @@ def R_BC(a: sp.Expr) -> sp.Matrix:
 
 def doubled_energy(inertia: Sequence[float], w: sp.Matrix) -> sp.Expr:
     """w' diag(inertia) w, as T writes it."""
-    return (w.T * sp.diag(*inertia) * w)[0]
+    return w.dot(sp.diag(*inertia) * w)
 
 
-def doubled_cube_energy(w_b: sp.Matrix, q: Sequence[sp.Symbol], dq: Sequence[sp.Symbol]) -> sp.Expr:
-    """A gimbal's and its flywheel's share of 2 T, from their angles and rates (c, d) on a frame turning with w_b."""
+def doubled_cube_energy(w_b: sp.Matrix, q: Sequence[sp.Expr], dq: Sequence[sp.Expr]) -> sp.Expr:
+    """Gimbal's and flywheel's share of 2 T, by their angles and rates (c, d), in a frame turning with w_b."""
     w_c = sp.Matrix([dq[0], 0, 0]) + R_BC(q[0]) * w_b
     w_d = sp.Matrix([0, dq[1], 0]) + R_AB(q[1]) * w_c
     return doubled_energy([I_d, J_d, K_d], w_d) + doubled_energy([I_c, J_c, K_c], w_c)
 
 
 class Lagrangian:
-    """Functions of a system L = T - P. Coordinates lie on the last axis of every argument and result.
+    """Functions of a system L = T - P, compiled at first use. Coordinates lie on every array's last axis."""
 
-    Attributes:
-        kinetic: T(q, dq) [J].
-        potential: P(q) [J].
-        momenta: dT/d(dq) [N m s]; constant where neither T nor P knows the coordinate.
-        mass_matrix: M(q), (..., n, n) [kg m^2].
-        bias: What M ddq leaves of the Euler-Lagrange equations (1): tau = M ddq + bias(q, dq) [N m].
-    """
+    def __init__(self, q: Sequence[sp.Symbol], dq: Sequence[sp.Symbol], T: sp.Expr, P: sp.Expr) -> None:
+        self.q, self.dq, self.T, self.P = sp.Matrix(q), sp.Matrix(dq), T, P
 
-    def __init__(self, q: sp.Matrix, dq: sp.Matrix, T: sp.Expr, P: sp.Expr) -> None:
-        momenta = sp.Matrix([T]).jacobian(dq).T
-        bias = momenta.jacobian(q) * dq - sp.Matrix([T - P]).jacobian(q).T
-        self.kinetic = _compiled(T, q, dq)
-        self.potential = _compiled(P, q)
-        self.momenta = _compiled(momenta, q, dq)
-        self.mass_matrix = _compiled(momenta.jacobian(dq), q)
-        self.bias = _compiled(bias, q, dq)
+    @cached_property
+    def _dT_ddq(self) -> sp.Matrix:
+        return sp.Matrix([self.T]).jacobian(self.dq).T
+
+    @cached_property
+    def kinetic(self) -> Function:
+        """T(q, dq) [J]."""
+        energy = _compiled(sp.Matrix([self.T]), self.q, self.dq)
+        return lambda q, dq: energy(q, dq)[..., 0, 0]
+
+    @cached_property
+    def potential(self) -> Function:
+        """P(q) [J]."""
+        energy = _compiled(sp.Matrix([self.P]), self.q)
+        return lambda q: energy(q)[..., 0, 0]
+
+    @cached_property
+    def momenta(self) -> Function:
+        """dT/d(dq)(q, dq) [N m s]; constant where neither T nor P knows the coordinate."""
+        momenta = _compiled(self._dT_ddq, self.q, self.dq)
+        return lambda q, dq: momenta(q, dq)[..., 0]
+
+    @cached_property
+    def mass_matrix(self) -> Function:
+        """M(q), (..., n, n) [kg m^2]."""
+        return _compiled(self._dT_ddq.jacobian(self.dq), self.q)
+
+    @cached_property
+    def bias(self) -> Function:
+        """What the Euler-Lagrange equations (1) have besides M ddq: tau = M ddq + bias(q, dq) [N m]."""
+        dL_dq = sp.Matrix([self.T - self.P]).jacobian(self.q).T
+        bias = _compiled(self._dT_ddq.jacobian(self.q) * self.dq - dL_dq, self.q, self.dq)
+        return lambda q, dq: bias(q, dq)[..., 0]
 
     def accelerations(self, q: np.ndarray, dq: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """ddq of the Euler-Lagrange equations (1) under generalised torques tau [rad/s^2]."""
+        """ddq of the Euler-Lagrange equations (1) under the generalised torques tau [rad/s^2]."""
         return np.linalg.solve(self.mass_matrix(q), (tau - self.bias(q, dq))[..., None])[..., 0]
 
 
-def _compiled(expression: sp.Expr | sp.Matrix, *arguments: sp.Matrix) -> Function:
-    """A sympy expression as a function of arrays; a matrix' shape follows the arrays' own."""
-    is_matrix = isinstance(expression, sp.MatrixBase)
-    entries = list(expression) if is_matrix else [expression]
-    rows, columns = expression.shape if is_matrix else (1, 1)
-    shape = () if not is_matrix else (rows,) if columns == 1 else (rows, columns)
-    compiled = sp.lambdify([symbol for argument in arguments for symbol in argument], entries, "numpy", cse=True)
+def _compiled(matrix: sp.Matrix, *arguments: sp.Matrix) -> Function:
+    """A matrix of expressions as a function of arrays (..., n), one for each column of symbols."""
+    symbols = [symbol for argument in arguments for symbol in argument.flat()]
+    entries = sp.lambdify(symbols, matrix.flat(), "numpy", cse=True)
 
     def function(*values: np.ndarray) -> np.ndarray:
         batch = np.shape(values[0])[:-1]
-        results = compiled(*(column for value in values for column in np.moveaxis(np.asarray(value), -1, 0)))
-        return np.stack([np.broadcast_to(r, batch) for r in results], axis=-1).reshape(*batch, *shape)
+        columns = [column for value in values for column in np.moveaxis(value, -1, 0)]
+        flat = np.stack([np.broadcast_to(entry, batch) for entry in entries(*columns)], axis=-1)
+        return flat.reshape(*batch, *matrix.shape)
 
     return function
 
 
-def _coordinates(*names: str) -> tuple[sp.Matrix, sp.Matrix]:
-    return sp.Matrix([sp.Symbol(f"q_{name}") for name in names]), sp.Matrix([sp.Symbol(f"dq_{name}") for name in names])
+def _coordinates(*names: str) -> tuple[list[sp.Symbol], list[sp.Symbol]]:
+    return [sp.Symbol(f"q_{name}") for name in names], [sp.Symbol(f"dq_{name}") for name in names]
 
 
 @cache
-def scissored_pair(K_a: float, *, e: float = 0.0, yaw_term: bool = True) -> Lagrangian:
+def scissored_pair(K_a: float, *, yaw_term: bool = True) -> Lagrangian:
     """The six bodies of aranovskiy2020, section II. Coordinates q_a, q_b, q_c1, q_d1, q_c2, q_d2.
 
     Args:
         K_a: The thrust bearing's inertia about the vertical, which Table 1 does not give [kg m^2].
-        e: The equilibrium bias, as P has it [rad].
         yaw_term: Whether to add what T misses: the tilted frame's yaw inertia m l^2 sin^2(q_b + pi/4).
     """
     q, dq = _coordinates("a", "b", "c1", "d1", "c2", "d2")
@@ -118,7 +137,15 @@ def scissored_pair(K_a: float, *, e: float = 0.0, yaw_term: bool = True) -> Lagr
     )
     if yaw_term:
         doubled += m * l**2 * sp.sin(tilt) ** 2 * dq[0] ** 2
-    return Lagrangian(q, dq, doubled / 2, sp.sqrt(2) * m * g * l * sp.cos(tilt + e))
+    return Lagrangian(q, dq, doubled / 2, sp.sqrt(2) * m * g * l * sp.cos(tilt))
+
+
+@cache
+def flywheel_weights(first_moment: float) -> Lagrangian:
+    """What P gains if each flywheel's mass times its offset along d_1 is first_moment [kg m]. T is left out."""
+    q, dq = _coordinates("a", "b", "c1", "d1", "c2", "d2")
+    height_1, height_2 = ((R_AB(q[k + 1]) * R_BC(q[k]) * R_AB(q[1]))[0, 2] for k in (2, 4))
+    return Lagrangian(q, dq, sp.S.Zero, first_moment * g * (height_1 + height_2))
 
 
 @cache
@@ -126,5 +153,5 @@ def single_gimbal() -> Lagrangian:
     """The three bodies of sokolov2019: T of the six with one cube and q_a = 0. Coordinates q_b, q_c, q_d."""
     q, dq = _coordinates("b", "c", "d")
     w_b = sp.Matrix([0, dq[0], 0])
-    doubled = doubled_energy([I_b, J_b + m * l_single**2, K_b], w_b) + doubled_cube_energy(w_b, q[1:3], dq[1:3])
+    doubled = doubled_energy([I_b, J_b + m * l_single**2, K_b], w_b) + doubled_cube_energy(w_b, q[1:], dq[1:])
     return Lagrangian(q, dq, doubled / 2, m * g * l_single * sp.cos(q[0] + sp.pi / 4))

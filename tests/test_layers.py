@@ -1,0 +1,144 @@
+"""The house's one rule: a lower room may use a higher one, and nothing above the line imports MuJoCo."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import cmg_mj
+
+PACKAGE = Path(cmg_mj.__file__).parent
+
+UPPER = [
+    "errors",
+    "timing",
+    "elementwise",
+    "resources",
+    "push",
+    "reduced",
+    "tilt",
+    "sensors",
+    "observers",
+    "controller",
+    "trajectory",
+    "metrics",
+]
+LOWER = ["plant", "callback", "worlds", "rows", "simulate", "scenario", "recording", "report", "runs", "bench"]
+LAST = ["cli"]
+"""The rooms from top to bottom. One that is not named here lies between the lower rooms and the last."""
+
+HEAVY = {"rerun": "recording", "matplotlib": "report"}
+"""Imported by one room each, because it costs time."""
+
+
+def rooms() -> list[str]:
+    """Modules and packages of cmg_mj."""
+    return sorted(
+        {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
+        - {"__init__"}
+    )
+
+
+def depth(room: str) -> int:
+    order = [*UPPER, *LOWER]
+    return order.index(room) if room in order else len(order) + LAST.count(room)
+
+
+def files(room: str) -> list[Path]:
+    one = PACKAGE / f"{room}.py"
+    return [one] if one.exists() else sorted((PACKAGE / room).rglob("*.py"))
+
+
+def imports(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and full name of everything that a file imports, inside functions too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: write the whole name"
+            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+
+
+def used_rooms(room: str) -> Iterator[tuple[str, str]]:
+    """Where a room imports which other room."""
+    for path in files(room):
+        for line, name in imports(path):
+            parts = name.split(".")
+            if parts[0] == "cmg_mj" and len(parts) > 1 and parts[1] in rooms() and parts[1] != room:
+                yield f"{path.name}:{line}", parts[1]
+
+
+def in_a_fresh_interpreter(code: str) -> list[str]:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+
+
+def test_rooms_are_all_there() -> None:
+    assert not set(UPPER + LAST) - set(rooms())
+
+
+@pytest.mark.parametrize("room", rooms())
+def test_imports_run_upward_only(room: str) -> None:
+    below = [f"{where} imports {other}" for where, other in used_rooms(room) if depth(other) > depth(room)]
+    assert not below
+
+
+def test_a_downward_import_would_be_seen() -> None:
+    """The order is not trivially held: the loop does use the controller, the command line the scenario."""
+    assert "controller" in {other for _, other in used_rooms("simulate")}
+    assert "scenario" in {other for _, other in used_rooms("cli")}
+    assert depth("controller") < depth("simulate") < depth("scenario") < depth("cli")
+
+
+def test_nothing_above_the_line_imports_mujoco() -> None:
+    """One room after the other: the first that brings MuJoCo, or what is as heavy, is named."""
+    code = "import importlib, sys\n"
+    for room in UPPER:
+        code += f"importlib.import_module('cmg_mj.{room}')\n"
+        for heavy in ("mujoco", "control", "pyarrow", *HEAVY):
+            code += f"if {heavy!r} in sys.modules: print('{room}:{heavy}')\n"
+    code += "print('done')"
+    assert in_a_fresh_interpreter(code) == ["done"]
+
+
+def test_every_observer_works_without_mujoco() -> None:
+    code = """
+import sys
+from cmg_mj.observers import OBSERVERS, Measurement, make_observer
+from cmg_mj.reduced import ReducedModel
+model = ReducedModel(0.061841, -1.9e-4, 11e-4, 314.0, 3.4531)
+for kind in OBSERVERS:
+    observer = make_observer(kind, 0.005, model)
+    observer.step(observer.init(Measurement(0.0, 0.0)), Measurement(0.01, 0.0), 0.0)
+print("mujoco" in sys.modules)
+"""
+    assert in_a_fresh_interpreter(code) == ["False"]
+
+
+def test_heavy_packages_are_imported_where_they_are_used() -> None:
+    """All rooms but recording leave rerun out, and nothing imports matplotlib before a plot is drawn."""
+    code = "import importlib, sys\n"
+    for room in rooms():
+        if room != "recording":
+            code += f"importlib.import_module('cmg_mj.{room}')\n"
+    code += f"print(*[name for name in {sorted(HEAVY)} if name in sys.modules], 'done')"
+    assert in_a_fresh_interpreter(code) == ["done"]
+
+
+@pytest.mark.parametrize("package", sorted(HEAVY))
+def test_only_one_room_knows_a_heavy_package(package: str) -> None:
+    users = {
+        room for room in rooms() for path in files(room) for _, name in imports(path) if name.split(".")[0] == package
+    }
+    assert users <= {HEAVY[package]}
+
+
+@pytest.mark.parametrize("room", UPPER)
+def test_upper_rooms_do_not_name_mujoco(room: str) -> None:
+    """Not even inside a function."""
+    named = [f"{path.name}:{line}" for path in files(room) for line, name in imports(path) if name.startswith("mujoco")]
+    assert not named

@@ -1,0 +1,107 @@
+"""The tilt from two accelerometers, and the gyro, on a frame in arbitrary motion."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from cmg_mj.plant import Plant, load_plant
+from tests.full_model import states
+
+N_STATES = 1_000
+
+
+def two_accelerometers(plant: Plant, data: mujoco.MjData) -> float:
+    """y1, from the x and z components of both sensors, [rad]."""
+    inner, outer = (data.sensor(f"accelerometer_{which}").data for which in ("inner", "outer"))
+    return plant.radial_tilt(float(inner[0]), float(inner[2]), float(outer[0]), float(outer[2]))
+
+
+def one_accelerometer(data: mujoco.MjData, which: str) -> float:
+    """What a single one would take for the tilt: the direction of its specific force, [rad]."""
+    x, _, z = data.sensor(f"accelerometer_{which}").data
+    return math.atan2(-x, z)
+
+
+def turns(angle: np.ndarray) -> np.ndarray:
+    """An angle's remainder in (-pi, pi]."""
+    return np.angle(np.exp(1j * angle))
+
+
+@pytest.mark.parametrize("model", ["scissored_pair.xml", "single_gimbal.xml"])
+@pytest.mark.parametrize("bias_deg", [0.0, 1.5])
+def test_two_accelerometers_show_the_tilt_in_any_motion(model: str, bias_deg: float) -> None:
+    """Any posture, all rates (the yaw's among them) and accelerations, from random torques on the joints.
+
+    Both sites lie on one ray through a pivot that stays where it is, so whatever the rotation, their
+    accelerations are in the ratio of their radii. Yaw therefore does no harm; it would if the tilt axis
+    missed the yaw axis, and the pivot moved.
+    """
+    rng = np.random.default_rng(8)
+    plant = load_plant(model=model, equilibrium_bias_deg=bias_deg)
+    n = plant.model.nv
+    qpos = rng.uniform(-math.pi, math.pi, (N_STATES, n))
+    qvel = rng.uniform(-5.0, 5.0, (N_STATES, n)) + plant.model.key_qvel[plant.key]
+    torques = rng.uniform(-3.0, 3.0, (N_STATES, n))
+    readings, accelerations = [], []
+    for data in states(plant.model, qpos, qvel, torques):
+        single = [one_accelerometer(data, which) for which in ("inner", "outer")]
+        readings.append([data.sensor("fog").data[1], two_accelerometers(plant, data), *single])
+        accelerations.append(data.qacc[[plant.yaw, plant.tilt]].copy())
+    assert np.all(np.abs(accelerations).max(axis=0) > 50.0)
+
+    fog, *estimates = np.array(readings).T
+    both, inner, outer = (np.abs(turns(y1 - qpos[:, plant.tilt] + plant.tilt_zero)) for y1 in estimates)
+    alone = np.degrees(np.median([inner, outer], axis=1))
+    print(f"{model}, e = {bias_deg} deg: two accelerometers off by {both.max():.1e} rad at most,", end=" ")
+    print(f"the inner alone by {alone[0]:.0f} deg, the outer by {alone[1]:.0f} deg (median)")
+    assert both.max() < 1e-9
+    assert np.all(alone > 5.0)
+    # The gyro's second axis is the tilt axis, and the yaw does not reach it.
+    np.testing.assert_allclose(fog, qvel[:, plant.tilt], rtol=0.0, atol=1e-12)
+
+
+def test_a_step_of_latency_costs_the_tilt_of_that_step() -> None:
+    """Recovering from 11 degrees under K_e with true feedback at 200 Hz: rates of a rad/s, as after a push.
+
+    After mj_step the accelerometers are those of the state before. The estimate is then the tilt of one
+    physics step ago, exactly, and off by x2 h. A single accelerometer is off by degrees in the same motion.
+    """
+    plant = load_plant(equilibrium_bias_deg=0.0, initial_tilt_deg=11.0)
+    model, data, h = plant.model, plant.new_data(), plant.settings.timestep_s
+    K_e = np.array([35.0, 4.0, -1.0, 0.3])
+    x_e, before = 0.0, 0.0
+    rows = []
+    for step in range(2_000):
+        x1, x2 = data.qpos[plant.tilt] - plant.tilt_zero, data.qvel[plant.tilt]
+        if step % 5 == 0:
+            x3 = plant.gimbal_angle(data.qpos)
+            u = float(np.clip(-K_e @ [x1, x2, x3, x_e], -4.7, 4.7))
+            x_e -= 5.0 * h * x3
+            for cube in plant.cubes:
+                data.ctrl[cube.servo] = cube.direction * u
+        if step:
+            rows.append((two_accelerometers(plant, data), one_accelerometer(data, "outer"), before, x1, x2))
+        before = x1
+        mujoco.mj_step(model, data)
+    both, outer, late, now, rate = np.array(rows).T
+
+    assert np.abs(both - late).max() < 1e-9
+    error, alone, fastest = (
+        np.degrees(np.abs(both - now)),
+        np.degrees(np.abs(outer - late)),
+        np.abs(rate).max(),
+    )
+    print(f"up to {fastest:.2f} rad/s: 1 ms late is off by {error.max():.3f} deg at most,", end=" ")
+    print(
+        f"{np.sqrt(np.mean(error**2)):.4f} deg rms; one accelerometer by {alone.max():.1f} deg at most,",
+        end=" ",
+    )
+    print(f"{np.sqrt(np.mean(alone[:500] ** 2)):.1f} deg rms over the first half second")
+    assert 0.8 < fastest < 1.5
+    assert error.max() == pytest.approx(math.degrees(fastest * h), rel=0.02)
+    assert alone.max() > 1.0
+    assert np.abs(now[-1]) < math.radians(1.0)  # it did recover
