@@ -15,6 +15,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from cmg_mj import recording
+from cmg_mj.errors import InputError
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
 from cmg_mj.recording import Recorded, write_recording
@@ -474,31 +475,54 @@ def test_runs_need_names_of_their_own(run: Recorded, experiment: Experiment, tmp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_interrupted_write_leaves_nothing(
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError("disk full")])
+@pytest.mark.parametrize("old", [[], ["recording.rrd"]])
+def test_an_interrupted_write_leaves_no_half_file(
+    run: Recorded,
+    experiment: Experiment,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    error: BaseException,
+    old: list[str],
+) -> None:
+    for name in old:
+        (tmp_path / name).write_text("old")
+
+    def half(path: Path, content: bytes) -> None:
+        with path.open("wb") as file:
+            file.write(content[: len(content) // 2])
+        raise error
+
+    monkeypatch.setattr(Path, "write_bytes", half)
+    with pytest.raises(type(error)):
+        write(tmp_path / "recording.rrd", experiment, [run])
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "old") for name in old]
+
+
+def test_an_interrupted_recording_leaves_nothing(
     run: Recorded, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(*_: object) -> None:
-        assert list(tmp_path.iterdir())  # under its temporary name
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(recording, "log_series", interrupt)
+    monkeypatch.setattr(recording, "log_phases", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write(tmp_path / "recording.rrd", experiment, [run])
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_interrupted_write_keeps_the_old_file(
+def test_a_place_that_cannot_be_written(run: Recorded, experiment: Experiment, tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        write(tmp_path / "missing" / "recording.rrd", experiment, [run])
+
+
+def test_rerun_turned_off_by_the_environment(
     run: Recorded, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "recording.rrd").write_text("old")
-
-    def fail(*_: object) -> None:
-        raise OSError("disk full")
-
-    monkeypatch.setattr(recording, "log_phases", fail)
-    with pytest.raises(OSError, match="disk full"):
+    monkeypatch.setenv("RERUN", "off")
+    with pytest.raises(InputError, match="RERUN"):
         write(tmp_path / "recording.rrd", experiment, [run])
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("recording.rrd", "old")]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_strict_mode_is_left_as_it_was(path: Path) -> None:

@@ -12,10 +12,11 @@ from typing import Any
 
 import rerun as rr
 
+from cmg_mj.errors import InputError
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
-from cmg_mj.recording.blueprint import blueprint
+from cmg_mj.recording.blueprint import default_blueprint
 from cmg_mj.recording.recorded import Recorded
 from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, log_rig
 from cmg_mj.recording.signals import Branch, log_phases, log_series, series
@@ -53,6 +54,8 @@ def write_recording(
 
     Raises:
         ValueError: There is no run, or two have the same name.
+        InputError: The environment turns rerun off.
+        OSError: The file cannot be written.
     """
     names = [run.name for run in runs]
     if not names or len(set(names)) < len(names):
@@ -60,9 +63,12 @@ def write_recording(
     settings = settings or MetricsSettings()
     branches = [_branch(run, plant, settings, rate_limit_rad_s) for run in runs]
     notes = f"In the 3-D view the flywheels turn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed."
-    application = _application(names)
-    with whole_file(path) as temporary, _strict(), rr.RecordingStream(application) as rec:
-        rec.save(temporary, default_blueprint=blueprint(plant, branches))
+    with _strict(), rr.RecordingStream(_application(names)) as rec:
+        if not rr.is_enabled(rec):
+            raise InputError("the environment variable RERUN turns recording off: unset it")
+        # Rerun's own writing to a file hides a full disk, or waits for ever.
+        memory = rec.memory_recording()
+        rec.send_blueprint(default_blueprint(plant, branches), make_active=False, make_default=True)
         rec.set_log_time_enabled(False)
         rec.set_log_tick_enabled(False)
         rec.send_recording_name(f"{title or 'Run'}: {', '.join(names)}")
@@ -74,6 +80,9 @@ def write_recording(
             log_phases(rec, branch, pushes, settings, end)
         _log_page(rec, "summary", markdown(title, runs, pushes, settings, notes))
         _log_page(rec, "scenario", scenario_page(scenario_toml))
+        content = memory.drain_as_bytes()
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
 
 
 def _branch(run: Recorded, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> Branch:

@@ -57,7 +57,7 @@ COMPARED_ACTUATOR_PLOTS = (
     Plot("Integrator [rad s]", ("integrator/x_e",), 1.0, _LOW),
 )
 
-EYE = (1.45, -1.6, 0.6)
+EYE = (1.3, -1.45, 0.55)
 """From the rig's centre to the camera, in radii of the rig."""
 
 BACKGROUND = (58, 63, 71)
@@ -67,7 +67,7 @@ MOST_LEGENDS = 4
 """More lines than this are explained once, not in every plot."""
 
 
-def blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint:
+def default_blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint:
     """Lay out a recording.
 
     Args:
@@ -78,7 +78,7 @@ def blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint:
         A dashboard for one run; for several, one that compares them, and a tab for each.
     """
     if len(branches) == 1:
-        root = _dashboard(plant, branches[0], _pages())
+        root = _dashboard(plant, branches[0])
     else:
         boards = [_dashboard(plant, branch) for branch in branches]
         root = rrb.Tabs(_comparison(plant, branches), *boards, active_tab=0)
@@ -92,13 +92,12 @@ def blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint:
     )
 
 
-def _dashboard(plant: Plant, branch: Branch, pages: rrb.Container | None = None) -> rrb.Container:
+def _dashboard(plant: Plant, branch: Branch) -> rrb.Container:
     """Everything about one run."""
     rig = _rig(plant, branch, f"Rig (flywheels drawn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed)")
-    left = rrb.Vertical(rig, pages, row_shares=[3, 2]) if pages else rig
     return _three_columns(
         branch.run.name,
-        left,
+        rrb.Vertical(rig, _pages(), row_shares=[3, 2]),
         _column(_phases([branch]), 1, [_plot(plot, branch) for plot in TILT_PLOTS], TILT_PLOTS),
         _column(None, 0, [_plot(plot, branch) for plot in ACTUATOR_PLOTS], ACTUATOR_PLOTS),
     )

@@ -18,7 +18,7 @@ POSE_RATE_HZ = 100.0
 """Poses are recorded at most this often; the eye needs no more."""
 
 FLYWHEEL_SLOWDOWN = 100.0
-"""Flywheels are drawn at this fraction of their speed.
+"""Flywheels are drawn turning this many times slower.
 
 At 314 rad/s a mark on the disc makes half a turn between two poses and seems to stand still. The recorded pose of
 the flywheel is the true one; its shapes hang from a child entity, `slowed`, that turns them back.
@@ -62,7 +62,8 @@ def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Recorded, p
 
 def body_path(branch: str, plant: Plant, body: int) -> str:
     """Entity of a body: flat under the rig, `cube1/gimbal` as `cube1.gimbal`, for poses are in the world's frame."""
-    return f"{branch}/rig/{rr.escape_entity_path_part(plant.model.body(body).name.replace('/', '.'))}"
+    name = plant.model.body(body).name or f"body{body}"
+    return f"{branch}/rig/{rr.escape_entity_path_part(name.replace('/', '.'))}"
 
 
 def pose_samples(plant: Plant, run: Recorded) -> tuple[np.ndarray, np.ndarray]:

@@ -46,7 +46,6 @@ PHASES: dict[str, Color] = {
     **dict.fromkeys(ENDINGS.values(), (170, 40, 60)),
 }
 
-
 NO_PHASE = ""
 """Ends the lane."""
 
