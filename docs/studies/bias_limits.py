@@ -1,6 +1,7 @@
 """At which equilibrium bias e does each observer let the rig fall? Both signs, with and without the push.
 
-For every seed and sign, e is bisected until the limit is known to 1/32 degree (a fall within the scenario's 15 s counts).
+For every seed and sign, e is bisected until the limit is known to 1/32 degree. A fall within the scenario's 15 s
+counts.
 True feedback (the exact rate in the law) and the gyro stand beside the observers.
 
     python docs/studies/bias_limits.py            # about three minutes on two quiet cores

@@ -1,8 +1,8 @@
 """Where the paper's order of the velocity RMS errors holds, over accelerometer noise and equilibrium bias.
 
-Each cell: the mean velocity RMS error [1e-3 rad/s] of homogeneous (H), ltv (V) and linear (L) over the worlds that stood,
-and their order; worlds are the same for all three. "~" joins two whose difference, world by world, is within two
-standard errors. A number in brackets is the share of falls.
+Each cell: the mean velocity RMS error [1e-3 rad/s] of homogeneous (H), ltv (V) and linear (L) over the worlds that
+stood, and their order; worlds are the same for all three. "~" joins two whose difference, world by world, is within
+two standard errors. A number in brackets is the share of falls.
 
     python docs/studies/noise_bias_map.py         # about three minutes on two quiet cores
 """
