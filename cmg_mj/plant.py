@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass as plain_dataclass
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +29,7 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
 KEYFRAME = "equilibrium"
 QUARTER_TURN = math.pi / 2.0
+UPRIGHT = math.cos(math.radians(30.0))  # sensors farther off than this are mounted otherwise, not inaccurately
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
@@ -119,18 +122,12 @@ class Plant:
 
     def _resolve(self) -> None:
         model = self.model
-        if any(kind != int(mujoco.mjtJoint.mjJNT_HINGE) for kind in model.jnt_type):
-            raise InputError(f"{self.path}: every joint must be a hinge")
         names = [model.joint(i).name for i in range(model.njnt)]
         self.tilt = self._id("joint", "tilt")
         self.yaw = names.index("yaw") if "yaw" in names else None
         self.key = self._id("key", KEYFRAME)
         self.tilt_zero = float(model.key_qpos[self.key, self.tilt])
         prefixes = [name.removesuffix("/gimbal") for name in names if name.endswith("/gimbal")]
-        if not prefixes:
-            raise InputError(
-                f"{self.path}: no joint 'cube1/gimbal': a rig needs at least one cube attached with its prefix"
-            )
         self.frame = int(model.jnt_bodyid[self.tilt])
         self._accelerometers = [self._accelerometer(f"accelerometer_{which}") for which in ("inner", "outer")]
         radii = [radius for _, radius in self._accelerometers]
@@ -148,26 +145,26 @@ class Plant:
         self._specific_forces = [address + axis for address, _ in self._accelerometers for axis in (0, 2)]
 
     def _id(self, kind: str, name: str) -> int:
-        model = self.model
-        found = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
-        if found < 0:
-            count = {"joint": model.njnt, "actuator": model.nu, "sensor": model.nsensor, "key": model.nkey}[kind]
-            existing = [getattr(model, kind)(i).name for i in range(count)]
-            raise InputError(f"{self.path}: the model has no {kind} {name!r}; {nearest(name, existing)}")
-        return int(found)
+        """Address of an element that `_require` has found."""
+        return int(mujoco.mj_name2id(self.model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
 
     def _accelerometer(self, name: str) -> tuple[int, float]:
         """Address in sensordata, and distance of the site from the tilt axis."""
         model = self.model
         sensor = self._id("sensor", name)
         site = int(model.sensor_objid[sensor])
-        is_one = model.sensor_type[sensor] == int(mujoco.mjtSensor.mjSENS_ACCELEROMETER)
-        if not is_one or model.site_bodyid[site] != self.frame:
-            raise InputError(
-                f"{self.path}: sensor {name!r} must be an accelerometer at a site of the body with the joint 'tilt'"
-            )
+        if model.site_bodyid[site] != self.frame:
+            raise InputError(f"{self.path}: sensor {name!r} must be at a site of the body with the joint 'tilt'")
         x, _, z = model.site_pos[site] - model.jnt_pos[self.tilt]
-        return int(model.sensor_adr[sensor]), float(math.hypot(x, z))
+        radius = float(math.hypot(x, z))
+        axes = np.zeros(9)
+        mujoco.mju_quat2Mat(axes, model.site_quat[site])
+        if axes[4] < UPRIGHT or axes[2] * x + axes[8] * z < UPRIGHT * radius:
+            raise InputError(
+                f"{self.path}: the site of sensor {name!r} must have its y axis along the tilt axis and its z axis "
+                "pointing away from it"
+            )
+        return int(model.sensor_adr[sensor]), radius
 
     def _cube(self, prefix: str) -> Cube:
         model = self.model
@@ -175,13 +172,9 @@ class Plant:
         flywheel = self._id("joint", f"{prefix}/flywheel")
         servo = self._id("actuator", f"{prefix}/gimbal_servo")
         motor = self._id("actuator", f"{prefix}/flywheel_motor")
-        encoder = self._id("sensor", f"{prefix}/gimbal_encoder")
-        is_position = model.sensor_type[encoder] == int(mujoco.mjtSensor.mjSENS_JOINTPOS)
-        if not is_position or model.sensor_objid[encoder] != gimbal:
-            raise InputError(f"{self.path}: sensor '{prefix}/gimbal_encoder' must be the jointpos of '{prefix}/gimbal'")
         zero = float(model.key_qpos[self.key, gimbal])
         speed = float(model.key_ctrl[self.key, motor])
-        if speed == 0.0:
+        if speed == 0.0 or not math.isfinite(speed):
             raise InputError(f"{self.path}: keyframe {KEYFRAME!r} must give '{prefix}/flywheel_motor' a speed")
         # A quarter turn back, the flywheel's momentum lies along the tilt axis; u > 0 turns it away from there.
         inertia = self._mass_matrix({gimbal: zero - QUARTER_TURN})
@@ -257,8 +250,8 @@ class Plant:
         model = self.model
         if model.body_mass[self.frame] <= 0.0:
             raise InputError(
-                f"plant.equilibrium_bias_deg: {self.path}: the body with the joint 'tilt' needs a mass of its own to move "
-                "(give the model's compiler fusestatic=\"true\", so that the cubes' halves become part of it)"
+                f"plant.equilibrium_bias_deg: {self.path}: the body with the joint 'tilt' needs a mass of its own to "
+                "move (give the model's compiler fusestatic=\"true\", so that the cubes' halves become part of it)"
             )
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, self.key)
@@ -381,14 +374,19 @@ _INTEGRATORS = {
 
 
 def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
+    """MuJoCo's message without what tells a user nothing."""
+    text = " ".join(str(error).split()).removeprefix("Error: ")
+    syntax = re.match(r"XML parse error .*Line number=(\d+)", text)
+    return f"XML syntax error at line {syntax[1]}" if syntax else re.sub(r" The static bodies .* remain so\.", "", text)
 
 
 def _parse(path: Path) -> mujoco.MjSpec:
     try:
-        return mujoco.MjSpec.from_file(str(path))
+        spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
         raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
+    _require(spec, path)
+    return spec
 
 
 def _compile(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
@@ -398,6 +396,53 @@ def _compile(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
         raise InputError(f"{path}: does not compile: {_one_line(error)}") from error
 
 
+def _require(spec: mujoco.MjSpec, path: Path) -> None:
+    """A rig has certain joints, actuators, sensors and a keyframe, by name.
+
+    The compiler, which comes after this, would only say that the keyframe has the wrong size.
+    """
+    elements = {
+        "joint": {joint.name: joint for joint in spec.joints},
+        "actuator": {actuator.name: actuator for actuator in spec.actuators},
+        "sensor": {sensor.name: sensor for sensor in spec.sensors},
+        "keyframe": {key.name: key for key in spec.keys},
+    }
+
+    def get(kind: str, name: str) -> Any:
+        if name not in elements[kind]:
+            raise InputError(
+                f"{path}: the model has no {kind} {name!r}; {nearest(name, elements[kind], 'its ' + kind + 's')}"
+            )
+        return elements[kind][name]
+
+    def check(is_right: bool, what: str) -> None:
+        if not is_right:
+            raise InputError(f"{path}: {what}")
+
+    for joint in spec.joints:
+        check(bool(joint.name), f"the joint of body {joint.parent.name!r} has no name")
+        check(int(joint.type) == int(mujoco.mjtJoint.mjJNT_HINGE), f"joint {joint.name!r} must be a hinge")
+    axis = np.array(get("joint", "tilt").axis)
+    check(bool(axis[1] > 0.0 and axis[0] == axis[2] == 0.0), "joint 'tilt' must turn about y (axis=\"0 1 0\")")
+    suffixes = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
+    names = [name for kind in elements.values() for name in kind]
+    cubes = [name.rpartition("/")[0] for name in names if name.endswith(suffixes)]
+    for cube in dict.fromkeys(cubes or ["cube1"]):
+        for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
+            get("joint", f"{cube}/{name}")
+            drive = get("actuator", f"{cube}/{actuator}")
+            drives = drive.target == f"{cube}/{name}" and int(drive.trntype) == int(mujoco.mjtTrn.mjTRN_JOINT)
+            check(drives, f"actuator '{cube}/{actuator}' must drive the joint '{cube}/{name}'")
+        encoder = get("sensor", f"{cube}/gimbal_encoder")
+        is_one = int(encoder.type) == int(mujoco.mjtSensor.mjSENS_JOINTPOS) and encoder.objname == f"{cube}/gimbal"
+        check(is_one, f"sensor '{cube}/gimbal_encoder' must be the jointpos of '{cube}/gimbal'")
+    sensors = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
+    for name, kind in sensors.items():
+        is_one = int(get("sensor", name).type) == int(getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"))
+        check(is_one, f"sensor {name!r} must be of the kind {kind!r}")
+    get("keyframe", KEYFRAME)
+
+
 def _lock(spec: mujoco.MjSpec, path: Path) -> None:
     """Take the yaw joint out, and its entry out of every keyframe."""
     names = [joint.name for joint in spec.joints]
@@ -405,11 +450,24 @@ def _lock(spec: mujoco.MjSpec, path: Path) -> None:
         raise InputError(f"plant.lock_thrust_bearing = true: {path} has no joint 'yaw' to lock")
     index = names.index("yaw")
     spec.delete(spec.joint("yaw"))
-    for key in spec.keys:
-        key.qpos = np.delete(np.array(key.qpos), index)
-        key.qvel = np.delete(np.array(key.qvel), index)
+    for key in spec.keys:  # which may leave its rates out, or have them wrong, of which the compiler speaks
+        key.qpos, key.qvel = (np.delete(values, [index] if len(values) else []) for values in (key.qpos, key.qvel))
 
 
+@contextmanager
+def quiet() -> Iterator[None]:
+    """No warnings from MuJoCo or numpy, nor MUJOCO_LOG.TXT in the current folder: what goes wrong is said otherwise."""
+    before, config = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    config.logto_console = config.logto_file = False
+    config.set()
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    finally:
+        before.set()
+
+
+@quiet()
 def load_plant(settings: PlantSettings | None = None, beside: Path | None = None, **fields: object) -> Plant:
     """Load a rig.
 
@@ -425,4 +483,4 @@ def load_plant(settings: PlantSettings | None = None, beside: Path | None = None
         InputError: The file does not exist, does not compile, or lacks a joint, actuator, sensor or keyframe.
     """
     settings = settings or PlantSettings(**fields)  # type: ignore[arg-type]
-    return Plant(settings, find("models", settings.model, ".xml", "plant.model", beside))
+    return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside))

@@ -1,8 +1,10 @@
-"""Tables for the terminal, and plots. No other part of the package imports matplotlib."""
+"""Tables and lists for the terminal, and plots. No other part of the package imports matplotlib."""
 
 from __future__ import annotations
 
-import math
+import inspect
+import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,17 +13,21 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
+from cmg_mj.observers import OBSERVERS, observer_class
+from cmg_mj.resources import bundled
+from cmg_mj.scenario import Experiment, load_scenario
 from cmg_mj.trajectory import Trajectory, whole_file
 
 COLUMNS = (
-    ("velocity_rms_error_rad_s", "velocity RMS\nerror [rad/s]", "{:.4f}"),
-    ("velocity_rms_error_fog_rad_s", "against the\ngyro [rad/s]", "{:.4f}"),
-    ("tilt_rms_deg", "tilt RMS\n[deg]", "{:.3f}"),
-    ("settle_time_s", "settle\ntime [s]", "{:.2f}"),
-    ("gimbal_peak_deg", "gimbal\npeak [deg]", "{:.1f}"),
-    ("command_rms_rad_s", "command RMS\n[rad/s]", "{:.3f}"),
+    ("velocity_rms_error_rad_s", "velocity\nRMS error\n[rad/s]", "{:.4f}"),
+    ("velocity_rms_error_fog_rad_s", "against\nthe gyro\n[rad/s]", "{:.4f}"),
+    ("tilt_rms_deg", "tilt\nRMS\n[deg]", "{:.3f}"),
+    ("settle_time_s", "settle\ntime\n[s]", "{:.2f}"),
+    ("gimbal_peak_deg", "gimbal\npeak\n[deg]", "{:.1f}"),
+    ("command_rms_rad_s", "command\nRMS\n[rad/s]", "{:.3f}"),
     ("command_saturated_fraction", "command\nlimited", "{:.1%}"),
-    ("fell_fraction", "falls", "{:.0%}"),
+    ("fell_fraction", "fell", "{:.0%}"),
+    ("stopped_fraction", "stopped", "{:.0%}"),
 )
 """Summary key, heading, format."""
 
@@ -40,30 +46,40 @@ def _cell(value: Any, pattern: str) -> str:
     return "-" if value is None else pattern.format(value)
 
 
+def _columns(summaries: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    """All columns, but that of stopped worlds only if there are any."""
+    stopped = any(summary["stopped_fraction"] for summary in summaries)
+    return [column for column in COLUMNS if stopped or column[0] != "stopped_fraction"]
+
+
 def comparison_table(summaries: Sequence[Mapping[str, Any]], title: str) -> Table:
     """The table that `cmg-mj compare` prints."""
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
-    table.add_column("observer")
-    for _, heading, _ in COLUMNS:
-        table.add_column(heading, justify="right")
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0))
+    table.add_column("observer", vertical="bottom", overflow="fold")
+    columns = _columns(summaries)
+    for _, heading, _ in columns:
+        table.add_column(heading, justify="right", vertical="bottom")
     for summary in summaries:
-        table.add_row(summary["observer"], *(_cell(summary[key], pattern) for key, _, pattern in COLUMNS))
+        table.add_row(summary["observer"], *(_cell(summary[key], pattern) for key, _, pattern in columns))
     return table
 
 
 def comparison_markdown(summaries: Sequence[Mapping[str, Any]]) -> str:
     """The same table in Markdown."""
-    headings = ["observer", *(heading.replace("\n", " ") for _, heading, _ in COLUMNS)]
-    lines = ["| " + " | ".join(headings) + " |", "|---|" + "---:|" * len(COLUMNS)]
+    columns = _columns(summaries)
+    headings = ["observer", *(heading.replace("\n", " ") for _, heading, _ in columns)]
+    lines = ["| " + " | ".join(headings) + " |", "|---|" + "---:|" * len(columns)]
     for summary in summaries:
-        cells = [f"`{summary['observer']}`", *(_cell(summary[key], pattern) for key, _, pattern in COLUMNS)]
+        cells = [f"`{summary['observer']}`", *(_cell(summary[key], pattern) for key, _, pattern in columns)]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def summary_table(summary: Mapping[str, Any]) -> Table:
     """The table that `cmg-mj run` prints."""
-    ends = {"done": "stood to the end", "fell": "fell", "stopped": "stopped", "interrupted": "interrupted"}
+    ends = {"done": "stood to the end, {:g} s", "fell": "fell at {:.2f} s"}
+    outcome = str(summary["outcome"])
+    end = ends.get(outcome, outcome + " at {:g} s").format(summary["end_time_s"])
     table = Table(
         title=f"{summary['scenario'] or 'Run'}: {summary['observer']}, seed {summary['seed']}",
         box=box.SIMPLE_HEAD,
@@ -72,16 +88,72 @@ def summary_table(summary: Mapping[str, Any]) -> Table:
     )
     table.add_column()
     table.add_column(justify="right")
-    table.add_row("Outcome", f"{ends[summary['outcome']]} at {summary['end_time_s']:.2f} s")
+    table.add_row("Outcome", end)
     for key, label in LABELS.items():
-        table.add_row(label, _cell(summary[key], "{:.4f}"))
+        table.add_row(label, _cell(summary[key], "{:.1%}" if key.endswith("fraction") else "{:.4f}"))
     for name, errors in summary.get("companions", {}).items():
         table.add_row(f"Velocity RMS error of {name} [rad/s]", _cell(errors["velocity_rms_error_rad_s"], "{:.4f}"))
     return table
 
 
+def scenario_list() -> str:
+    """What `cmg-mj list scenarios` prints."""
+    names = bundled("scenarios")
+    width = max(len(name) for name in names)
+    return "\n".join(["Scenarios", *(f"  {name:{width}}  {load_scenario(name).title}" for name in names)])
+
+
+def observer_list() -> str:
+    """What `cmg-mj list observers` prints: every observer, the defaults of its parameters, what it is."""
+    width = max(len(name) for name in OBSERVERS)
+    lines = ["Observers, and the defaults of their parameters (--set observer.NAME=VALUE)"]
+    for name in OBSERVERS:
+        cls = observer_class(name)
+        parameters = [p for p in inspect.signature(cls).parameters.values() if p.name not in ("dt", "model")]
+        title = (sys.modules[cls.__module__].__doc__ or "").partition("\n")[0]
+        lines.append(f"  {name:{width}}  {_assignments({p.name: p.default for p in parameters}) or 'no parameters'}")
+        lines += textwrap.wrap(title, 98, initial_indent=" " * (width + 4), subsequent_indent=" " * (width + 4))
+    return "\n".join(lines)
+
+
+def description(name: str, experiment: Experiment) -> str:
+    """What `cmg-mj check` prints: what a scenario amounts to."""
+    scenario, plant, law = experiment.scenario, experiment.plant, experiment.law
+    fields = experiment.resolved()
+    settings = scenario.plant
+    steps = f"{round(scenario.duration_s / settings.timestep_s)} physics steps of {settings.timestep_s:g} s"
+    poles = np.linalg.eigvals(plant.reduced.A_e - plant.reduced.B_e @ np.array([law.gains]))
+    slowest = float(np.max(poles.real))
+    stability = "stable" if slowest < 0.0 else "UNSTABLE"
+    observer = {key: value for key, value in fields["observer"].items() if key != "kind"}
+    rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
+    rows = [
+        ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}), seed {scenario.seed}"),
+        ("plant", f"{fields['plant']['model']}, cubes: {', '.join(cube.name for cube in plant.cubes)}"),
+        ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
+        ("law", f"K_e = {_number(law.gains)} at {scenario.controller.rate_hz:g} Hz, at most {law.rate_limit:g} rad/s"),
+        ("", f"tilt rate from the {scenario.controller.feedback}, {scenario.controller.angles} angles"),
+        ("", f"{stability} with the reduced model and its true state, slowest pole {slowest:.3g} 1/s"),
+        ("observer", f"{scenario.observer.kind}  {_assignments(observer)}".rstrip()),
+        ("companions", ", ".join(scenario.companion_names()) or "none"),
+        ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
+        *(("push", f"{p.torque_n_m:g} N m from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
+    ]
+    return "\n".join([f"{name}: valid", *(f"  {label:10}  {text}" for label, text in rows)])
+
+
+def _assignments(values: Mapping[str, Any]) -> str:
+    return "  ".join(f"{name}={_number(value)}" for name, value in values.items())
+
+
+def _number(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_number(item) for item in value)}]"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
 def plot_run(path: Path, trajectory: Trajectory, title: str) -> None:
-    """Plot a run as aranovskiy2020's Figs 4 to 7 do: tilt, velocity, command.
+    """Plot a run as aranovskiy2020's Figs 4 to 7 do: tilt, tilt rate with a panel an observer, gimbal angle, command.
 
     Args:
         path: The PNG to write.
@@ -94,32 +166,39 @@ def plot_run(path: Path, trajectory: Trajectory, title: str) -> None:
     import matplotlib.pyplot as plt
 
     t = trajectory["time_s"]
-    figure, (tilt, rate, gimbal, command) = plt.subplots(4, 1, sharex=True, figsize=(9, 10), layout="constrained")
+    n = len(trajectory.observers)
+    figure, panels = plt.subplots(3 + n, 1, sharex=True, figsize=(9.0, 7.5 + 1.75 * n), layout="constrained")
+    tilt, *rates, gimbal, command = panels
     tilt.plot(t, np.degrees(trajectory["y1_rad"]), color="0.7", linewidth=0.8, label="measured $y_1$")
     tilt.plot(t, np.degrees(trajectory["x1_rad"]), color="C0", label="true $x_1$ (from equilibrium)")
     tilt.set_ylabel("tilt [deg]")
-    rate.plot(t, trajectory["fog_rad_s"], color="0.2", linewidth=2.0, label="gyro")
-    for i, name in enumerate(trajectory.observers):
-        rate.plot(
-            t, trajectory[f"estimate/{name}/x2_rad_s"], color=f"C{i + 1}", linewidth=1.0, label=f"{name} $\\hat x_2$"
-        )
-    spread = float(np.max(np.abs(trajectory["fog_rad_s"]), initial=0.05))
-    rate.set_ylim(-2.0 * spread, 2.0 * spread)
-    rate.set_ylabel("tilt rate [rad/s]")
+    fog = trajectory["fog_rad_s"]
+    low, high = (float(fog.min()), float(fog.max())) if len(fog) else (0.0, 0.0)
+    room = 0.75 * max(high - low, 0.05)  # an estimate may be far off, and would leave no room for the others
+    for i, (name, axes) in enumerate(zip(trajectory.observers, rates, strict=True)):
+        label = f"{name} $\\hat x_2$" + (", riding along" if i else "")
+        axes.plot(t, trajectory[f"estimate/{name}/x2_rad_s"], color=f"C{i + 1}", linewidth=0.8, label=label)
+        axes.plot(t, fog, color="0.15", linewidth=1.2, label="gyro")
+        axes.set_ylim(low - room, high + room)
+        axes.set_ylabel("tilt rate\n[rad/s]")
     gimbal.plot(t, np.degrees(trajectory["x3_rad"]), color="C0", label="true $x_3$")
-    gimbal.set_ylabel("gimbal angle [deg]")
+    gimbal.set_ylabel("gimbal angle\n[deg]")
     command.step(t, trajectory["u_rad_s"], where="post", color="C0", linewidth=0.8, label="$u$")
-    command.set_ylabel("gimbal rate [rad/s]")
+    command.set_ylabel("gimbal rate\n[rad/s]")
     command.set_xlabel("time [s]")
     pushed = trajectory["push_n_m"] != 0.0
-    for axes in (tilt, rate, gimbal, command):
+    for axes in panels:
         if pushed.any():
+            in_panel = axes.get_xaxis_transform()
+            style = {"color": "C3", "alpha": 0.25, "linewidth": 0, "zorder": 0}
             axes.fill_between(
-                t, 0, 1, where=pushed, transform=axes.get_xaxis_transform(), color="C3", alpha=0.3, linewidth=0
+                t, 0, 1, where=pushed, transform=in_panel, label="push" if axes is tilt else None, **style
             )
         axes.grid(alpha=0.3)
-        axes.legend(loc="upper right", fontsize="small", ncols=math.ceil(len(axes.lines) / 3))
-    figure.suptitle(title)
+        axes.margins(x=0.0)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=3, frameon=False, borderpad=0)
+    figure.align_ylabels()
+    figure.suptitle(title, x=0.01, ha="left")
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=110, format="png")
     plt.close(figure)

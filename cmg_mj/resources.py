@@ -28,7 +28,8 @@ def find(kind: str, name: str, suffix: str, field: str, beside: Path | None = No
         name: What the user wrote.
         suffix: The file's ending, which a bundled name may leave out.
         field: What to call it in the error.
-        beside: A folder that relative paths may start from as well as from the current one.
+        beside: A folder that relative paths start from first. The current folder then comes last, so that the same
+            file is found wherever one stands.
 
     Returns:
         The file's path.
@@ -37,11 +38,17 @@ def find(kind: str, name: str, suffix: str, field: str, beside: Path | None = No
         InputError: There is no such file.
     """
     candidates = [Path(name)]
-    if beside is not None:
-        candidates.append(beside / name)
     if "/" not in name and "\\" not in name:
         candidates.append(folder(kind) / (name if name.endswith(suffix) else name + suffix))
-    for path in candidates:
-        if path.is_file():
-            return path
-    raise InputError(f"{field} = {name!r}: no such file, nor a bundled one; {nearest(name, bundled(kind))}")
+    if beside is not None:
+        candidates = [beside / name, *candidates[1:], Path(name)]
+    try:
+        for path in candidates:
+            if path.is_file():
+                return path
+        if name and any(path.is_dir() for path in candidates):
+            raise InputError(f"{field} {name!r}: is a folder, not a file")
+    except OSError as error:  # a name that is too long, a folder that may not be looked into
+        raise InputError(f"{field} {name!r}: cannot be read: {error.strerror}") from error
+    known = nearest(Path(name).name.removesuffix(suffix), bundled(kind), "bundled")
+    raise InputError(f"{field} {name!r}: no such file, nor a bundled one; {known}")

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import statistics
-from collections.abc import Callable, Sequence
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from cmg_mj.errors import InputError
+from cmg_mj.report import plot_run
 from cmg_mj.scenario import Experiment, Scenario, prepare
 from cmg_mj.simulate import Outcome, Result
 from cmg_mj.trajectory import Trajectory, whole_file
@@ -32,22 +35,35 @@ class Compared:
     example: Result
 
     @property
+    def kind(self) -> str:
+        """The observer."""
+        return self.experiment.scenario.observer.kind
+
+    @property
+    def stopped(self) -> list[Outcome]:
+        """The worlds that could not go on, because the observer failed or the plant diverged."""
+        return [outcome for outcome in self.result.outcomes if outcome.kind == "stopped"]
+
+    @property
     def summary(self) -> dict[str, Any]:
         """Means over the worlds that stood to the end, by the names of a run's summary, and the share of falls."""
         outcomes, summaries = self.result.outcomes, self.result.summaries
         stood = [summary for summary, outcome in zip(summaries, outcomes, strict=True) if outcome.kind == "done"]
-        means = {key: _mean([summary[key] for summary in stood]) for key in summaries[0] if key not in ("companions",)}
+        means = {key: _mean([summary[key] for summary in stood]) for key in summaries[0] if key != "companions"}
         scenario = self.experiment.scenario
-        return {
-            "observer": scenario.observer.kind,
-            "seed": scenario.seed,
-            "worlds": len(outcomes),
-            "fell": any(outcome.fell for outcome in outcomes),
-            "fell_fraction": sum(outcome.kind != "done" for outcome in outcomes) / len(outcomes),
-            "settled_fraction": sum(summary["settle_time_s"] is not None for summary in summaries) / len(outcomes),
-            **means,
-            "velocity_rms_error_std_rad_s": _deviation([summary["velocity_rms_error_rad_s"] for summary in stood]),
-        }
+        return _finite(
+            {
+                "observer": scenario.observer.kind,
+                "seed": scenario.seed,
+                "worlds": len(outcomes),
+                "fell": any(outcome.fell for outcome in outcomes),
+                "fell_fraction": sum(outcome.fell for outcome in outcomes) / len(outcomes),
+                "stopped_fraction": len(self.stopped) / len(outcomes),
+                "settled_fraction": sum(summary["settle_time_s"] is not None for summary in summaries) / len(outcomes),
+                **means,
+                "velocity_rms_error_std_rad_s": _deviation([summary["velocity_rms_error_rad_s"] for summary in stood]),
+            }
+        )
 
 
 def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[str, Any]:
@@ -64,38 +80,56 @@ def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[s
     }
     if outcome.reason:
         summary["reason"] = outcome.reason
-    return summary | result.summaries[world]
+    return _finite(summary | result.summaries[world])
 
 
-def compare(
-    scenario: Scenario, observers: Sequence[str], worlds: int, on_progress: Callable[[float], None] | None = None
-) -> list[Compared]:
-    """Run every observer on the same plant, pushes and noise.
+def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Experiment]:
+    """Make every observer's experiment ready, on the same plant, pushes and noise.
 
     Args:
         scenario: The experiment.
         observers: Their names.
+
+    Returns:
+        One experiment an observer.
+
+    Raises:
+        InputError: An observer does not exist, or something does not fit.
+    """
+    experiments = [prepare(scenario.with_observer(kind)) for kind in observers]
+    for experiment in experiments:
+        experiment.rehearse(worlds=2)
+    return experiments
+
+
+def compare(
+    experiments: Sequence[Experiment], worlds: int, on_progress: Callable[[float], None] | None = None
+) -> list[Compared]:
+    """Run every experiment in many worlds, and the first world once more with its trajectory.
+
+    Args:
+        experiments: One an observer.
         worlds: How many worlds: world i has the same noise for every observer.
         on_progress: Called now and then with the share done.
 
     Returns:
-        One entry an observer.
-
-    Raises:
-        InputError: An observer does not exist or something does not fit; before anything is run.
+        One entry an observer; fewer if the user interrupted, and those there are complete.
     """
-    experiments = [prepare(scenario.with_observer(kind)) for kind in observers]
     compared = []
     for i, experiment in enumerate(experiments):
+        duration = experiment.scenario.duration_s
 
-        def report(time: float, done: int = i) -> None:
+        def report(time: float, done: int = i, duration: float = duration) -> None:
             if on_progress:
-                on_progress((done + time / scenario.duration_s) / len(experiments))
+                on_progress((done + time / duration) / len(experiments))
 
         result = experiment.run_many(worlds, keep_trajectory=False, on_progress=report)
-        compared.append(Compared(experiment, result, experiment.run()))
         if any(outcome.kind == "interrupted" for outcome in result.outcomes):
             break
+        example = experiment.run(on_progress=lambda time, report=report, end=duration: report(end))
+        if example.outcomes[0].kind == "interrupted":
+            break
+        compared.append(Compared(experiment, result, example))
     return compared
 
 
@@ -113,47 +147,84 @@ def output_folder(path: Path) -> Path:
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
-        probe = path / ".writable"
-        probe.touch()
-        probe.unlink()
+        tempfile.TemporaryFile(dir=path).close()
     except OSError as error:
         raise InputError(f"--out {path}: cannot be written: {error.strerror}") from error
     return path
 
 
-def save_run(folder: Path, experiment: Experiment, result: Result) -> None:
+def save_run(folder: Path, experiment: Experiment, result: Result, *, plot: bool = False) -> None:
     """Write scenario.toml, summary.json, trajectory.parquet and recording.rrd, each whole or not at all.
 
     Args:
         folder: Where.
         experiment: What was run.
         result: One world's result, with its trajectory.
+        plot: Write plot.png as well.
 
     Raises:
         InputError: The folder cannot be written any more.
     """
-    summary = summary_of(experiment, result)
-    try:
-        experiment.save(folder / "scenario.toml")
-        _write_json(folder / "summary.json", summary)
-        trajectory_with_metadata(experiment, result).save(folder / "trajectory.parquet")
-        _record(folder / "recording.rrd", [(experiment, result)])
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror}") from error
+    trajectory = trajectory_with_metadata(experiment, result)
+    scenario = experiment.scenario
+    title = f"{scenario.title or 'Run'}: {scenario.observer.kind}, seed {scenario.seed}"
+    _write(
+        folder,
+        {
+            "trajectory.parquet": trajectory.save,
+            "summary.json": lambda path: _write_json(path, summary_of(experiment, result)),
+            "scenario.toml": experiment.save,
+            "recording.rrd": lambda path: _record(path, [(experiment, result)]),
+            **({"plot.png": lambda path: plot_run(path, trajectory, title)} if plot else {}),
+        },
+    )
 
 
 def save_comparison(folder: Path, compared: Sequence[Compared]) -> None:
-    """Write summary.json, a trajectory an observer, scenario.toml and one recording of world 0 of all of them."""
-    try:
-        compared[0].experiment.save(folder / "scenario.toml")
-        _write_json(folder / "summary.json", [entry.summary for entry in compared])
-        for entry in compared:
-            name = file_name(entry.experiment.scenario.observer.kind)
-            trajectory = trajectory_with_metadata(entry.experiment, entry.example)
-            trajectory.save(folder / f"trajectory-{name}.parquet")
-        _record(folder / "recording.rrd", [(entry.experiment, entry.example) for entry in compared])
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror}") from error
+    """Write summary.json, a trajectory an observer, scenario.toml and one recording of world 0 of all of them.
+
+    Args:
+        folder: Where.
+        compared: What was run.
+
+    Raises:
+        InputError: The folder cannot be written any more.
+    """
+    names = file_names([entry.kind for entry in compared])
+    trajectories = {
+        f"trajectory-{name}.parquet": trajectory_with_metadata(entry.experiment, entry.example).save
+        for name, entry in zip(names, compared, strict=True)
+    }
+    _write(
+        folder,
+        {
+            **trajectories,
+            "summary.json": lambda path: _write_json(path, [entry.summary for entry in compared]),
+            "scenario.toml": compared[0].experiment.save,
+            "recording.rrd": lambda path: _record(path, [(entry.experiment, entry.example) for entry in compared]),
+        },
+    )
+
+
+def _write(folder: Path, files: Mapping[str, Callable[[Path], None]]) -> None:
+    """Write every file that can be written, then complain of those that cannot."""
+    wrong = {}
+    for name, write in files.items():
+        try:
+            write(folder / name)
+        except OSError as error:
+            wrong[name] = error
+    if wrong:
+        why = "; ".join(
+            f"{folder / name}: cannot be written: {error.strerror or error}" for name, error in wrong.items()
+        )
+        raise InputError(why)
+
+
+def file_names(kinds: Sequence[str]) -> list[str]:
+    """Observers' names as parts of file names, no two alike: of a dotted path its class, or all of it."""
+    short = [file_name(kind) for kind in kinds]
+    return [name if short.count(name) == 1 else kind.replace(":", ".") for name, kind in zip(short, kinds, strict=True)]
 
 
 def file_name(kind: str) -> str:
@@ -196,6 +267,13 @@ def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
 def _write_json(path: Path, value: Any) -> None:
     with whole_file(path) as temporary:
         temporary.write_text(json.dumps(value, indent=2) + "\n")
+
+
+def _finite(value: Any) -> Any:
+    """None for a number that JSON does not know."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import platform
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, TypeAdapter, ValidationError, model_validator
 
 from cmg_mj.controller import TABLE_2_GAINS, Angles, Controller, Feedback, Law, lqr_gains
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, complaint, fields_of, not_allowed, shown
 from cmg_mj.metrics import MetricsSettings
-from cmg_mj.observers import OBSERVERS, Observer, make_observer
+from cmg_mj.observers import OBSERVERS, Measurement, Observer, make_observer
+from cmg_mj.observers.registry import observer_class
 from cmg_mj.plant import Plant, PlantSettings, load_plant
 from cmg_mj.push import Push
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.resources import find
+from cmg_mj.resources import find, folder
 from cmg_mj.sensors import Sensors
 from cmg_mj.simulate import Driver, Result, simulate
+from cmg_mj.timing import whole_steps
 from cmg_mj.trajectory import whole_file
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -106,6 +110,8 @@ class Scenario(BaseModel):
     metrics: MetricsSettings = Field(default_factory=MetricsSettings)
     versions: dict[str, str] = Field(default_factory=dict)
     """Written by a run, not read."""
+    _where: str = PrivateAttr("")
+    """What to call it in an error: the file, and what was changed in it."""
 
     def with_observer(self, kind: str) -> Scenario:
         """The same experiment with another observer in the loop; its own keeps the parameters given for it."""
@@ -190,14 +196,31 @@ class Experiment:
             **options,
         )
 
+    def rehearse(self, worlds: int | None = None) -> None:
+        """Try every observer once, so that one that cannot work is found before a run and not at its first sample.
+
+        Args:
+            worlds: Try it on arrays of so many worlds; None for floats.
+
+        Raises:
+            InputError: An observer raised an exception or returned something else than a state and an estimate.
+        """
+        with np.errstate(all="ignore"):
+            for i, (kind, observer) in enumerate(zip(self.observer_names, self._observers(), strict=True)):
+                try:
+                    _rehearse(observer, worlds)
+                except InputError as error:
+                    raise InputError(f"{'companions:' if i else 'observer.kind ='} {kind!r}: {error}") from error
+
+    def _observers(self) -> list[Observer]:
+        controller = self.controller()
+        return [controller.observer, *controller.companions.values()]
+
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
         fields = TypeAdapter(Scenario).dump_python(self.scenario, mode="json", exclude_none=True)
-        if (
-            self.scenario.plant.model not in (self.plant.path.name, self.plant.path.stem)
-            or Path(self.scenario.plant.model).is_file()
-        ):
-            fields["plant"]["model"] = str(self.plant.path.resolve())
+        path = self.plant.path.resolve()
+        fields["plant"]["model"] = path.name if path.parent == folder("models").resolve() else str(path)
         fields["controller"]["gains"] = list(self.law.gains)
         fields["controller"].pop("lqr", None)
         fields["companions"] = self.scenario.companion_names()
@@ -207,11 +230,14 @@ class Experiment:
         return _plain(fields)
 
     def _observer_parameters(self) -> dict[str, Any]:
+        """What was given, and the defaults of the rest as far as they can be known and TOML can hold them."""
+        given = self.scenario.observer.parameters
         observer: Any = self.scenario.observer.make(self.law.dt, self.plant.reduced)
         if not dataclasses.is_dataclass(observer):
-            return self.scenario.observer.parameters
+            return given
         names = [f.name for f in dataclasses.fields(observer) if f.init and f.name not in ("dt", "model")]
-        return {name: getattr(observer, name) for name in names}
+        kept = {name: _plain(getattr(observer, name, None)) for name in names if name not in given}
+        return {name: value for name, value in kept.items() if _is_toml(value)} | given
 
     def save(self, path: Path) -> None:
         """Write the resolved scenario as TOML: running that file again gives the same run."""
@@ -220,7 +246,9 @@ class Experiment:
 
 
 def _plain(value: Any) -> Any:
-    """Tuples to lists, as TOML wants them."""
+    """Tuples and arrays to lists, as TOML wants them."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -228,12 +256,21 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def load_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
+def _is_toml(value: Any) -> bool:
+    try:
+        tomli_w.dumps({"value": value})
+    except TypeError:
+        return False
+    return True
+
+
+def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None = None) -> Scenario:
     """Read a scenario.
 
     Args:
         name: A bundled scenario's name, or the path of a TOML file.
         overrides: Settings `section.field=value` that replace those of the file.
+        observer: An observer instead of the file's, whose parameters then do not count; `overrides` come after it.
 
     Returns:
         The scenario, its fields checked.
@@ -243,28 +280,44 @@ def load_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
     """
     path = find("scenarios", name, ".toml", "scenario")
     try:
-        fields = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not valid TOML: {error}") from error
+        fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{name}: not valid TOML: not UTF-8 text (at byte {error.start})") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{name}: not valid TOML: {error}") from error
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+        raise InputError(f"{name}: cannot be read: {error.strerror}") from error
+    changes = []
+    if observer is not None:
+        changes.append(f"--observer {observer}")
+        section = fields.get("observer")
+        if not (isinstance(section, dict) and section.get("kind", ObserverSettings().kind) == observer):
+            fields["observer"] = {"kind": observer}
     for override in overrides:
+        changes.append(f"--set {override}")
         _override(fields, override)
-    scenario = parse_scenario(fields, str(path))
-    model = path.parent / scenario.plant.model
-    if model.is_file() and not Path(scenario.plant.model).is_file():
-        # A model beside the scenario file, named relative to it.
-        plant = dataclasses.replace(scenario.plant, model=str(model))
-        scenario = scenario.model_copy(update={"plant": plant})
+    where = " ".join([name, *(["with"] if changes else []), *changes])
+    scenario = parse_scenario(fields, where)
+    if not any(override.partition("=")[0].strip() == "plant.model" for override in overrides):
+        scenario = _find_model(scenario, path.parent)
     return scenario
 
 
-def parse_scenario(fields: Mapping[str, Any], where: str = "scenario") -> Scenario:
+def _find_model(scenario: Scenario, beside: Path) -> Scenario:
+    """The same with the path of its model, which a scenario file names relative to itself."""
+    try:
+        model = find("models", scenario.plant.model, ".xml", "plant.model =", beside)
+    except InputError as error:
+        raise InputError(f"{scenario._where}: {error}") from error
+    return scenario.model_copy(update={"plant": dataclasses.replace(scenario.plant, model=str(model))})
+
+
+def parse_scenario(fields: Mapping[str, Any], where: str = "") -> Scenario:
     """Check a scenario given as a mapping.
 
     Args:
         fields: The TOML file's content.
-        where: What to call it in the error.
+        where: What to call it in an error.
 
     Returns:
         The scenario.
@@ -273,14 +326,26 @@ def parse_scenario(fields: Mapping[str, Any], where: str = "scenario") -> Scenar
         InputError: A field is unknown or not allowed. All wrong fields are named, on one line.
     """
     try:
-        return Scenario.model_validate(fields)
+        # By way of JSON, pydantic takes a list for a tuple and still no text or true for a number.
+        scenario = Scenario.model_validate_json(json.dumps(fields, default=_as_json), strict=True)
     except ValidationError as error:
-        complaints = [_complaint(detail, fields) for detail in error.errors()]
-        raise InputError(f"{where}: " + "; ".join(dict.fromkeys(complaints))) from error
+        complaints = [complaint(Scenario, detail, fields) for detail in error.errors()]
+        raise InputError(_in(where, "; ".join(dict.fromkeys(complaints)))) from error
+    scenario._where = where
+    return scenario
+
+
+def _as_json(value: Any) -> Any:
+    """Numbers of numpy, for those who write a scenario in Python; a date of TOML, which no field takes."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def _in(where: str, wrong: str) -> str:
+    return f"{where}: {wrong}" if where else wrong
 
 
 def prepare(scenario: Scenario) -> Experiment:
-    """Load the plant and construct everything once, so that what does not fit is found before a run.
+    """Load the plant, construct everything and try the observers once, so that what does not fit is found before a run.
 
     Args:
         scenario: The scenario.
@@ -291,15 +356,98 @@ def prepare(scenario: Scenario) -> Experiment:
     Raises:
         InputError: Something in the scenario does not fit.
     """
-    plant = load_plant(scenario.plant)
-    experiment = Experiment(scenario, plant, scenario.controller.law(plant.reduced))
-    experiment.controller()
+    try:
+        _check_times(scenario)
+        _check_observers(scenario)
+        plant = load_plant(scenario.plant)
+        experiment = Experiment(scenario, plant, scenario.controller.law(plant.reduced))
+        experiment.controller()
+        experiment.rehearse()
+    except InputError as error:
+        raise InputError(_in(scenario._where, str(error))) from error
+    return experiment
+
+
+def _check_times(scenario: Scenario) -> None:
+    """Rates must divide the physics rate, times be multiples of the physics step, and pushes begin within the run."""
+    timestep = scenario.plant.timestep_s
+    sensors = {kind: getattr(scenario.sensors, kind) for kind in ("accelerometer", "encoder", "fog")}
+    rates = {"controller.rate_hz": scenario.controller.rate_hz}
+    rates |= {f"sensors.{kind}.rate_hz": sensor.rate_hz for kind, sensor in sensors.items()}
+    times = {"duration_s": scenario.duration_s}
+    times |= {f"sensors.{kind}.latency_s": sensor.latency_s for kind, sensor in sensors.items()}
+    for i, push in enumerate(scenario.push):
+        times |= {f"push.{i}.start_s": push.start_s, f"push.{i}.duration_s": push.duration_s}
+    for field, rate in rates.items():
+        _check_grid(1.0 / rate, timestep, field, f"{rate:g} Hz", lambda steps: f"{1.0 / (steps * timestep):g} Hz")
+    for field, time in times.items():
+        _check_grid(time, timestep, field, f"{time:g} s", lambda steps: f"{steps * timestep:g} s")
     for i, push in enumerate(scenario.push):
         if push.start_s >= scenario.duration_s:
             raise InputError(
-                f"push.{i}.start_s = {push.start_s:g}: the run ends at duration_s = {scenario.duration_s:g}"
+                f"push.{i}.start_s = {push.start_s:g}: must be less than duration_s = {scenario.duration_s:g}, "
+                "where the run ends"
             )
-    return experiment
+
+
+def _check_grid(time: float, timestep: float, field: str, given: str, show: Callable[[int], str]) -> None:
+    try:
+        whole_steps(time, timestep, field, given)
+    except InputError as error:
+        around = {max(1, math.floor(time / timestep)), max(1, math.ceil(time / timestep))}
+        raise InputError(f"{error} (nearest: {' or '.join(show(steps) for steps in sorted(around))})") from error
+
+
+def _check_observers(scenario: Scenario) -> None:
+    """The observers exist, and the parameters of the one in the loop are of their types: no text for a number."""
+    for name in scenario.companion_names():
+        try:
+            observer_class(name)
+        except InputError as error:
+            raise InputError(str(error).replace("observer.kind = ", "companions: ", 1)) from error
+    kind, parameters = scenario.observer.kind, scenario.observer.parameters
+    types = fields_of(observer_class(kind))
+    for name, value in parameters.items():
+        if name in ("dt", "model"):
+            raise InputError(f"observer.{name}: set by the bench, which gives it to every observer")
+        if name not in types:
+            continue  # a name that the class does not have, or no class of pydantic's: its constructor decides
+        adapter = TypeAdapter(types[name], config=ConfigDict(strict=True, allow_inf_nan=False))
+        try:
+            adapter.validate_json(json.dumps(value, default=_as_json))
+        except ValidationError as error:
+            finite = all(detail["type"] != "finite_number" for detail in error.errors())
+            wrong = not_allowed(f"observer.{name}", value, types[name], finite=finite)
+            raise InputError(f"{wrong} (observer {kind})") from error
+
+
+def _rehearse(observer: Observer, worlds: int | None) -> None:
+    """Two samples of one observer, on floats or on arrays of so many worlds."""
+
+    def sample(tilt: float) -> Measurement:
+        y = Measurement(tilt, -tilt)
+        return y if worlds is None else Measurement(*(np.full(worlds, angle) for angle in y))
+
+    hint = "" if worlds is None else "; many worlds come at once, as arrays: use operators and cmg_mj.elementwise"
+    u: Any = 0.1 if worlds is None else np.full(worlds, 0.1)
+    call = "init(y)"
+    try:
+        state = observer.init(sample(0.01))
+        call = "step(state, y, u)"
+        returned = observer.step(state, sample(0.011), u)
+    except Exception as error:  # a user's observer may fail in any way
+        raise InputError(f"{call} raised {type(error).__name__}: {error}{hint}") from error
+    try:
+        _, (x1, x2, x3) = returned
+    except (TypeError, ValueError) as error:
+        pair = isinstance(returned, tuple) and len(returned) == 2
+        given = f"(state, {shown(returned[1])})" if pair else shown(returned)
+        raise InputError(f"{call} must return (state, (x1, x2, x3)), not {given}") from error
+    for name, value in (("x1", x1), ("x2", x2), ("x3", x3)):
+        number = np.asarray(value)
+        if number.dtype.kind not in "fiu" or number.shape != np.shape(u):
+            wanted = "a number" if worlds is None else f"an array of {worlds} numbers"
+            raise InputError(f"{call} must return {wanted} for {name}, not {shown(value)}{hint}")
 
 
 def _override(fields: dict[str, Any], setting: str) -> None:
@@ -308,67 +456,21 @@ def _override(fields: dict[str, Any], setting: str) -> None:
     if not equals or not all(parts):
         raise InputError(f"--set {setting!r}: write section.field=value, for example plant.equilibrium_bias_deg=1.0")
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        (value,) = tomllib.loads(f"value = {text}").values()
+    except (tomllib.TOMLDecodeError, ValueError):
         value = text.strip()  # a bare word is a string
     *sections, field = parts
     place: Any = fields
-    for section in sections:
-        if isinstance(place, list) and section.isdigit() and int(section) < len(place):
+    for i, section in enumerate(sections):
+        if isinstance(place, list) and section.isdecimal() and int(section) < len(place):
             place = place[int(section)]
-        elif isinstance(place, dict):
-            place = place.setdefault(section, {})
+        elif isinstance(place, dict) and not section.isdecimal():
+            following = sections[i + 1 : i + 2]
+            place = place.setdefault(section, [] if following and following[0].isdecimal() else {})
         else:
-            raise InputError(f"--set {setting!r}: there is no {'.'.join(sections)} to set a field of")
+            there = f"; it has {len(place)} of them, counted from 0" if isinstance(place, list) else ""
+            raise InputError(f"--set {setting!r}: there is no {'.'.join(sections[: i + 1])}{there}")
     if not isinstance(place, dict):
-        raise InputError(
-            f"--set {setting!r}: {'.'.join(sections)} is not a section; write for example push.0.torque_n_m=2.0"
-        )
+        example = f"{'.'.join(sections)}.0.torque_n_m=2.0" if isinstance(place, list) else "plant.timestep_s=0.0005"
+        raise InputError(f"--set {setting!r}: {'.'.join(sections)} is not a section; write for example {example}")
     place[field] = value
-
-
-def _complaint(detail: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
-    """One wrong field in words: where, what was given, what is allowed."""
-    location = [
-        part for part in detail["loc"] if not str(part).startswith(("tuple[", "list[", "literal[", "function-"))
-    ]
-    where = ".".join(str(part) for part in location)
-    kind = detail["type"]
-    if kind in ("extra_forbidden", "unexpected_keyword_argument"):
-        return f"{where}: no such field; {nearest(str(location[-1]), _siblings(location[:-1]))}"
-    if kind in ("missing", "missing_argument"):
-        return f"{where}: missing"
-    message = detail["msg"].removeprefix("Value error, ")
-    message = message[0].lower() + message[1:]
-    given = detail["input"]
-    shown = "" if isinstance(given, (dict, list, BaseModel)) or dataclasses.is_dataclass(given) else f" = {given!r}"
-    if isinstance(given, float) and not math.isfinite(given):
-        shown = f" = {given}"
-    return f"{where}{shown}: {message}" if where else message
-
-
-def _siblings(location: Sequence[Any]) -> list[str]:
-    """Names of the fields of the section at a place of the scenario."""
-    place: Any = Scenario
-    for part in location:
-        if isinstance(part, int):
-            continue
-        annotation = _fields(place)[part]
-        for candidate in _types_in(annotation):
-            if _fields(candidate):
-                place = candidate
-                break
-    return [name for name in _fields(place) if name != "versions"]
-
-
-def _fields(place: Any) -> dict[str, Any]:
-    if isinstance(place, type) and issubclass(place, BaseModel):
-        return {name: info.annotation for name, info in place.model_fields.items()}
-    if dataclasses.is_dataclass(place):
-        return {name: info.annotation for name, info in place.__pydantic_fields__.items()}  # type: ignore[attr-defined]
-    return {}
-
-
-def _types_in(annotation: Any) -> list[Any]:
-    arguments = getattr(annotation, "__args__", None)
-    return [annotation] if not arguments else [t for argument in arguments for t in _types_in(argument)]

@@ -14,7 +14,7 @@ from cmg_mj.callback import installed
 from cmg_mj.controller import Controller
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.metrics import Metrics, MetricsSettings
-from cmg_mj.plant import Plant
+from cmg_mj.plant import Plant, quiet
 from cmg_mj.push import Push
 from cmg_mj.rows import Rows
 from cmg_mj.timing import whole_steps
@@ -83,6 +83,7 @@ def _stops(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> It
             yield last, end - last, held
 
 
+@quiet()
 def simulate(
     plant: Plant | Sequence[Plant],
     controller: Controller,
@@ -135,7 +136,7 @@ def simulate(
 
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
     try:
-        with drive, np.errstate(all="ignore"):
+        with drive:
             for step, count, held in _stops(steps, controller.beat, pushes, timestep):
                 if held != torque:
                     torque = held

@@ -451,6 +451,16 @@ def test_recorded_commands_are_the_papers_law(kind: str) -> None:
     np.testing.assert_allclose(np.diff(x_e), np.where(held, 0.0, -0.005 * y2)[:-1], rtol=0.0, atol=1e-12)
 
 
+def test_a_scenario_may_feed_back_the_estimated_angles() -> None:
+    """As the text after (10) has it: the whole estimate, the integrator too."""
+    trajectory = run("duration_s=0.5", "push=[]", "observer.kind=ltv", "controller.angles=estimated")
+    x1, x2, x3 = (trajectory[f"estimate/ltv/{name}"] for name in ("x1_rad", "x2_rad_s", "x3_rad"))
+    u, x_e = trajectory["u_rad_s"], trajectory["x_e_rad_s"]
+    np.testing.assert_allclose(u, -(35.0 * x1 + 4.0 * x2 - 1.0 * x3 + 0.3 * x_e), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(np.diff(x_e), -0.005 * x3[:-1], rtol=0.0, atol=1e-12)
+    assert np.abs(x1 - trajectory["y1_rad"]).max() > 1e-3
+
+
 def test_the_true_rate_is_read_only_when_asked_for() -> None:
     """feedback = observer: another truth (a biased gyro) changes nothing; feedback = fog: it does."""
     runs = {

@@ -1,6 +1,6 @@
 """Set the acceptance bounds from a seed sweep: python -m tests.acceptance.set_bounds > tests/acceptance/bounds.json.
 
-A figure's bounds are its mean over groups of 20 worlds, -+ six standard deviations of the groups' figures. The seed is
+A figure's bounds are its mean over groups of 20 worlds, -+ four standard deviations of the groups' figures. The seed is
 not the tests' one.
 """
 
@@ -19,7 +19,7 @@ def bounds(groups: list[dict[str, float]]) -> dict[str, list[float]]:
     found = {}
     for name in groups[0]:
         values = [group[name] for group in groups]
-        mean, spread = statistics.fmean(values), 6.0 * statistics.stdev(values)
+        mean, spread = statistics.fmean(values), 4.0 * statistics.stdev(values)
         found[name] = [float(f"{max(mean - spread, 0.0):.4g}"), float(f"{mean + spread:.4g}")]
     return found
 

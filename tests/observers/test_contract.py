@@ -1,0 +1,172 @@
+"""What every observer must be: a value with pure, elementwise init and step, that filters and starts at rest."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import inspect
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.observers import OBSERVERS, Estimate, Measurement
+from tests.observers.reference import BOUND, DT, EPSILON, PAPER, observer, rough_signals
+
+EVERY = sorted(OBSERVERS)
+
+DEFAULTS = {
+    "linear": {"tau": 0.02},  # aranovskiy2020 Table 2, as are the next two
+    "ltv": {"Q": (1.0, 5e6, 1.0), "H0": (1.0, 1.0, 1.0)},
+    "homogeneous": {"k1": 20.0, "k2": 150.0, "alpha": 0.85},
+    "luenberger": {"L": ((20.0, 0.0), (150.0, 0.0), (0.0, 20.0))},  # sokolov2019 Table II
+    "finite_difference": {},
+    "super_twisting": {"L": BOUND, "l0": 1.5, "l1": 1.1},  # l0, l1: Levant 1998
+    "linear_high_gain": {"epsilon": EPSILON, "a1": 2.0**0.5, "a2": 1.0},  # Butterworth
+}
+
+
+def flat(state: Any) -> list:
+    """The numbers of a state, whatever its shape."""
+    if isinstance(state, tuple | list):
+        return [number for part in state for number in flat(part)]
+    return [state]
+
+
+def walk(of: Any, samples: Sequence[tuple[Any, ...]]) -> tuple[Any, list[Estimate]]:
+    """Last state and all estimates along samples (y1, y2, u held since the sample before)."""
+    state, estimates = of.init(Measurement(*samples[0][:2])), []
+    for y1, y2, u in samples[1:]:
+        state, estimate = of.step(state, Measurement(y1, y2), u)
+        estimates.append(estimate)
+    return state, estimates
+
+
+def samples(n: int = 60, seed: int = 0) -> list[tuple[float, float, float]]:
+    y1, y2, u = rough_signals(n, seed)
+    return list(zip(y1.tolist(), y2.tolist(), [0.0, *u.tolist()[:-1]], strict=True))
+
+
+@pytest.mark.parametrize("kind", sorted(DEFAULTS))
+def test_defaults_are_those_of_the_papers(kind: str) -> None:
+    of: Any = observer(kind)
+    names = [f.name for f in dataclasses.fields(of) if f.name not in ("dt", "model")]
+    assert {name: getattr(of, name) for name in names} == DEFAULTS[kind]
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_every_parameter_is_documented(kind: str) -> None:
+    cls = type(observer(kind))
+    for name in inspect.signature(cls).parameters:
+        assert f"{name}: " in (cls.__doc__ or "")
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_is_a_frozen_value(kind: str) -> None:
+    of = observer(kind)
+    assert dataclasses.is_dataclass(of)
+    assert of == observer(kind)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        object.__getattribute__(of, "__setattr__")("dt", 0.1)
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_starts_at_rest_at_the_measured_angles(kind: str) -> None:
+    """At the equilibrium nothing moves, so the estimate stays (0, 0, y2) while the measurement does."""
+    of = observer(kind)
+    state = of.init(Measurement(0.0, 0.3))
+    for _ in range(5):
+        state, estimate = of.step(state, Measurement(0.0, 0.3), 0.0)
+        np.testing.assert_allclose(estimate, (0.0, 0.0, 0.3), rtol=0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_step_has_no_memory_but_the_state(kind: str) -> None:
+    """The same state gives the same step, from another instance, after other steps, and is left as it was."""
+    of, twin = observer(kind), observer(kind)
+    state, _ = walk(of, samples())
+    before = copy.deepcopy(state)
+    y, u = Measurement(0.02, 0.1), 1.5
+    first = of.step(state, y, u)
+    walk(of, samples(seed=1))
+    assert flat(of.step(state, y, u)) == flat(first)
+    assert flat(twin.step(state, y, u)) == flat(first)
+    assert flat(state) == flat(before)
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_two_runs_may_share_one_observer(kind: str) -> None:
+    of = observer(kind)
+    alone = [walk(of, samples(seed=seed))[1] for seed in (0, 1)]
+    states: list[Any] = [of.init(Measurement(*samples(seed=seed)[0][:2])) for seed in (0, 1)]
+    for k in range(1, 60):
+        for seed in (0, 1):
+            y1, y2, u = samples(seed=seed)[k]
+            states[seed], estimate = of.step(states[seed], Measurement(y1, y2), u)
+            assert estimate == alone[seed][k - 1]
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_estimate_uses_the_sample_it_is_given(kind: str) -> None:
+    """A filter, not a one-step predictor: y1_k and (for y2's model) y2_k move the estimate of sample k."""
+    of = observer(kind)
+    state = of.init(Measurement(0.0, 0.1))
+    _, estimate = of.step(state, Measurement(1e-5, 0.1), 0.0)
+    _, moved = of.step(state, Measurement(5e-5, 0.1), 0.0)
+    assert abs(moved.x2 - estimate.x2) > 1e-6
+    _, turned = of.step(state, Measurement(1e-5, 0.3), 0.0)
+    assert abs(turned.x3 - estimate.x3) > 1e-4
+
+
+@pytest.mark.parametrize("kind", ["ltv", "homogeneous", "luenberger"])
+def test_models_use_the_command_held_since_the_sample_before(kind: str) -> None:
+    """J_d omega_d/J1 u dt = 5.585 rad/s^2 a rad/s: what one period of u adds to the rate, but for the correction."""
+    of = observer(kind)
+    state = of.init(Measurement(0.0, 0.0))
+    _, still = of.step(state, Measurement(0.0, 0.0), 0.0)
+    _, driven = of.step(state, Measurement(0.0, 0.0), 2.0)
+    assert driven.x2 - still.x2 == pytest.approx(11e-4 * 314.0 / 0.061841 * 2.0 * DT, rel=0.1)
+
+
+@pytest.mark.parametrize("kind", ["linear", "linear_high_gain", "finite_difference", "super_twisting"])
+def test_differentiators_use_no_model(kind: str) -> None:
+    """Neither the command nor the gimbal nor the rig's parameters reach the rate."""
+    bent = dataclasses.replace(PAPER, J1=1.0, J2=0.3, J_d=0.1, omega_d=10.0, gravity_torque=9.0)
+    still = [(y1, 0.0, 0.0) for y1, _, _ in samples()]
+    rates = [
+        [e.x2 for e in walk(of, s)[1]] for of, s in ((observer(kind), samples()), (observer(kind, model=bent), still))
+    ]
+    assert rates[0] == rates[1]
+
+
+@pytest.mark.parametrize("n_worlds", [1, 5, 8])
+@pytest.mark.parametrize("kind", EVERY)
+def test_arrays_equal_floats_bit_by_bit(kind: str, n_worlds: int) -> None:
+    of = observer(kind)
+    worlds = [samples(120, seed) for seed in range(n_worlds)]
+    together = [tuple(np.array([world[k][i] for world in worlds]) for i in range(3)) for k in range(len(worlds[0]))]
+    _, many = walk(of, together)
+    for i, world in enumerate(worlds):
+        _, single = walk(of, world)
+        assert all(type(number) is float for number in single[-1])
+        assert [tuple(float(part[i]) for part in estimate) for estimate in many] == single
+
+
+@pytest.mark.parametrize("kind", EVERY)
+@pytest.mark.parametrize("dt", [0.0, -0.005, float("nan"), float("inf")])
+def test_a_sample_period_that_is_none_is_refused(kind: str, dt: float) -> None:
+    with pytest.raises(InputError, match=r"^observer\.dt"):
+        observer(kind, dt)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [(kind, name) for kind, values in DEFAULTS.items() for name, value in values.items() if isinstance(value, float)],
+)
+def test_a_gain_that_is_not_positive_is_refused(kind: str, name: str) -> None:
+    for value in (0.0, -1.0, float("nan")):
+        parameters: Any = {name: value}
+        with pytest.raises(InputError, match=rf"^observer\.{name} = .* \(observer {kind}\)$"):
+            observer(kind, **parameters)

@@ -1,0 +1,192 @@
+"""The homogeneous differentiator against aranovskiy2020 (11)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from cmg_mj.errors import InputError
+from cmg_mj.observers import Measurement, Observer
+from cmg_mj.reduced import ReducedModel
+from tests.observers.reference import (
+    DT,
+    GRAVITY_TORQUE,
+    HEAVY,
+    J1,
+    PAPER,
+    homogeneous_slope,
+    integrate,
+    observer,
+    rough_signals,
+    run,
+)
+
+
+def started(of: Observer, x1: float, x2: float, y1: float = 0.0, y2: float = 0.0) -> Any:
+    """A state with this estimate after this measurement."""
+    return of.init(Measurement(y1, y2))._replace(x1=x1, x2=x2)
+
+
+CASES = [
+    pytest.param({}, PAPER, id="Table 2"),
+    pytest.param({"k1": 35.0}, PAPER, id="k1"),
+    pytest.param({"k2": 400.0}, PAPER, id="k2"),
+    pytest.param({"alpha": 0.7}, PAPER, id="alpha"),
+    pytest.param({}, HEAVY, id="another rig"),
+]
+
+
+@pytest.mark.parametrize(("parameters", "model"), CASES)
+def test_one_sample_is_the_printed_equation(parameters: dict, model: ReducedModel) -> None:
+    """Away from e = 0, where the right-hand side is smooth, at large rates, gimbal angles and commands."""
+    rng = np.random.default_rng(11)
+    for _ in range(20):
+        x1, x2, y2, u = (
+            0.01 * rng.normal(),
+            rng.uniform(-9.0, 9.0),
+            rng.uniform(-1.3, 1.3),
+            rng.uniform(-4.7, 4.7),
+        )
+        y1 = x1 + math.copysign(0.3, rng.normal())
+        after = Measurement(y1 + 0.02 * rng.normal(), y2 + DT * u)
+        expected = integrate(homogeneous_slope(model, **parameters), [x1, x2], [y1, after.y1], [y2, after.y2], [u])
+        of = observer("homogeneous", model=model, **parameters)
+        _, estimate = of.step(started(of, x1, x2, y1, y2), after, u)
+        np.testing.assert_allclose(estimate[:2], expected[0], rtol=0.0, atol=1e-5)
+        assert estimate.x3 == after.y2
+
+
+@pytest.mark.parametrize(("parameters", "model"), CASES)
+def test_follows_the_continuous_observer_at_200_hz(parameters: dict, model: ReducedModel) -> None:
+    """On a restless rig, the estimate crossing e = 0 all the time."""
+    y1, y2, u = rough_signals(200)
+    expected = integrate(homogeneous_slope(model, **parameters), [y1[0], 0.0], y1, y2, u)
+    estimates, _ = run(observer("homogeneous", model=model, **parameters), y1, y2, u)
+    error = np.sqrt(np.mean((estimates[:, 1] - expected[:, 1]) ** 2))
+    print(f"{parameters}: rms rate {np.std(expected[:, 1]):.3f} rad/s, rms error of the step {error:.2e}")
+    allowed = 2e-2 if parameters.get("alpha") == 0.7 else 3e-3
+    assert error < allowed * np.std(expected[:, 1])
+
+
+def test_converges_to_the_continuous_observer_with_the_square_of_the_period() -> None:
+    """Smooth signals, a command that is held anyway."""
+    u, duration = 0.7, 1.0
+
+    def y1(t: np.ndarray | float) -> np.ndarray:
+        return 0.05 * np.sin(3.0 * np.asarray(t)) + 0.02 * np.sin(11.0 * np.asarray(t) + 0.3)
+
+    def y2(t: np.ndarray | float) -> np.ndarray:
+        return u * np.asarray(t) - 0.3
+
+    slope = homogeneous_slope()
+    reference = solve_ivp(
+        lambda t, x: slope(x, float(y1(t)), float(y2(t)), u),
+        (0.0, duration),
+        [y1(0.0), 0.0],
+        "DOP853",
+        rtol=1e-11,
+        atol=1e-12,
+        max_step=0.01,
+        dense_output=True,
+    ).sol
+    errors = []
+    for n in (200, 400, 800, 1600):
+        t = np.linspace(0.0, duration, n + 1)
+        estimates, _ = run(observer("homogeneous", duration / n), y1(t), y2(t), np.full(n, u))
+        error = np.abs(estimates[:, 1] - reference(t[1:])[1])
+        errors.append(error[t[1:] > 0.3].max())
+    orders = [math.log2(coarse / fine) for coarse, fine in itertools.pairwise(errors)]
+    print(f"largest error at 200 Hz {errors[0]:.2e} rad/s, orders {np.round(orders, 3)}")
+    assert errors[0] < 1e-4
+    assert min(orders) > 1.95
+
+
+@pytest.mark.parametrize(
+    ("alpha", "e_deg"), [(0.85, 0.5), (0.85, -1.0), (0.85, 2.0), (0.7, -1.0), (0.7, 2.0), (1.0, 0.5)]
+)
+def test_a_bias_leaves_a_rate_error_of_the_closed_form(alpha: float, e_deg: float) -> None:
+    """At rest y1 = -e: k2 [x1 - y1]^(2 alpha - 1) balances gravity, and x2 = k1 [x1 - y1]^alpha."""
+    y1 = -math.radians(e_deg)
+    n = 1200
+    estimates, _ = run(observer("homogeneous", alpha=alpha), [y1] * n, [0.0] * n, [0.0] * n)
+    pull = GRAVITY_TORQUE * math.sin(abs(y1)) / J1 / 150.0
+    expected = math.copysign(20.0 * pull ** (alpha / (2.0 * alpha - 1.0)), y1)
+    assert estimates[-1, 1] == pytest.approx(expected, rel=1e-7)
+
+
+def free_errors(alpha: float, dt: float, n: int, x1: float, x2: float) -> np.ndarray:
+    """The error dynamics alone: no drive (y1 = 0, u = 0), so the estimate is the error, (n, 2)."""
+    of = observer("homogeneous", dt, alpha=alpha)
+    state, rows = started(of, x1, x2), []
+    for _ in range(n):
+        state, estimate = of.step(state, Measurement(0.0, 0.0), 0.0)
+        rows.append(estimate[:2])
+    return np.array(rows)
+
+
+def test_converges_in_finite_time() -> None:
+    """alpha = 1 gains a factor e every 0.1 s for ever; alpha = 0.85 has all digits within a second."""
+    dt = 1e-3
+    ours, linear = (np.abs(free_errors(alpha, dt, 1500, 0.05, -1.0)[:, 1]) for alpha in (0.85, 1.0))
+    arrived = dt * (1 + int(np.flatnonzero(ours > 1e-9)[-1]))
+    print(f"1e-9 rad/s after {arrived:.3f} s; alpha = 1 then has {linear[round(arrived / dt)]:.1e} rad/s")
+    assert arrived < 1.2
+    assert linear[round(arrived / dt)] > 1e-6
+
+
+@pytest.mark.parametrize("alpha", [0.85, 0.7, 0.55])
+def test_is_homogeneous(alpha: float) -> None:
+    """An error (lambda, lambda^alpha) times larger goes the same way in lambda^(1 - alpha) times the time."""
+    scale, n = 16.0, 60
+    small = free_errors(alpha, 0.004, n, 0.002, -0.05)
+    large = free_errors(alpha, 0.004 * scale ** (1.0 - alpha), n, 0.002 * scale, -0.05 * scale**alpha)
+    np.testing.assert_allclose(large[:, 0], small[:, 0] * scale, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(large[:, 1], small[:, 1] * scale**alpha, rtol=0.0, atol=1e-8)
+
+
+def test_without_noise_and_bias_it_finds_the_rate() -> None:
+    """Along a free motion of (4), the true x1, x3 measured."""
+    u, dt = 0.5, 5e-4
+    slope = homogeneous_slope(k1=0.0, k2=0.0)
+    t = np.arange(0.0, 0.8, dt)
+    x1, x2 = solve_ivp(
+        lambda s, x: slope(x, x[0], u * s - 0.1, u),
+        (0.0, 0.8),
+        [-0.04, 0.25],
+        "DOP853",
+        t,
+        rtol=1e-11,
+        atol=1e-12,
+    ).y
+    estimates, _ = run(observer("homogeneous", dt), x1, u * t - 0.1, np.full(len(t), u))
+    error = np.abs(estimates[:, 1] - x2[1:])
+    assert error[:10].min() > 0.1
+    assert error[t[1:] > 0.7].max() < 5e-5
+
+
+def test_with_alpha_1_it_is_a_linear_observer() -> None:
+    """x' = [[-k1, 1], [-k2, 0]] x without drive. The step's error is RK4's, of fourth order."""
+    errors = []
+    for dt in (0.005, 0.0025):
+        n = round(0.1 / dt)
+        exact = expm(np.array([[-20.0, 1.0], [-150.0, 0.0]]) * 0.1) @ [0.03, -0.4]
+        errors.append(np.abs(free_errors(1.0, dt, n, 0.03, -0.4)[-1] - exact).max())
+    assert errors[0] < 2e-6
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
+
+
+@pytest.mark.parametrize("alpha", [0.5, 0.2, 1.0001, -0.85, math.nan])
+def test_alpha_outside_its_interval_is_refused(alpha: float) -> None:
+    with pytest.raises(InputError, match=r"^observer\.alpha = .*(greater|less|finite).*homogeneous"):
+        observer("homogeneous", alpha=alpha)
+
+
+@pytest.mark.parametrize("alpha", [0.501, 1.0])
+def test_alpha_inside_its_interval_is_taken(alpha: float) -> None:
+    observer("homogeneous", alpha=alpha)

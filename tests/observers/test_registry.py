@@ -1,0 +1,110 @@
+"""Observers by name and by dotted path, and what a wrong name or parameter is told."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
+from cmg_mj.reduced import ReducedModel
+from cmg_mj.scenario import parse_scenario, prepare
+from tests.observers.reference import DT, PAPER, observer
+
+
+class Mine:
+    """A user's observer: a plain class, no base class, its own parameter."""
+
+    def __init__(self, dt: float, model: ReducedModel, gain: float = 3.0) -> None:
+        if gain > 100.0:
+            raise RuntimeError("gain is far too large")
+        self.dt, self.model, self.gain = dt, model, gain
+
+    def init(self, y: Measurement) -> tuple[float]:
+        return (y.y1,)
+
+    def step(self, state: tuple[float], y: Measurement, u: float) -> tuple[tuple[float], Estimate]:
+        return (y.y1,), Estimate(y.y1, self.gain * (y.y1 - state[0]) / self.dt, y.y2)
+
+
+class Open:
+    """A user's observer that takes whatever it is given."""
+
+    def __init__(self, **parameters: Any) -> None:
+        self.parameters = parameters
+
+    init = step = None  # not callable
+
+
+class Greedy(Mine):
+    def __init__(self, dt: float, model: ReducedModel, **others: Any) -> None:
+        super().__init__(dt, model)
+        self.others = others
+
+
+MINE = f"{__name__}:Mine"
+
+
+@pytest.mark.parametrize("kind", sorted(OBSERVERS))
+def test_every_name_makes_its_observer(kind: str) -> None:
+    made = make_observer(kind, DT, PAPER)
+    assert f"{type(made).__module__}:{type(made).__name__}" == OBSERVERS[kind]
+    assert observer_class(OBSERVERS[kind]) is type(made)
+
+
+def test_the_papers_names_exist() -> None:
+    papers = {"linear", "ltv", "homogeneous", "luenberger"}
+    baselines = {"finite_difference", "super_twisting", "linear_high_gain"}
+    assert papers | baselines <= set(OBSERVERS)
+
+
+def test_a_users_class_by_dotted_path() -> None:
+    made: Any = make_observer(MINE, DT, PAPER, gain=2.0)
+    assert isinstance(made, Mine)
+    assert (made.dt, made.model, made.gain) == (DT, PAPER, 2.0)
+    greedy: Any = make_observer(f"{__name__}:Greedy", DT, PAPER, anything=1)
+    assert greedy.others == {"anything": 1}
+
+
+def test_a_users_class_in_a_scenario() -> None:
+    """A difference three times too large in the loop: the parameter arrives, and the run is this observer's."""
+    scenario = {"duration_s": 0.1, "observer": {"kind": MINE, "gain": 1.5}}
+    trajectory = prepare(parse_scenario(scenario)).run().trajectory
+    assert trajectory is not None
+    y1, rate = trajectory["y1_rad"], trajectory[f"estimate/{MINE}/x2_rad_s"]
+    assert rate[0] == 0.0
+    assert rate[1:] == pytest.approx(1.5 * 200.0 * (y1[1:] - y1[:-1]), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters", "message"),
+    [
+        ("homogenous", {}, r"observer\.kind = 'homogenous': no such observer; did you mean 'homogeneous'\?"),
+        ("LTV", {}, r"observer\.kind = 'LTV': no such observer; .*allowed: .*ltv.*package\.module:Class"),
+        ("", {}, r"observer\.kind = '': no such observer"),
+        ("linear", {"tua": 0.1}, r"observer\.tua: linear has no such parameter; did you mean 'tau'\?"),
+        ("homogeneous", {"k3": 1.0}, r"observer\.k3: homogeneous has no such parameter; allowed: alpha, k1, k2"),
+        ("finite_difference", {"tau": 0.1}, r"observer\.tau: finite_difference has no such parameter; it has none"),
+        ("linear", {"tau": "fast"}, r"observer\.tau = 'fast': .*number.*\(observer linear\)"),
+        ("ltv", {"Q": [1.0, 2.0]}, r"observer\.Q.*\(observer ltv\)"),
+        (MINE, {"gian": 1.0}, r"observer\.gian: .*Mine has no such parameter; did you mean 'gain'\?"),
+        (MINE, {"gain": 200.0}, r"observer .*Mine: RuntimeError: gain is far too large"),
+        (f"{__name__}:Yours", {}, r"observer\.kind = .*Yours': cannot be imported: AttributeError"),
+        ("no_such_package:Mine", {}, r"cannot be imported: ModuleNotFoundError: .*no_such_package"),
+        (f"{__name__}:Open", {}, r"must be a class with the methods init\(y\) and step\(state, y, u\)"),
+        (f"{__name__}:MINE", {}, r"must be a class with the methods"),
+        (":", {}, r"observer\.kind = ':': cannot be imported"),
+    ],
+)
+def test_what_is_wrong_is_named_in_one_line(kind: str, parameters: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        observer(kind, **parameters)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["dt", "model"])
+def test_dt_and_model_are_not_the_users_to_set(name: str) -> None:
+    """In a scenario's [observer] they would collide with the loop's own."""
+    with pytest.raises(InputError, match=rf"^observer\.{name}"):
+        prepare(parse_scenario({"observer": {"kind": "linear", name: 0.1}}))
