@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import mujoco
 
 from cmg_mj.controller import Controller
+from cmg_mj.engine import control_callback
 from cmg_mj.plant import Plant
 
 
 def control(plant: Plant, controller: Controller, data: mujoco.MjData) -> bool:
     """Sample what is due at this physics step, and set the servos' commands if it is a control tick.
 
-    Call it before every `mujoco.mj_step`. At the first step the accelerometers are computed here, so that it
-    does not matter whether `mj_forward` was called before.
+    Call it before every `mujoco.mj_step`, without an `mj_forward` between: that would show the accelerometers
+    one step newer than the runner's. At the first tick they are computed here, so that a start without `mj_forward`
+    is as good as one with it.
 
     Args:
         plant: The rig.
@@ -28,7 +31,7 @@ def control(plant: Plant, controller: Controller, data: mujoco.MjData) -> bool:
     step = round(data.time / plant.model.opt.timestep)
     if step % controller.beat:
         return False
-    sensordata = data.sensordata if step else _first_readings(plant, data)
+    sensordata = _first_readings(plant, data) if controller.tick is None else data.sensordata
     ideal = plant.ideal(data.qpos.tolist(), data.qvel.tolist(), sensordata.tolist())
     if not controller.update(step, ideal):
         return False
@@ -42,12 +45,8 @@ def _first_readings(plant: Plant, data: mujoco.MjData):
     """Accelerometers at the start: MuJoCo shows zeros until a first forward pass."""
     scratch = mujoco.MjData(plant.model)
     mujoco.mj_copyState(plant.model, data, scratch, int(mujoco.mjtState.mjSTATE_INTEGRATION))
-    previous = mujoco.get_mjcb_control()
-    mujoco.set_mjcb_control(None)
-    try:
+    with control_callback(None):
         mujoco.mj_forward(plant.model, scratch)
-    finally:
-        mujoco.set_mjcb_control(previous)
     return scratch.sensordata
 
 
@@ -67,29 +66,35 @@ class ControlCallback:
         self.plant = plant
         self.controller = controller
         self._instant: float | None = None
+        self._latest = -math.inf
         self._half_stages = 0
 
     def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Take the control decision if this call is the first at a sampling instant."""
         h, t = model.opt.timestep, data.time
-        if self._instant is not None:
+        backwards = t < self._latest
+        self._latest = t
+        if self._instant is not None and not backwards:
             ahead = (t - self._instant) / h
-            if abs(ahead) < 0.25:  # a repeated forward pass at this instant
+            if abs(ahead) < 0.25 and self._commands_stand(data):  # a repeated forward pass at this instant
                 self._half_stages = 0
                 return
             if 0.25 < ahead < 0.75:  # RK4's second and third stage
                 self._half_stages += 1
                 return
-            if (
-                self._half_stages >= 2 and 0.75 < ahead < 1.25
-            ):  # RK4's fourth stage; the next call is the next step's first
+            if self._half_stages >= 2 and 0.75 < ahead < 1.25:  # RK4's fourth stage, before the next step's first
                 self._half_stages = 0
                 return
-            if ahead < 0.0:
-                self.controller.reset()
+        if backwards or t == self._instant:
+            self.controller.reset()
         self._half_stages = 0
         self._instant = t
         control(self.plant, self.controller, data)
+
+    def _commands_stand(self, data: mujoco.MjData) -> bool:
+        """Whether the servos' commands are still those of the last tick; a reset to the same time takes them away."""
+        tick = self.controller.tick
+        return tick is None or all(data.ctrl[cube.servo] == cube.direction * tick.u for cube in self.plant.cubes)
 
 
 @contextmanager
@@ -107,9 +112,5 @@ def installed(plant: Plant, controller: Controller) -> Iterator[ControlCallback]
         The callback.
     """
     callback = ControlCallback(plant, controller)
-    previous = mujoco.get_mjcb_control()
-    mujoco.set_mjcb_control(callback)
-    try:
+    with control_callback(callback):
         yield callback
-    finally:
-        mujoco.set_mjcb_control(previous)

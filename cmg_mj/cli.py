@@ -69,7 +69,21 @@ _observers = click.option(
 )
 
 
-@click.group(help=HELP, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+class Interruptible(click.Group):
+    """Commands that Ctrl-C ends with one line and exit status 130."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            _say("interrupted")
+            sys.exit(INTERRUPTED)
+
+
+@click.group(
+    cls=Interruptible, help=HELP, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
 @click.version_option(package_name="cmg_mj", prog_name="cmg-mj")
 def cli() -> None:  # noqa: D103  (its help is HELP)
     pass
@@ -250,9 +264,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (InputError, click.ClickException) as error:
         _say(error.format_message() if isinstance(error, click.ClickException) else str(error))
         sys.exit(WRONG_INPUT)
-    except (KeyboardInterrupt, click.Abort):
-        _say("interrupted")
-        sys.exit(INTERRUPTED)
     except OSError as error:
         with suppress(OSError):  # so that Python does not try again to write what it still has
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -230,8 +230,12 @@ class Controller:
             except Exception as error:  # a user's observer may fail in any way
                 self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
             estimates.append(estimate)
-        if self._single and 0.0 * estimates[0][1] != 0.0:  # NaN and infinity alike; many worlds are judged one by one
-            self._blame(self.observer, f"returned {estimates[0][1]} for x2", step)
+        if self._single:  # many worlds are judged one by one
+            x1, x2, x3 = estimates[0][:3]
+            if 0.0 * (x1 + x2 + x3) != 0.0:  # NaN and infinity alike
+                named = zip(("x1", "x2", "x3"), (x1, x2, x3), strict=True)
+                name, value = next((n, v) for n, v in named if not math.isfinite(v))
+                self._blame(self.observer, f"returned {value} for {name}", step)
         return estimates
 
     def _blame(self, observer: Observer, what: str, step: int, cause: Exception | None = None) -> NoReturn:

@@ -43,7 +43,8 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
         return math.atan2(y, x)
     # `np.arctan2` may take a vector instruction that rounds differently from the C library; the complex
     # logarithm takes its angle from the library.
-    return np.log(x + 1j * y).imag
+    with np.errstate(divide="ignore"):  # the logarithm of 0, whose angle is 0
+        return np.log(x + 1j * y).imag
 
 
 def sign(x: Scalar) -> Scalar:

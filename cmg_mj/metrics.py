@@ -92,7 +92,7 @@ class Metrics:
             self._fog_errors[name] += _sum_of_squares(rate - fog, counted)
         self._saturated += (counted & (np.abs(u) >= self._limit)).sum(axis=0)
         self._gimbal_peak = np.maximum(self._gimbal_peak, np.where(counted, np.abs(x3), 0.0).max(axis=0, initial=0.0))
-        outside = counted & (np.abs(x1) > self._band) & (tick * self._dt >= self._push_end - 1e-9)
+        outside = counted & (np.abs(x1) > self._band)
         self._last_outside = np.maximum(self._last_outside, np.where(outside, tick, -1).max(axis=0, initial=-1))
         self._last_tick = np.maximum(self._last_tick, np.where(counted, tick, -1).max(axis=0, initial=-1))
 

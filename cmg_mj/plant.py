@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass as plain_dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +16,9 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.controller import Angles, Controller, Feedback, Law
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.engine import control_callback, quiet
+from cmg_mj.errors import InputError
+from cmg_mj.mjcf import KEYFRAME, compile_model, lock_thrust_bearing, parse
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
@@ -27,7 +27,6 @@ from cmg_mj.tilt import RadialTilt
 
 NonNegative = Annotated[float, Field(ge=0.0)]
 Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
-KEYFRAME = "equilibrium"
 QUARTER_TURN = math.pi / 2.0
 UPRIGHT = math.cos(math.radians(30.0))  # sensors farther off than this are mounted otherwise, not inaccurately
 
@@ -110,10 +109,10 @@ class Plant:
         self.settings = settings
         self.path = path
         self.bias = math.radians(settings.equilibrium_bias_deg)
-        spec = _parse(path)
+        spec = parse(path)
         if settings.lock_thrust_bearing:
-            _lock(spec, path)
-        self.model = _compile(spec, path)
+            lock_thrust_bearing(spec, path)
+        self.model = compile_model(spec, path)
         self._resolve()
         self.reduced = self._read_reduced()
         self._vary()
@@ -322,7 +321,8 @@ class Plant:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""
         mujoco.mj_resetDataKeyframe(self.model, data, self.key)
         data.qpos[self.tilt] = self.tilt_zero - self.bias + math.radians(self.settings.initial_tilt_deg)
-        mujoco.mj_forward(self.model, data)
+        with control_callback(None):  # the first control tick is the first step's
+            mujoco.mj_forward(self.model, data)
 
     def new_data(self) -> mujoco.MjData:
         """Fresh simulation data at the scenario's initial state, accelerometers included."""
@@ -373,100 +373,6 @@ _INTEGRATORS = {
 }
 
 
-def _one_line(error: Exception) -> str:
-    """MuJoCo's message without what tells a user nothing."""
-    text = " ".join(str(error).split()).removeprefix("Error: ")
-    syntax = re.match(r"XML parse error .*Line number=(\d+)", text)
-    return f"XML syntax error at line {syntax[1]}" if syntax else re.sub(r" The static bodies .* remain so\.", "", text)
-
-
-def _parse(path: Path) -> mujoco.MjSpec:
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
-        raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
-    _require(spec, path)
-    return spec
-
-
-def _compile(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
-    try:
-        return spec.compile()
-    except ValueError as error:
-        raise InputError(f"{path}: does not compile: {_one_line(error)}") from error
-
-
-def _require(spec: mujoco.MjSpec, path: Path) -> None:
-    """A rig has certain joints, actuators, sensors and a keyframe, by name.
-
-    The compiler, which comes after this, would only say that the keyframe has the wrong size.
-    """
-    elements = {
-        "joint": {joint.name: joint for joint in spec.joints},
-        "actuator": {actuator.name: actuator for actuator in spec.actuators},
-        "sensor": {sensor.name: sensor for sensor in spec.sensors},
-        "keyframe": {key.name: key for key in spec.keys},
-    }
-
-    def get(kind: str, name: str) -> Any:
-        if name not in elements[kind]:
-            raise InputError(
-                f"{path}: the model has no {kind} {name!r}; {nearest(name, elements[kind], 'its ' + kind + 's')}"
-            )
-        return elements[kind][name]
-
-    def check(is_right: bool, what: str) -> None:
-        if not is_right:
-            raise InputError(f"{path}: {what}")
-
-    for joint in spec.joints:
-        check(bool(joint.name), f"the joint of body {joint.parent.name!r} has no name")
-        check(int(joint.type) == int(mujoco.mjtJoint.mjJNT_HINGE), f"joint {joint.name!r} must be a hinge")
-    axis = np.array(get("joint", "tilt").axis)
-    check(bool(axis[1] > 0.0 and axis[0] == axis[2] == 0.0), "joint 'tilt' must turn about y (axis=\"0 1 0\")")
-    suffixes = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
-    names = [name for kind in elements.values() for name in kind]
-    cubes = [name.rpartition("/")[0] for name in names if name.endswith(suffixes)]
-    for cube in dict.fromkeys(cubes or ["cube1"]):
-        for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
-            get("joint", f"{cube}/{name}")
-            drive = get("actuator", f"{cube}/{actuator}")
-            drives = drive.target == f"{cube}/{name}" and int(drive.trntype) == int(mujoco.mjtTrn.mjTRN_JOINT)
-            check(drives, f"actuator '{cube}/{actuator}' must drive the joint '{cube}/{name}'")
-        encoder = get("sensor", f"{cube}/gimbal_encoder")
-        is_one = int(encoder.type) == int(mujoco.mjtSensor.mjSENS_JOINTPOS) and encoder.objname == f"{cube}/gimbal"
-        check(is_one, f"sensor '{cube}/gimbal_encoder' must be the jointpos of '{cube}/gimbal'")
-    sensors = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
-    for name, kind in sensors.items():
-        is_one = int(get("sensor", name).type) == int(getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"))
-        check(is_one, f"sensor {name!r} must be of the kind {kind!r}")
-    get("keyframe", KEYFRAME)
-
-
-def _lock(spec: mujoco.MjSpec, path: Path) -> None:
-    """Take the yaw joint out, and its entry out of every keyframe."""
-    names = [joint.name for joint in spec.joints]
-    if "yaw" not in names:
-        raise InputError(f"plant.lock_thrust_bearing = true: {path} has no joint 'yaw' to lock")
-    index = names.index("yaw")
-    spec.delete(spec.joint("yaw"))
-    for key in spec.keys:  # which may leave its rates out, or have them wrong, of which the compiler speaks
-        key.qpos, key.qvel = (np.delete(values, [index] if len(values) else []) for values in (key.qpos, key.qvel))
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """No warnings from MuJoCo or numpy, nor MUJOCO_LOG.TXT in the current folder: what goes wrong is said otherwise."""
-    before, config = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
-    config.logto_console = config.logto_file = False
-    config.set()
-    try:
-        with np.errstate(all="ignore"):
-            yield
-    finally:
-        before.set()
-
-
 @quiet()
 def load_plant(settings: PlantSettings | None = None, beside: Path | None = None, **fields: object) -> Plant:
     """Load a rig.
@@ -483,4 +389,5 @@ def load_plant(settings: PlantSettings | None = None, beside: Path | None = None
         InputError: The file does not exist, does not compile, or lacks a joint, actuator, sensor or keyframe.
     """
     settings = settings or PlantSettings(**fields)  # type: ignore[arg-type]
-    return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside))
+    with control_callback(None):  # compiling a model runs it
+        return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside))

@@ -13,6 +13,7 @@ from typing import Any
 
 import tomli_w
 
+from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError
 from cmg_mj.report import plot_run
 from cmg_mj.scenario import Experiment, Scenario, prepare
@@ -211,7 +212,8 @@ def _write(folder: Path, files: Mapping[str, Callable[[Path], None]]) -> None:
     wrong = {}
     for name, write in files.items():
         try:
-            write(folder / name)
+            with quiet():
+                write(folder / name)
         except OSError as error:
             wrong[name] = error
     if wrong:

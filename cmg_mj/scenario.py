@@ -221,8 +221,10 @@ class Experiment:
         fields = TypeAdapter(Scenario).dump_python(self.scenario, mode="json", exclude_none=True)
         path = self.plant.path.resolve()
         fields["plant"]["model"] = path.name if path.parent == folder("models").resolve() else str(path)
-        fields["controller"]["gains"] = list(self.law.gains)
-        fields["controller"].pop("lqr", None)
+        controller = fields["controller"] | {"gains": list(self.law.gains), "lqr": None}
+        fields["controller"] = {
+            name: controller[name] for name in ControllerSettings.model_fields if controller[name] is not None
+        }
         fields["companions"] = self.scenario.companion_names()
         fields["observer"] = {"kind": self.scenario.observer.kind, **self._observer_parameters()}
         names = ("cmg_mj", "mujoco", "numpy", "scipy")

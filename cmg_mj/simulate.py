@@ -11,10 +11,11 @@ from typing import Any, Literal
 import numpy as np
 
 from cmg_mj.callback import installed
-from cmg_mj.controller import Controller
+from cmg_mj.controller import Controller, Tick
+from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.metrics import Metrics, MetricsSettings
-from cmg_mj.plant import Plant, quiet
+from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.rows import Rows
 from cmg_mj.timing import whole_steps
@@ -158,6 +159,8 @@ def simulate(
                 if native:
                     ticked = step % controller.beat == 0 and controller.update(step, rig.ideal(q, v, s))
                     if ticked and controller.tick is not None:
+                        if not single:
+                            _stop_blind(worlds, controller.tick, ends, step * timestep)
                         worlds.command(controller.tick.u)
                     worlds.advance(count)
                 else:
@@ -166,11 +169,6 @@ def simulate(
                 if ticked:
                     tick = controller.tick
                     assert tick is not None
-                    if not single and not np.isfinite(tick.estimates[0][1]).all():
-                        blind = ~np.isfinite(tick.estimates[0][1]) & worlds.running
-                        for i in np.flatnonzero(blind):
-                            ends[i] = Outcome("stopped", step * timestep, f"{observers[0]} returned no finite x2")
-                        worlds.stop(blind)
                     completed = rows.add(q, v, tick, torque, None if single else worlds.running.copy())
                     if completed and on_progress:
                         on_progress((step + count) * timestep)
@@ -182,6 +180,18 @@ def simulate(
     outcomes = [end or Outcome("done", duration_s) for end in ends]
     summaries = [metrics.summary(i, outcome.kind != "done") for i, outcome in enumerate(outcomes)]
     return Result(outcomes, summaries, rows.trajectory(), max(o.time_s for o in outcomes))
+
+
+def _stop_blind(worlds: ManyWorlds, tick: Tick, ends: list[Outcome | None], time: float) -> None:
+    """Stop the worlds whose observer lost itself (in one world the controller raises)."""
+    estimate = tick.estimates[0]
+    blind = ~np.isfinite(estimate[0] + estimate[1] + estimate[2]) & worlds.running
+    if blind.any():
+        for i in np.flatnonzero(blind):
+            ends[i] = Outcome(
+                "stopped", time, f"the observer returned an estimate that is not finite at t = {time:g} s"
+            )
+        worlds.stop(blind)
 
 
 def _fallen(lean: float, time: float) -> Outcome:

@@ -275,8 +275,8 @@ def test_pushes(given: str, fragments: list[str]) -> None:
 
 
 @table(
-    ("an open string", "title = 'a", "not valid TOML: ", "(at line 1, column"),
-    ("an open bracket", "title = 'a'\n[plant", "not valid TOML: ", "at line 2"),
+    ("an open string", 'title = "a\nseed = 1', "not valid TOML: Illegal character '\\n' (at line 1, column 11)"),
+    ("an open bracket", "title = 'a'\n[plant\nmodel = 'x'", "not valid TOML: Expected ']'", "at line 2, column 7"),
     ("a field twice", "seed = 1\nseed = 2", "not valid TOML: Cannot overwrite a value"),
     ("a bare word", "title = a", "not valid TOML: ", "(at line 1, column 9)"),
     ("another encoding", "title = 'Stoß'".encode("latin-1"), "not valid TOML: not UTF-8 text (at byte 12)"),
@@ -649,9 +649,9 @@ def test_an_observer_for_one_world_among_many(quick: str, given: type, fragments
 
 
 @table(
-    ("raises", FailsLater, "observer FailsLater raised ZeroDivisionError: division by zero at t = 0.15 s"),
-    ("NaN", GivesNan, "observer GivesNan returned nan for x2 at t = 0.15 s"),
-    ("infinity", GivesInfinity, "observer GivesInfinity returned inf for x2 at t = 0.15 s"),
+    ("raises", FailsLater, "observer FailsLater raised ZeroDivisionError: division by zero at t = 0.15 s; "),
+    ("NaN", GivesNan, "observer GivesNan returned ", "nan", " at t = 0.15 s; "),
+    ("infinity", GivesInfinity, "observer GivesInfinity returned ", "inf", " at t = 0.15 s; "),
 )
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_an_observer_that_fails_in_a_run(given: type, fragments: list[str], driver: str) -> None:
@@ -662,7 +662,7 @@ def test_an_observer_that_fails_in_a_run(given: type, fragments: list[str], driv
     assert "stopped at 0.15 s" in said.out
     written, complaint = said.err.splitlines()
     assert written.startswith("Written to it. ")
-    assert complaint == f"cmg-mj: {fragments[0]}; what was recorded until then is in it"
+    assert_in_order(["cmg-mj: ", *fragments, "what was recorded until then is in it"], complaint)
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 30
     assert sorted(path.name for path in Path("it").iterdir()) == [
         "recording.rrd",

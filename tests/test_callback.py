@@ -179,7 +179,6 @@ def test_resetting_the_time_restarts_the_controller(integrator: str, steps: int)
     assert_restarts(integrator, steps)
 
 
-@pytest.mark.xfail(strict=True, reason="BUG: a reset after exactly one step is taken for a forward pass")
 @pytest.mark.parametrize("integrator", ["RK4", "Euler"])
 def test_resetting_after_the_very_first_step_restarts_the_controller(integrator: str) -> None:
     assert_restarts(integrator, 1)
@@ -292,7 +291,6 @@ def test_it_restores_what_was_there() -> None:
         assert mujoco.get_mjcb_control() is other_callback
 
 
-@pytest.mark.xfail(strict=True, raises=InputError, reason="BUG: compiling a model calls the installed callback")
 def test_a_rig_loads_while_a_callback_is_installed() -> None:
     with somebody_elses():
         load_plant()

@@ -400,7 +400,6 @@ def test_an_estimate_that_is_no_number_stops_the_run(value: float) -> None:
         ticks(of)
 
 
-@pytest.mark.xfail(strict=True, reason="BUG: only x2 is looked at; the law passes NaN on, MuJoCo then commands 0")
 @pytest.mark.parametrize("estimate", [Estimate(math.nan, 0.0, 0.0), Estimate(0.0, 0.0, math.nan)])
 def test_an_estimated_angle_that_is_no_number_stops_the_run(estimate: Estimate) -> None:
     """If the law uses the estimated angles."""

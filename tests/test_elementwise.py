@@ -85,7 +85,6 @@ def test_atan2_knows_all_quadrants(quarter: int) -> None:
         assert atan2(np.array([y]), np.array([x]))[0] == pytest.approx(angle, abs=1e-15)
 
 
-@pytest.mark.xfail(strict=True, raises=RuntimeWarning, reason="BUG: the array branch warns of a division by zero")
 def test_angle_of_the_origin_is_zero() -> None:
     """As the C library has it, and quietly: a rig in free fall shows no gravity."""
     assert atan2(0.0, 0.0) == 0.0

@@ -28,7 +28,20 @@ UPPER = [
     "trajectory",
     "metrics",
 ]
-LOWER = ["plant", "callback", "worlds", "rows", "simulate", "scenario", "recording", "report", "runs", "bench"]
+LOWER = [
+    "engine",
+    "mjcf",
+    "plant",
+    "callback",
+    "worlds",
+    "rows",
+    "simulate",
+    "scenario",
+    "recording",
+    "report",
+    "runs",
+    "bench",
+]
 LAST = ["cli"]
 """The rooms from top to bottom. One that is not named here lies between the lower rooms and the last."""
 

@@ -1,4 +1,4 @@
-"""What the acceptance tests run: the closed loop at 0.5 degrees of bias, and all observers riding along on the gyro's loop."""
+"""What the acceptance tests run: observers in the loop, and all of them riding along on the gyro's."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FALLING = ("luenberger",)
 GROUP = 20
 
 BAND = "metrics.settle_band_deg=2.0"
-"""Noise alone takes the tilt out of the default band of one degree now and then, which makes that settle time erratic."""
+"""Noise alone takes the tilt out of the default band of one degree now and then: that settle time is erratic."""
 
 
 @cache

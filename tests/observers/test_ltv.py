@@ -170,7 +170,7 @@ EXTREMES = [
     for q1, q2, q3, steps in (
         (1.0, 5e6, 1.0, 200),
         (1e-3, 1e-3, 1e-3, 200),
-        (1e-3, 1e12, 1e12, 25),
+        (1e-3, 1e12, 1e6, 25),
         (1e6, 1e-3, 1.0, 25),
         (1e6, 1e6, 1e6, 25),
         (1e6, 1e12, 1e-3, 25),
@@ -221,9 +221,6 @@ def test_riccati_matrix_is_exact_while_the_gimbal_stands(dt: float, weights: tup
         assert relative_errors(riccati_matrix(state), H) < 1e-8
 
 
-@pytest.mark.xfail(
-    strict=True, reason="BUG: the estimate's explicit Runge-Kutta step is unstable once H11 dt exceeds 2.8"
-)
 @pytest.mark.parametrize(
     ("dt", "weights"), [(0.005, (1e6, 5e6, 1.0)), (0.005, (1.0, 1e12, 1.0)), (0.1, (1.0, 5e6, 1.0))]
 )

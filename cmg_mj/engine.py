@@ -1,0 +1,33 @@
+"""MuJoCo's process-wide switches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import mujoco
+import numpy as np
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """No warnings from MuJoCo or numpy, nor MUJOCO_LOG.TXT in the current folder: what goes wrong is said otherwise."""
+    before, config = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    config.logto_console = config.logto_file = False
+    config.set()
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    finally:
+        before.set()
+
+
+@contextmanager
+def control_callback(callback: object | None) -> Iterator[None]:
+    """Have MuJoCo call this control callback (None: none), and the one before it again afterwards."""
+    before = mujoco.get_mjcb_control()
+    mujoco.set_mjcb_control(callback)
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_control(before)
