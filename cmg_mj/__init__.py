@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from cmg_mj.plant import Plant, PlantSettings, load_plant
     from cmg_mj.push import Push
     from cmg_mj.reduced import ReducedModel
-    from cmg_mj.scenario import Experiment, Scenario, load_scenario, parse_scenario, prepare
+    from cmg_mj.scenario import Experiment, load_scenario, parse_scenario, prepare
+    from cmg_mj.schema import Scenario
     from cmg_mj.sensors import Accelerometer, Encoder, Fog, Sensors
     from cmg_mj.simulate import Outcome, Result, simulate
     from cmg_mj.tilt import RadialTilt
@@ -31,7 +32,8 @@ _HOMES = {
     "plant": ("Plant", "PlantSettings", "load_plant"),
     "push": ("Push",),
     "reduced": ("ReducedModel",),
-    "scenario": ("Experiment", "Scenario", "load_scenario", "parse_scenario", "prepare"),
+    "scenario": ("Experiment", "load_scenario", "parse_scenario", "prepare"),
+    "schema": ("Scenario",),
     "sensors": ("Accelerometer", "Encoder", "Fog", "Sensors"),
     "simulate": ("Outcome", "Result", "simulate"),
     "tilt": ("RadialTilt",),

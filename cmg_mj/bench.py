@@ -13,7 +13,8 @@ from mujoco.batch import Batch
 from rich import box
 from rich.table import Table
 
-from cmg_mj.scenario import Experiment, Scenario, parse_scenario, prepare
+from cmg_mj.scenario import Experiment, parse_scenario, prepare
+from cmg_mj.schema import Scenario
 
 CONTROL_RATES_HZ = (200.0, 1000.0)
 BARS = {200.0: (1.5, 0.9), 1000.0: (3.0, 0.75)}

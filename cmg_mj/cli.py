@@ -17,7 +17,7 @@ import click
 from cmg_mj.errors import InputError, nearest
 
 if TYPE_CHECKING:
-    from cmg_mj.scenario import Scenario
+    from cmg_mj.schema import Scenario
 
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 
@@ -264,6 +264,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (InputError, click.ClickException) as error:
         _say(error.format_message() if isinstance(error, click.ClickException) else str(error))
         sys.exit(WRONG_INPUT)
+    except (KeyboardInterrupt, click.Abort):  # before or after a command
+        _say("interrupted")
+        sys.exit(INTERRUPTED)
     except OSError as error:
         with suppress(OSError):  # so that Python does not try again to write what it still has
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -198,7 +198,7 @@ def plot_run(path: Path, trajectory: Trajectory, title: str) -> None:
         axes.margins(x=0.0)
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=3, frameon=False, borderpad=0)
     figure.align_ylabels()
-    figure.suptitle(title, x=0.01, ha="left")
+    figure.suptitle(title, x=0.01, ha="left", parse_math=False)
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=110, format="png")
     plt.close(figure)

@@ -16,7 +16,8 @@ import tomli_w
 from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError
 from cmg_mj.report import plot_run
-from cmg_mj.scenario import Experiment, Scenario, prepare
+from cmg_mj.scenario import Experiment, prepare
+from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Outcome, Result
 from cmg_mj.trajectory import Trajectory, whole_file
 

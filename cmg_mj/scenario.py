@@ -10,119 +10,22 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, TypeAdapter, ValidationError, model_validator
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from cmg_mj.controller import TABLE_2_GAINS, Angles, Controller, Feedback, Law, lqr_gains
+from cmg_mj.controller import Controller, Law
 from cmg_mj.errors import InputError, complaint, fields_of, not_allowed, shown
-from cmg_mj.metrics import MetricsSettings
-from cmg_mj.observers import OBSERVERS, Measurement, Observer, make_observer
+from cmg_mj.observers import Measurement, Observer, make_observer
 from cmg_mj.observers.registry import observer_class
-from cmg_mj.plant import Plant, PlantSettings, load_plant
-from cmg_mj.push import Push
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.plant import Plant, load_plant
 from cmg_mj.resources import find, folder
-from cmg_mj.sensors import Sensors
+from cmg_mj.schema import ControllerSettings, ObserverSettings, Scenario
 from cmg_mj.simulate import Driver, Result, simulate
 from cmg_mj.timing import whole_steps
 from cmg_mj.trajectory import whole_file
-
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-FORBID = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class LqrSettings(BaseModel):
-    """Weights of the quadratic cost that the gains minimise."""
-
-    model_config = FORBID
-    state_cost: tuple[NonNegative, NonNegative, NonNegative, NonNegative]
-    """Weights of x1, x2, x3, x_e."""
-    input_cost: Positive = 1.0
-    """Weight of u."""
-
-
-class ControllerSettings(BaseModel):
-    """The control law."""
-
-    model_config = FORBID
-    rate_hz: Positive = 200.0
-    """Control ticks a second; divides the physics rate."""
-    gains: tuple[float, float, float, float] | None = None
-    """K_e on [x1, x2, x3, x_e]; Table 2's if neither gains nor lqr is given."""
-    lqr: LqrSettings | None = None
-    """Weights to solve for the gains instead."""
-    rate_limit_rad_s: Positive = 4.7
-    """Largest gimbal rate."""
-    feedback: Feedback = "observer"
-    """Which rate the law uses."""
-    angles: Angles = "measured"
-    """Whether the law uses the measured angles, as (8), or the estimated ones, as the text after (10)."""
-
-    @model_validator(mode="after")
-    def _one_source_of_gains(self) -> ControllerSettings:
-        if self.gains is not None and self.lqr is not None:
-            raise ValueError("give either gains or lqr, not both")
-        return self
-
-    def law(self, model: ReducedModel) -> Law:
-        """The law for a reduced model."""
-        gains = self.gains or TABLE_2_GAINS
-        if self.lqr is not None:
-            gains = lqr_gains(model, self.lqr.state_cost, self.lqr.input_cost)
-        return Law(1.0 / self.rate_hz, tuple(gains), self.rate_limit_rad_s)  # type: ignore[arg-type]
-
-
-class ObserverSettings(BaseModel):
-    """An observer by name or dotted path, and its parameters, which the observer itself checks."""
-
-    model_config = ConfigDict(extra="allow", frozen=True)
-    kind: str = "homogeneous"
-    """A name that `cmg-mj list observers` shows, or package.module:Class."""
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """What was given besides the kind."""
-        return dict(self.__pydantic_extra__ or {})
-
-    def make(self, dt: float, model: ReducedModel) -> Observer:
-        """Construct the observer."""
-        return make_observer(self.kind, dt, model, **self.parameters)
-
-
-class Scenario(BaseModel):
-    """One experiment."""
-
-    model_config = FORBID
-    title: str = ""
-    duration_s: Positive = 15.0
-    seed: Annotated[int, Field(ge=0)] = 0
-    plant: PlantSettings = Field(default_factory=PlantSettings)
-    controller: ControllerSettings = Field(default_factory=ControllerSettings)
-    observer: ObserverSettings = Field(default_factory=ObserverSettings)
-    companions: list[str] | Literal["all"] = Field(default_factory=list)
-    """Observers that ride along open loop, with their default parameters."""
-    sensors: Sensors = Field(default_factory=Sensors)
-    push: list[Push] = Field(default_factory=list)
-    metrics: MetricsSettings = Field(default_factory=MetricsSettings)
-    versions: dict[str, str] = Field(default_factory=dict)
-    """Written by a run, not read."""
-    _where: str = PrivateAttr("")
-    """What to call it in an error: the file, and what was changed in it."""
-
-    def with_observer(self, kind: str) -> Scenario:
-        """The same experiment with another observer in the loop; its own keeps the parameters given for it."""
-        if kind == self.observer.kind:
-            return self
-        return self.model_copy(update={"observer": ObserverSettings(kind=kind)})
-
-    def companion_names(self) -> list[str]:
-        """The companions, spelled out, without the observer itself."""
-        names = list(OBSERVERS) if self.companions == "all" else list(self.companions)
-        return [name for name in dict.fromkeys(names) if name != self.observer.kind]
 
 
 @dataclasses.dataclass(frozen=True)

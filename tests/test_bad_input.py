@@ -712,12 +712,13 @@ def test_a_plant_that_diverges(command: str, given: str, fragments: list[str]) -
 @pytest.mark.parametrize("name", ["scenario.toml", "summary.json", "trajectory.parquet", "recording.rrd", "plot.png"])
 def test_a_file_that_cannot_be_written_keeps_no_other_from_being(quick: str, name: str) -> None:
     (Path("it") / name / "in the way").mkdir(parents=True)
-    said = cmg_mj("run", quick, "--out", "it", "--plot", "--json")
+    plot = ["--plot"] if name == "plot.png" else []
+    said = cmg_mj("run", quick, "--out", "it", "--json", *plot)
     assert said.status == 2
     assert said.err == f"cmg-mj: it/{name}: cannot be written: Is a directory\n"
     assert said.out.startswith("{")  # the summary is not lost
     files = {path.name for path in Path("it").iterdir() if path.is_file()}
-    assert files == {"scenario.toml", "summary.json", "trajectory.parquet", "recording.rrd", "plot.png"} - {name}
+    assert files == {"scenario.toml", "summary.json", "trajectory.parquet", "recording.rrd"} - {name}
 
 
 class Removes(Mine):

@@ -36,6 +36,7 @@ LOWER = [
     "worlds",
     "rows",
     "simulate",
+    "schema",
     "scenario",
     "recording",
     "report",

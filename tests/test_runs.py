@@ -75,17 +75,17 @@ def own_model() -> list[str]:
     """A model of the user's, named relative to the scenario, that differs from the bundled one."""
     for name in ("scissored_pair.xml", "cube.xml"):
         write((folder("models") / name).read_text().replace('mass="0.35"', 'mass="0.45"'), f"rigs/{name}")
-    return [write("duration_s = 1.0\n[plant]\nmodel = '../rigs/scissored_pair.xml'", "scenarios/my.toml")]
+    return [write("duration_s = 0.4\n[plant]\nmodel = '../rigs/scissored_pair.xml'", "scenarios/my.toml")]
 
 
 KINDS: dict[str, Callable[[], list[str]]] = {
-    "a bundled scenario": lambda: ["push_recovery", "--seed", "3", "--set", "duration_s=2.2", "--observer", "ltv"],
+    "a bundled scenario": lambda: ["push_recovery", "--seed", "3", "--set", "duration_s=2.05", "--observer", "ltv"],
     "a user's model": own_model,
-    "a user's observer": lambda: [write(f"duration_s = 1.0\n[observer]\nkind = '{__name__}:Mine'\ngain = 0.4")],
-    "lqr": lambda: [write("duration_s = 1.0\n[controller]\nlqr.state_cost = [30, 1, 0.5, 0.1]\nlqr.input_cost = 0.3")],
-    "every observer": lambda: [write("duration_s = 1.0\ncompanions = 'all'\n[controller]\nfeedback = 'fog'")],
+    "a user's observer": lambda: [write(f"duration_s = 0.4\n[observer]\nkind = '{__name__}:Mine'\ngain = 0.4")],
+    "lqr": lambda: [write("duration_s = 0.4\n[controller]\nlqr.state_cost = [30, 1, 0.5, 0.1]\nlqr.input_cost = 0.3")],
+    "every observer": lambda: [write("duration_s = 0.4\ncompanions = 'all'\n[controller]\nfeedback = 'fog'")],
     "another grid": lambda: [
-        write("duration_s = 1.0\n[plant]\ntimestep_s = 0.0005\nmodel = 'single_gimbal'\nlock_thrust_bearing = true")
+        write("duration_s = 0.4\n[plant]\ntimestep_s = 0.0005\nmodel = 'single_gimbal'\nlock_thrust_bearing = true")
     ],
 }
 
@@ -157,7 +157,7 @@ def test_a_fall_is_a_result() -> None:
 
 
 def test_a_run_shorter_than_a_tick_has_one() -> None:
-    assert cmg_mj("run", write("duration_s = 0.001"), "--out", "it", "--plot").status == 0
+    assert cmg_mj("run", write("duration_s = 0.001"), "--out", "it").status == 0
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 1
 
 
@@ -184,7 +184,7 @@ def test_numbers_json_does_not_know() -> None:
 
 
 def test_a_comparison_of_one_world_equals_single_runs() -> None:
-    file = write("duration_s = 1.0\n[[push]]\nstart_s = 0.3\n[observer]\nkind = 'homogeneous'\nk1 = 30.0")
+    file = write("duration_s = 0.5\n[[push]]\nstart_s = 0.2\n[observer]\nkind = 'homogeneous'\nk1 = 30.0")
     mine = f"{__name__}:Mine"
     said = cmg_mj("compare", file, "--worlds", 1, "--observers", f"ltv,homogeneous,{mine}", "--json", "--out", "it")
     assert (said.status, said.err) == (0, "")
@@ -315,7 +315,7 @@ def test_ctrl_c_ends_a_comparison_with_the_observers_that_are_done() -> None:
     write(SOURCE, "pressing.py")
     file = write("duration_s = 3.0\n[controller]\nfeedback = 'truth'")
     said = cmg_mj_process(
-        "compare", file, "--observers", "linear,pressing:Interrupts,ltv", "--worlds", 2, "--out", "it", cwd=Path()
+        "compare", file, "--observers", "linear,pressing:Interrupts,ltv", "--worlds", 1, "--out", "it", cwd=Path()
     )
     assert said.status == 130, said
     assert said.err.splitlines()[-1] == "cmg-mj: interrupted; 1 of 3 observers are in it"
@@ -326,7 +326,9 @@ def test_ctrl_c_ends_a_comparison_with_the_observers_that_are_done() -> None:
 
 def test_ctrl_c_before_the_first_observer_is_done_leaves_no_files() -> None:
     write(SOURCE, "pressing.py")
-    said = cmg_mj_process("compare", write(LONG), "--observers", "pressing:Interrupts", "--out", "it", cwd=Path())
+    said = cmg_mj_process(
+        "compare", write(LONG), "--observers", "pressing:Interrupts", "--worlds", 1, "--out", "it", cwd=Path()
+    )
     assert (said.status, said.out) == (130, "")
     assert said.err == "cmg-mj: interrupted before the first observer was done; nothing was written\n"
     assert names("it") == []
