@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import math
 import platform
@@ -130,8 +131,7 @@ class Experiment:
         }
         fields["companions"] = self.scenario.companion_names()
         fields["observer"] = {"kind": self.scenario.observer.kind, **self._observer_parameters()}
-        names = ("cmg_mj", "mujoco", "numpy", "scipy")
-        fields["versions"] = {name: version(name) for name in names} | {"python": platform.python_version()}
+        fields["versions"] = _versions()
         return _plain(fields)
 
     def _observer_parameters(self) -> dict[str, Any]:
@@ -148,6 +148,13 @@ class Experiment:
         """Write the resolved scenario as TOML: running that file again gives the same run."""
         with whole_file(path) as temporary:
             temporary.write_text(tomli_w.dumps(self.resolved()))
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    """What a run depends on (read once: that takes longer than to simulate a second)."""
+    names = ("cmg_mj", "mujoco", "numpy", "scipy")
+    return {name: version(name) for name in names} | {"python": platform.python_version()}
 
 
 def _plain(value: Any) -> Any:

@@ -25,6 +25,7 @@ NUMBER = r"(-?[0-9][0-9.e+-]*)"
 TESTS = [
     "tests/test_controller.py",
     "tests/observers",
+    "tests/test_scenario.py",
     "tests/test_paper_mass_matrix.py",
     "tests/test_reduced_against_plant.py",
     "tests/acceptance",
