@@ -202,7 +202,7 @@ class Controller:
             y2 = y2 + share * angle
         y = Measurement(y1, y2)
         if self._states is None:
-            self._states = [observer.init(y) for observer in self._observers]
+            self._states = [self._start(observer, y, step) for observer in self._observers]
             estimates = [Estimate(y1, 0.0 * y1, y2)] * len(self._observers)
             self._x_e = 0.0 * y1
         else:
@@ -218,6 +218,26 @@ class Controller:
         self.tick = Tick(y1, y2, fog, u, x_e, estimates)
         return True
 
+    def _start(self, observer: Observer, y: Measurement, step: int) -> Any:
+        """An observer's first state."""
+        try:
+            return observer.init(y)
+        except (Exception, SystemExit) as error:  # a user's observer may fail in any way
+            self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
+
+    def _fits(self, x1: Scalar, x2: Scalar, x3: Scalar, y: Measurement) -> bool:
+        """Whether an estimate consists of floats (one world) or of arrays (n_worlds,)."""
+        if self._single:
+            return type(x1) is float and type(x2) is float and type(x3) is float
+        shape = y[0].shape
+        return all(getattr(x, "shape", None) == shape for x in (x1, x2, x3))
+
+    def _fitted(self, x1: Scalar, x2: Scalar, x3: Scalar, y: Measurement) -> Estimate:
+        """Make a user's estimate, which may be NumPy's numbers or the same for all worlds, consist of these."""
+        if self._single:
+            return Estimate(float(x1), float(x2), float(x3))
+        return Estimate(*(np.broadcast_to(np.asarray(x, dtype=float), y[0].shape) for x in (x1, x2, x3)))
+
     def _observe(self, y: Measurement, u: Scalar, step: int) -> list[Estimate]:
         """Advance every observer by one sample."""
         states, estimates = self._states, []
@@ -225,9 +245,10 @@ class Controller:
         for i, observer in enumerate(self._observers):
             try:
                 states[i], estimate = observer.step(states[i], y, u)
-                if self._single and type(estimate[1]) is not float:
-                    estimate = Estimate(*(float(part) for part in estimate[:3]))
-            except Exception as error:  # a user's observer may fail in any way
+                x1, x2, x3 = estimate[:3]
+                if not self._fits(x1, x2, x3, y):
+                    estimate = self._fitted(x1, x2, x3, y)
+            except (Exception, SystemExit) as error:  # a user's observer may fail in any way
                 self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
             estimates.append(estimate)
         if self._single:  # many worlds are judged one by one
@@ -238,5 +259,5 @@ class Controller:
                 self._blame(self.observer, f"returned {value} for {name}", step)
         return estimates
 
-    def _blame(self, observer: Observer, what: str, step: int, cause: Exception | None = None) -> NoReturn:
+    def _blame(self, observer: Observer, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
         raise RunStopped(f"observer {type(observer).__name__} {what} at t = {step * self.timestep:g} s") from cause

@@ -11,13 +11,13 @@ from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.controller import Angles, Controller, Feedback, Law
 from cmg_mj.elementwise import Scalar
 from cmg_mj.engine import control_callback, quiet
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, complaint
 from cmg_mj.mjcf import KEYFRAME, compile_model, lock_thrust_bearing, parse
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.reduced import ReducedModel
@@ -53,7 +53,7 @@ class PlantSettings:
     model: str = "scissored_pair.xml"
     equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 0.5
     initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 1.0
-    timestep_s: Annotated[float, Field(gt=0.0, le=0.1)] = 0.001
+    timestep_s: Annotated[float, Field(ge=1e-6, le=0.1)] = 0.001
     integrator: Integrator = "RK4"
     lock_thrust_bearing: bool = False
     gimbal_armature_kg_m2: NonNegative | None = None
@@ -386,8 +386,13 @@ def load_plant(settings: PlantSettings | None = None, beside: Path | None = None
         The compiled plant.
 
     Raises:
-        InputError: The file does not exist, does not compile, or lacks a joint, actuator, sensor or keyframe.
+        InputError: A field is unknown or not allowed; the file does not exist, does not compile, or lacks a joint,
+            actuator, sensor or keyframe.
     """
-    settings = settings or PlantSettings(**fields)  # type: ignore[arg-type]
+    if settings is None:
+        try:
+            settings = PlantSettings(**fields)  # type: ignore[arg-type]
+        except ValidationError as error:
+            raise InputError(f"plant.{complaint(PlantSettings, error.errors()[0], fields)}") from error
     with control_callback(None):  # compiling a model runs it
         return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside))

@@ -200,5 +200,5 @@ def _fallen(lean: float, time: float) -> Outcome:
     return Outcome(
         "stopped",
         time,
-        f"the plant diverged at t = {time:g} s: take a smaller plant.timestep_s or integrator RK4",
+        f"the plant diverged at t = {time:g} s: take a smaller plant.timestep_s, the integrator RK4 or a gentler push",
     )

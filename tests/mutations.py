@@ -30,6 +30,8 @@ TESTS = [
     "tests/test_reduced_against_plant.py",
     "tests/acceptance",
 ]
+WITHOUT = ["-k", "not test_defaults_are_those_of_the_papers"]
+"""The test that compares defaults with the papers' literals would catch everything, and say nothing of the effect."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ def caught_by(parameter: str, factor: float) -> str:
             shutil.copytree(ROOT / part, copy / part, ignore=shutil.ignore_patterns("__pycache__"))
         shutil.copy(ROOT / "pyproject.toml", copy)
         mutate(copy, parameter, factor)
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-o", "addopts=", *TESTS]
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-o", "addopts=", *WITHOUT, *TESTS]
         environment = os.environ | {"PYTHONPATH": str(copy)}
         output = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True).stdout
     failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", output, flags=re.MULTILINE)
@@ -132,7 +134,8 @@ def main() -> None:
         "# Which test catches which wrong parameter",
         "",
         "Each parameter multiplied in a copy of the sources, and the first test that then fails; a dash would be a",
-        "survivor. Written by `python tests/mutations.py`.",
+        "survivor. The test that merely compares the defaults with the papers' literals is left out.",
+        "Written by `python tests/mutations.py`.",
         "",
         "| parameter | times 0.8 | times 1.2 |",
         "|---|---|---|",

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, complaint, nearest
 from cmg_mj.observers.protocol import Observer
 from cmg_mj.reduced import ReducedModel
 
@@ -54,7 +54,7 @@ def observer_class(kind: str) -> type:
     return found
 
 
-def make_observer(kind: str, dt: float, model: ReducedModel, **parameters: Any) -> Observer:
+def make_observer(kind: str, dt: float, model: ReducedModel, /, **parameters: Any) -> Observer:
     """Construct an observer.
 
     Args:
@@ -78,11 +78,8 @@ def make_observer(kind: str, dt: float, model: ReducedModel, **parameters: Any) 
     try:
         return cls(dt=dt, model=model, **parameters)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(["observer", *(str(part) for part in first["loc"])])
-        given = "" if first["type"] == "value_error" else f" = {first['input']!r}"
-        message = first["msg"].removeprefix("Value error, ")
-        raise InputError(f"{where}{given}: {message} (observer {kind})") from error
+        clause = complaint(cls, error.errors()[0], parameters)
+        raise InputError(f"observer.{clause} (observer {kind})") from error
     except Exception as error:  # a user's own class may refuse its parameters in its own way
         raise InputError(f"observer {kind}: {type(error).__name__}: {error}") from error
 
