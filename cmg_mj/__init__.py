@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cmg_mj.scenario import Experiment, load_scenario, parse_scenario, prepare
     from cmg_mj.schema import Scenario
     from cmg_mj.sensors import Accelerometer, Encoder, Fog, Sensors
-    from cmg_mj.simulate import Outcome, Result, simulate
+    from cmg_mj.simulate import Outcome, Result
     from cmg_mj.tilt import RadialTilt
     from cmg_mj.trajectory import Trajectory
 
@@ -35,7 +35,7 @@ _HOMES = {
     "scenario": ("Experiment", "load_scenario", "parse_scenario", "prepare"),
     "schema": ("Scenario",),
     "sensors": ("Accelerometer", "Encoder", "Fog", "Sensors"),
-    "simulate": ("Outcome", "Result", "simulate"),
+    "simulate": ("Outcome", "Result"),
     "tilt": ("RadialTilt",),
     "trajectory": ("Trajectory",),
 }
@@ -72,7 +72,6 @@ __all__ = [
     "make_observer",
     "parse_scenario",
     "prepare",
-    "simulate",
 ]
 
 

@@ -10,6 +10,7 @@ import mujoco
 
 from cmg_mj.controller import Controller
 from cmg_mj.engine import control_callback
+from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.plant import Plant
 
 
@@ -27,18 +28,37 @@ def control(plant: Plant, controller: Controller, data: mujoco.MjData) -> bool:
 
     Returns:
         Whether a control tick was due.
+
+    Raises:
+        InputError: Steps at which something was due were left out.
+        RunStopped: The plant diverged, or an observer failed.
     """
     step = round(data.time / plant.model.opt.timestep)
     if step % controller.beat:
         return False
+    if controller.step is not None:
+        if step < controller.step:  # the simulation was reset
+            controller.reset()
+        elif step > controller.step + controller.beat:
+            raise InputError(
+                f"control() was last called at step {controller.step} and now at step {step}: call it at least every "
+                f"{controller.beat} physics steps, before the step"
+            )
+    if not math.isfinite(data.qpos[plant.tilt]):
+        raise RunStopped(f"the plant diverged at t = {data.time:g} s")
     sensordata = _first_readings(plant, data) if controller.tick is None else data.sensordata
     ideal = plant.ideal(data.qpos.tolist(), data.qvel.tolist(), sensordata.tolist())
     if not controller.update(step, ideal):
         return False
-    assert controller.tick is not None
-    for cube in plant.cubes:
-        data.ctrl[cube.servo] = cube.direction * controller.tick.u
+    _hold(plant, controller, data)
     return True
+
+
+def _hold(plant: Plant, controller: Controller, data: mujoco.MjData) -> None:
+    """Set the servos' commands to those of the last tick."""
+    if controller.tick is not None:
+        for cube in plant.cubes:
+            data.ctrl[cube.servo] = cube.direction * controller.tick.u
 
 
 def _first_readings(plant: Plant, data: mujoco.MjData):
@@ -57,6 +77,9 @@ class ControlCallback:
     same time as the first of the next step. Only the first call of a step is a sampling instant. Calls from
     `mj_forward` repeat an instant and change nothing. If time runs backwards (a reset), the controller starts afresh.
 
+    Every call sets all controls, the flywheels' nominal speeds too, because others (`mujoco.rollout`, a viewer) write
+    theirs between the calls.
+
     Args:
         plant: The rig.
         controller: Its controller.
@@ -71,30 +94,32 @@ class ControlCallback:
 
     def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Take the control decision if this call is the first at a sampling instant."""
-        h, t = model.opt.timestep, data.time
+        if self._is_instant(model.opt.timestep, data.time):
+            control(self.plant, self.controller, data)
+        _hold(self.plant, self.controller, data)
+        for cube in self.plant.cubes:
+            data.ctrl[cube.motor] = cube.speed
+
+    def _is_instant(self, h: float, t: float) -> bool:
+        """Whether a call at time t is the first of a step of length h, and not one of its later stages."""
         backwards = t < self._latest
         self._latest = t
         if self._instant is not None and not backwards:
             ahead = (t - self._instant) / h
-            if abs(ahead) < 0.25 and self._commands_stand(data):  # a repeated forward pass at this instant
+            if ahead < 0.25:  # a repeated forward pass at this instant
                 self._half_stages = 0
-                return
-            if 0.25 < ahead < 0.75:  # RK4's second and third stage
+                return False
+            if ahead < 0.75:  # RK4's second and third stage
                 self._half_stages += 1
-                return
-            if self._half_stages >= 2 and 0.75 < ahead < 1.25:  # RK4's fourth stage, before the next step's first
+                return False
+            if self._half_stages >= 2 and ahead < 1.25:  # RK4's fourth stage, before the next step's first
                 self._half_stages = 0
-                return
-        if backwards or t == self._instant:
+                return False
+        if backwards:
             self.controller.reset()
         self._half_stages = 0
         self._instant = t
-        control(self.plant, self.controller, data)
-
-    def _commands_stand(self, data: mujoco.MjData) -> bool:
-        """Whether the servos' commands are still those of the last tick; a reset to the same time takes them away."""
-        tick = self.controller.tick
-        return tick is None or all(data.ctrl[cube.servo] == cube.direction * tick.u for cube in self.plant.cubes)
+        return True
 
 
 @contextmanager

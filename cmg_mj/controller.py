@@ -98,6 +98,17 @@ class Tick(NamedTuple):
     """The observer's estimate, then those of the companions."""
 
 
+class _Lost:
+    """A companion that raised: nothing is known any more."""
+
+    def init(self, y: Measurement) -> None:
+        return None
+
+    def step(self, state: None, y: Measurement, u: Scalar) -> tuple[None, Estimate]:
+        nothing = math.nan + 0.0 * y[0]
+        return None, Estimate(nothing, nothing, nothing)
+
+
 class Controller:
     """Runs the sensors, the observer and the law, tick after tick.
 
@@ -151,7 +162,7 @@ class Controller:
         self.companions = dict(companions or {})
         self._single = isinstance(worlds, int)
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
-        self._observers = [observer, *self.companions.values()]
+        self._observers: list[Observer] = []
         # y2 = sum of share * encoder - offset: half the difference of the encoders of a scissored pair.
         self._shares = [direction / len(self.directions) for direction in self.directions]
         self._offset = sum(share * zero for share, zero in zip(self._shares, self.gimbal_zero, strict=True))
@@ -159,6 +170,7 @@ class Controller:
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
+        self._observers = [self.observer, *self.companions.values()]
         kinds = ("accelerometer", "encoder", "fog")
         sampled = [
             SampledSensor(
@@ -173,6 +185,8 @@ class Controller:
         self._states: list[Any] | None = None
         self._x_e: Scalar = 0.0
         self.tick: Tick | None = None
+        self.step: int | None = None
+        """The physics step of the last update."""
         self.beat = math.gcd(self.period, *(sensor.period for sensor in sampled))
         """Physics steps between the moments at which anything may be due."""
 
@@ -189,8 +203,9 @@ class Controller:
         Raises:
             RunStopped: An observer returned a number that is not finite.
         """
+        first, self.step = self.step is None, step
         for sensor in self._sampled:
-            if step % sensor.period == 0:
+            if step % sensor.period == 0 or first:  # a start between two samples still has something to show
                 sensor.sample(step, ideal)
         if step % self.period:
             return False
@@ -249,7 +264,11 @@ class Controller:
                 if not self._fits(x1, x2, x3, y):
                     estimate = self._fitted(x1, x2, x3, y)
             except (Exception, SystemExit) as error:  # a user's observer may fail in any way
-                self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
+                if i == 0:
+                    self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
+                # One that only rides along must not end the run: it is NaN from here on.
+                self._observers[i] = _Lost()
+                states[i], estimate = self._observers[i].step(None, y, u)
             estimates.append(estimate)
         if self._single:  # many worlds are judged one by one
             x1, x2, x3 = estimates[0][:3]

@@ -125,7 +125,7 @@ class Metrics:
             "velocity_rms_error_rad_s": rms(self._errors[loop]),
             "velocity_rms_error_fog_rad_s": rms(self._fog_errors[loop]),
             "tilt_rms_deg": None if tilt is None else math.degrees(tilt),
-            "gimbal_peak_deg": math.degrees(self._gimbal_peak[world]),
+            "gimbal_peak_deg": math.degrees(self._gimbal_peak[world]) if n else None,
             "command_rms_rad_s": rms(self._squares["command"]),
             "command_saturated_fraction": float(self._saturated[world] / n) if n else None,
             **({"companions": companions} if companions else {}),

@@ -202,7 +202,7 @@ def save_comparison(folder: Path, compared: Sequence[Compared]) -> None:
         {
             **trajectories,
             "summary.json": lambda path: _write_json(path, [entry.summary for entry in compared]),
-            "scenario.toml": compared[0].experiment.save,
+            "scenario.toml": _asked(compared).save,
             "recording.rrd": lambda path: _record(path, [(entry.experiment, entry.example) for entry in compared]),
         },
     )
@@ -222,6 +222,12 @@ def _write(folder: Path, files: Mapping[str, Callable[[Path], None]]) -> None:
             f"{folder / name}: cannot be written: {error.strerror or error}" for name, error in wrong.items()
         )
         raise InputError(why)
+
+
+def _asked(compared: Sequence[Compared]) -> Experiment:
+    """The experiment as it was asked for: with the scenario's own observer and its parameters, if it was compared."""
+    own = [entry.experiment for entry in compared if entry.experiment.scenario.observer.parameters]
+    return (own or [compared[0].experiment])[0]
 
 
 def file_names(kinds: Sequence[str]) -> list[str]:

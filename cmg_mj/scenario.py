@@ -72,7 +72,7 @@ class Experiment:
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
         """Run one world. Options are those of `simulate`."""
-        return self._simulate(self.plant, self.controller(world), driver=driver, **options)
+        return self._simulate(self.plant, self.controller(int(world)), driver=driver, **options)
 
     def run_many(self, worlds: int | Sequence[int], plants: Sequence[Plant] | None = None, **options: Any) -> Result:
         """Run many worlds at once.
@@ -84,9 +84,20 @@ class Experiment:
 
         Returns:
             The result of all worlds.
+
+        Raises:
+            InputError: There is no world, or the plants do not fit the worlds or each other.
         """
-        numbers = range(worlds) if isinstance(worlds, int) else worlds
-        return self._simulate(list(plants or [self.plant] * len(numbers)), self.controller(list(numbers)), **options)
+        numbers = [int(number) for number in (range(worlds) if isinstance(worlds, int) else worlds)]
+        rigs = [self.plant] * len(numbers) if plants is None else list(plants)
+        if not numbers or len(rigs) != len(numbers):
+            raise InputError(
+                f"run_many: {len(numbers)} worlds and {len(rigs)} plants; give at least one, and as many of each"
+            )
+        alike = {(rig.model.opt.timestep, int(rig.model.opt.integrator), *rig.joint_names) for rig in set(rigs)}
+        if len(alike) > 1:
+            raise InputError("run_many: the plants must have the same joints, timestep_s and integrator")
+        return self._simulate(rigs, self.controller(numbers), **options)
 
     def _simulate(self, plant: Plant | Sequence[Plant], controller: Controller, **options: Any) -> Result:
         scenario = self.scenario

@@ -12,6 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from mujoco import rollout
 
 from cmg_mj.callback import control, installed
 from cmg_mj.controller import Controller
@@ -20,6 +21,7 @@ from cmg_mj.observers import OBSERVERS, Estimate, Measurement
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.sensors import Accelerometer, Sensors
 from cmg_mj.trajectory import Trajectory
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1")
@@ -194,7 +196,11 @@ def assert_restarts(integrator: str, steps: int) -> None:
         loop.rows = []
         for _ in loop.steps():
             loop.step()
-    assert_same_run(loop.rows, native(settings))
+    # After a single call, the tick at t = 0 still stands: it is the one a restarted controller would take again.
+    whole = native(settings)
+    taken = len(loop.rows)
+    assert taken >= len(whole) - 1
+    assert_same_run(loop.rows, Trajectory({name: values[-taken:] for name, values in whole.columns.items()}))
 
 
 # --- how often -----------------------------------------------------------------------------------------
@@ -338,3 +344,47 @@ def test_commands_reach_the_servos_in_their_directions() -> None:
         u = loop.controller.tick.u
         assert loop.data.ctrl[plant.servos].tolist() == [u, -u]
         assert loop.data.ctrl[[cube.motor for cube in plant.cubes]].tolist() == [314.0, -314.0]
+
+
+def test_rollout_runs_the_callback() -> None:
+    """mujoco.rollout writes zeros into the controls between the calls."""
+    plant = load_plant()
+    full = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    start = np.zeros(mujoco.mj_stateSize(plant.model, full))
+    mujoco.mj_getState(plant.model, plant.new_data(), start, full)
+    with installed(plant, plant.controller("ltv")):
+        states, _ = rollout.rollout(plant.model, mujoco.MjData(plant.model), start[None], nstep=2000)
+    lean = states[0, :, 1 + plant.tilt] - plant.tilt_zero  # after the time
+    assert np.abs(np.degrees(lean)).max() < 3.0
+    assert np.abs(states[0, -1, 1 + plant.model.nq + plant.cubes[0].flywheel] - plant.cubes[0].speed) < 1.0
+
+
+def test_leaving_steps_out_is_said() -> None:
+    plant = load_plant()
+    controller, data = plant.controller("linear"), plant.new_data()
+    for _ in range(5):  # steps 0, 2, 4, 6, 8: step 5 is left out
+        control(plant, controller, data)
+        mujoco.mj_step(plant.model, data, 2)
+    with pytest.raises(InputError, match="call it at least every 5 physics steps"):
+        control(plant, controller, data)
+
+
+def test_a_reset_in_a_users_own_loop_restarts_the_controller() -> None:
+    plant = load_plant()
+    controller, data = plant.controller("linear", seed=4), plant.new_data()
+    ends = []
+    for _ in range(2):
+        plant.initialise(data)
+        for _ in range(60):
+            control(plant, controller, data)
+            mujoco.mj_step(plant.model, data)
+        ends.append(data.qpos.copy())
+    np.testing.assert_array_equal(*ends)
+
+
+def test_a_start_between_two_samples_of_a_slow_sensor() -> None:
+    plant = load_plant()
+    controller = plant.controller("linear", sensors=Sensors(accelerometer=Accelerometer(rate_hz=100.0)))
+    data = plant.new_data()
+    data.time = 0.005
+    assert control(plant, controller, data)

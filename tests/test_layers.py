@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -156,3 +157,17 @@ def test_upper_rooms_do_not_name_mujoco(room: str) -> None:
     """Not even inside a function."""
     named = [f"{path.name}:{line}" for path in files(room) for line, name in imports(path) if name.startswith("mujoco")]
     assert not named
+
+
+def test_public_names_are_what_they_say() -> None:
+    """In a fresh process, after everything has been imported: a submodule must not hide a name."""
+    code = "import cmg_mj, inspect; cmg_mj.prepare(cmg_mj.load_scenario('push_recovery')).run;"
+    code += "bad = [n for n in cmg_mj.__all__ if inspect.ismodule(getattr(cmg_mj, n))]; assert not bad, bad"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_documents_named_in_the_sources_exist() -> None:
+    root = PACKAGE.parent
+    for path in [*PACKAGE.rglob("*.py"), root / "README.md", *(root / "docs").glob("*.md")]:
+        for name in re.findall(r"docs/[\w/]+\.(?:md|py|png)", path.read_text(encoding="utf-8")):
+            assert (root / name).is_file(), f"{path.name} names {name}"

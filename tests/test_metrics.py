@@ -203,9 +203,7 @@ def test_worlds_do_not_mix() -> None:
 
 
 def test_a_run_without_a_tick_has_no_numbers() -> None:
-    found = metrics().summary(0, False)
-    assert found.pop("gimbal_peak_deg") == 0.0
-    assert set(found.values()) == {None}
+    assert set(metrics().summary(0, False).values()) == {None}
 
 
 def test_an_estimate_that_is_not_finite_gives_none_not_nan() -> None:

@@ -28,7 +28,7 @@ class LinearHighGain:
     Attributes:
         dt: Sample period [s].
         model: The reduced model (not used: this observer is model-free).
-        epsilon: The gain's inverse [s]. Default: tuned, docs/tuning.md.
+        epsilon: The gain's inverse [s]. Default: tuned, docs/assumptions.md.
         a1: First coefficient of s^2 + a1 s + a2. Default: sqrt(2), Butterworth poles.
         a2: Second coefficient.
     """

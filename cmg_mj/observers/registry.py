@@ -78,7 +78,7 @@ def make_observer(kind: str, dt: float, model: ReducedModel, /, **parameters: An
     try:
         return cls(dt=dt, model=model, **parameters)
     except ValidationError as error:
-        clause = complaint(cls, error.errors()[0], parameters)
+        clause = complaint(cls, error.errors()[0], {"dt": dt, "model": model, **parameters})
         raise InputError(f"observer.{clause} (observer {kind})") from error
     except Exception as error:  # a user's own class may refuse its parameters in its own way
         raise InputError(f"observer {kind}: {type(error).__name__}: {error}") from error

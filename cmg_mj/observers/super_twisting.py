@@ -33,7 +33,7 @@ class SuperTwisting:
     Attributes:
         dt: Sample period [s].
         model: The reduced model (not used: this observer is model-free).
-        L: Bound of the second derivative [rad/s^2]. Default: tuned, docs/tuning.md.
+        L: Bound of the second derivative [rad/s^2]. Default: tuned, docs/assumptions.md.
         l0: First gain. Default: Levant's 1.5.
         l1: Second gain. Default: Levant's 1.1.
     """

@@ -27,8 +27,6 @@ OBSERVERS: dict[str, Color] = {
     "ltv": (86, 180, 233),
     "linear": (0, 170, 120),
     "luenberger": (214, 120, 180),
-    "adaptive": (230, 175, 20),
-    "high_gain": (70, 110, 240),
     "finite_difference": (165, 110, 80),
     "super_twisting": (150, 115, 215),
     "linear_high_gain": (130, 185, 60),
