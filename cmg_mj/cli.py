@@ -17,6 +17,7 @@ import click
 from cmg_mj.errors import InputError, nearest
 
 if TYPE_CHECKING:
+    from cmg_mj.scenario import Experiment
     from cmg_mj.schema import Scenario
 
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
@@ -123,7 +124,7 @@ def run(
     chosen = _scenario(scenario, settings, seed, observer)
     experiment = prepare(chosen)
     kind = runs.file_name(chosen.observer.kind)
-    folder = _folder(out, f"{Path(scenario).stem}-{kind}-{chosen.seed}")
+    folder = _folder(out, f"{Path(scenario).stem}-{kind}-{chosen.seed}", experiment)
     with CtrlC() as ctrl_c:
         with _progress(chosen.title or scenario, chosen.duration_s, ctrl_c) as on_progress:
             result = experiment.run(driver=driver, on_progress=on_progress)  # type: ignore[arg-type]
@@ -182,7 +183,7 @@ def compare(
                 f"--observers {observers}; the others are compared with their default parameters"
             )
     experiments = runs.prepare_comparison(chosen, names)
-    folder = _folder(out, f"{Path(scenario).stem}-compare-{chosen.seed}")
+    folder = _folder(out, f"{Path(scenario).stem}-compare-{chosen.seed}", runs.asked_for(experiments))
     with CtrlC() as ctrl_c:
         with _progress(f"{chosen.title or scenario}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
             compared = runs.compare(experiments, worlds, on_progress)
@@ -324,12 +325,12 @@ def _scenario(name: str, settings: Sequence[str], seed: int | None, observer: st
     return scenario if seed is None else scenario.model_copy(update={"seed": seed})
 
 
-def _folder(out: str | None, default: str) -> Path:
-    from cmg_mj.runs import output_folder
+def _folder(out: str | None, default: str, experiment: Experiment) -> Path:
+    from cmg_mj.runs import output_folder, unused_folder
 
     if out == "":
         raise InputError("--out '': name a folder, . for the current one")
-    return output_folder(Path("runs") / default if out is None else Path(out))
+    return output_folder(unused_folder(Path("runs"), default, experiment) if out is None else Path(out))
 
 
 def _names(observers: str) -> list[str]:

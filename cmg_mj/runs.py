@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import math
 import statistics
@@ -155,6 +156,28 @@ def output_folder(path: Path) -> Path:
     return path
 
 
+def unused_folder(parent: Path, name: str, experiment: Experiment) -> Path:
+    """A folder that no other run has written: the name itself, or with a number behind it.
+
+    The same run again goes to the same folder.
+
+    Args:
+        parent: Where the folders are.
+        name: The name wanted.
+        experiment: What will be written there.
+
+    Returns:
+        The folder, which need not exist yet.
+    """
+    text = tomli_w.dumps(experiment.resolved())
+    for number in itertools.count(1):
+        folder = parent / (name if number == 1 else f"{name}-{number}")
+        scenario = folder / "scenario.toml"
+        if not folder.exists() or (scenario.is_file() and scenario.read_text(encoding="utf-8") == text):
+            return folder
+    raise AssertionError("count() does not end")
+
+
 def save_run(folder: Path, experiment: Experiment, result: Result, *, plot: bool = False) -> None:
     """Write scenario.toml, summary.json, trajectory.parquet and recording.rrd, each whole or not at all.
 
@@ -202,14 +225,18 @@ def save_comparison(folder: Path, compared: Sequence[Compared]) -> None:
         {
             **trajectories,
             "summary.json": lambda path: _write_json(path, [entry.summary for entry in compared]),
-            "scenario.toml": _asked(compared).save,
+            "scenario.toml": asked_for([entry.experiment for entry in compared]).save,
             "recording.rrd": lambda path: _record(path, [(entry.experiment, entry.example) for entry in compared]),
         },
     )
 
 
 def _write(folder: Path, files: Mapping[str, Callable[[Path], None]]) -> None:
-    """Write every file that can be written, then complain of those that cannot."""
+    """Write every file that can be written, then complain of those that cannot. What an earlier run left goes first."""
+    for pattern in ("trajectory*.parquet", "recording.rrd", "summary.json", "plot.png"):
+        for stale in folder.glob(pattern):
+            if stale.is_file():
+                stale.unlink()
     wrong = {}
     for name, write in files.items():
         try:
@@ -224,10 +251,9 @@ def _write(folder: Path, files: Mapping[str, Callable[[Path], None]]) -> None:
         raise InputError(why)
 
 
-def _asked(compared: Sequence[Compared]) -> Experiment:
-    """The experiment as it was asked for: with the scenario's own observer and its parameters, if it was compared."""
-    own = [entry.experiment for entry in compared if entry.experiment.scenario.observer.parameters]
-    return (own or [compared[0].experiment])[0]
+def asked_for(experiments: Sequence[Experiment]) -> Experiment:
+    """Of those that are compared, the one with the scenario's own observer and its parameters, if it is there."""
+    return next((experiment for experiment in experiments if experiment.scenario.observer.parameters), experiments[0])
 
 
 def file_names(kinds: Sequence[str]) -> list[str]:

@@ -126,6 +126,8 @@ def caught_by(parameter: str, factor: float) -> str:
 
 def main() -> None:
     """Run all mutations and write the table."""
+    if (failed := caught_by(MUTATIONS[0].parameter, 1.0)) != "-":
+        sys.exit(f"{failed} fails without any mutation: mend that first")
     parameters = [m.parameter for m in MUTATIONS] + [f"reduced: {name}" for name in REDUCED]
     with ThreadPoolExecutor(2) as pool:
         found = {(p, f): pool.submit(caught_by, p, f) for p in parameters for f in FACTORS}

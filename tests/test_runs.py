@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from rerun.chunk import RrdReader
 
-from cmg_mj import Estimate, Measurement, load_scenario, prepare, runs
+from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare, runs
 from cmg_mj.resources import folder
 from cmg_mj.simulate import Outcome
 from cmg_mj.trajectory import Trajectory
@@ -355,3 +355,12 @@ def test_ctrl_c_from_outside() -> None:
     assert 0 < len(trajectory) < 600 * 200
     verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", "it/recording.rrd"], capture_output=True)
     assert verified.returncode == 0, verified
+
+
+def test_another_run_does_not_take_the_folder_of_one_that_is_there() -> None:
+    first = prepare(parse_scenario({"duration_s": 0.05}))
+    other = prepare(parse_scenario({"duration_s": 0.05, "plant": {"equilibrium_bias_deg": 0.2}}))
+    folder = runs.output_folder(runs.unused_folder(Path("runs"), "mine", first))
+    runs.save_run(folder, first, first.run())
+    assert runs.unused_folder(Path("runs"), "mine", first) == folder
+    assert runs.unused_folder(Path("runs"), "mine", other) == Path("runs/mine-2")
