@@ -120,7 +120,7 @@ def caught_by(parameter: str, factor: float) -> str:
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-o", "addopts=", *WITHOUT, *TESTS]
         environment = os.environ | {"PYTHONPATH": str(copy)}
         output = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True).stdout
-    failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", output, flags=re.MULTILINE)
+    failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", output, flags=re.MULTILINE)
     return f"`{failed[0].removeprefix('tests/')}`" if failed else "-"
 
 
