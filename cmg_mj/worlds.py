@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -14,26 +14,6 @@ from cmg_mj.plant import Plant
 
 Reading = tuple[Any, Any, Any]
 """Joint angles, joint rates, sensordata: lists of floats, or arrays (n, n_worlds)."""
-
-
-class Worlds(Protocol):
-    """Physics, one world or many."""
-
-    def read(self) -> Reading:
-        """Joint angles, joint rates and sensordata, each indexed by its address first."""
-        ...
-
-    def command(self, u: Scalar) -> None:
-        """Set the gimbal rate until the next command."""
-        ...
-
-    def push(self, torque: float) -> None:
-        """Set the torque on the frame until the next push."""
-        ...
-
-    def advance(self, steps: int) -> None:
-        """Take physics steps."""
-        ...
 
 
 class OneWorld:
