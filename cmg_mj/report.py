@@ -1,4 +1,4 @@
-"""Tables and lists for the terminal, and plots. No other part of the package imports matplotlib."""
+"""Tables and lists for the terminal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import inspect
 import sys
 import textwrap
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from rich.table import Table
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.resources import bundled
 from cmg_mj.scenario import Experiment, load_scenario
-from cmg_mj.trajectory import Trajectory, whole_file
 
 COLUMNS = (
     ("velocity_rms_error_rad_s", "velocity\nRMS error\n[rad/s]", "{:.4f}"),
@@ -150,55 +148,3 @@ def _number(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(_number(item) for item in value)}]"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def plot_run(path: Path, trajectory: Trajectory, title: str) -> None:
-    """Plot a run as aranovskiy2020's Figs 4 to 7 do: tilt, tilt rate with a panel an observer, gimbal angle, command.
-
-    Args:
-        path: The PNG to write.
-        trajectory: One world.
-        title: Above the plot.
-    """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    t = trajectory["time_s"]
-    n = len(trajectory.observers)
-    figure, panels = plt.subplots(3 + n, 1, sharex=True, figsize=(9.0, 7.5 + 1.75 * n), layout="constrained")
-    tilt, *rates, gimbal, command = panels
-    tilt.plot(t, np.degrees(trajectory["y1_rad"]), color="0.7", linewidth=0.8, label="measured $y_1$")
-    tilt.plot(t, np.degrees(trajectory["x1_rad"]), color="C0", label="true $x_1$ (from equilibrium)")
-    tilt.set_ylabel("tilt [deg]")
-    fog = trajectory["fog_rad_s"]
-    low, high = (float(fog.min()), float(fog.max())) if len(fog) else (0.0, 0.0)
-    room = 0.75 * max(high - low, 0.05)  # an estimate may be far off, and would leave no room for the others
-    for i, (name, axes) in enumerate(zip(trajectory.observers, rates, strict=True)):
-        label = f"{name} $\\hat x_2$" + (", riding along" if i else "")
-        axes.plot(t, trajectory[f"estimate/{name}/x2_rad_s"], color=f"C{i + 1}", linewidth=0.8, label=label)
-        axes.plot(t, fog, color="0.15", linewidth=1.2, label="gyro")
-        axes.set_ylim(low - room, high + room)
-        axes.set_ylabel("tilt rate\n[rad/s]")
-    gimbal.plot(t, np.degrees(trajectory["x3_rad"]), color="C0", label="true $x_3$")
-    gimbal.set_ylabel("gimbal angle\n[deg]")
-    command.step(t, trajectory["u_rad_s"], where="post", color="C0", linewidth=0.8, label="$u$")
-    command.set_ylabel("gimbal rate\n[rad/s]")
-    command.set_xlabel("time [s]")
-    pushed = trajectory["push_n_m"] != 0.0
-    for axes in panels:
-        if pushed.any():
-            in_panel = axes.get_xaxis_transform()
-            style = {"color": "C3", "alpha": 0.25, "linewidth": 0, "zorder": 0}
-            axes.fill_between(
-                t, 0, 1, where=pushed, transform=in_panel, label="push" if axes is tilt else None, **style
-            )
-        axes.grid(alpha=0.3)
-        axes.margins(x=0.0)
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=3, frameon=False, borderpad=0)
-    figure.align_ylabels()
-    figure.suptitle(title, x=0.01, ha="left", parse_math=False)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=110, format="png")
-    plt.close(figure)

@@ -16,7 +16,7 @@ import tomli_w
 
 from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError
-from cmg_mj.report import plot_run
+from cmg_mj.plots import plot_run
 from cmg_mj.scenario import Experiment, prepare
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Outcome, Result

@@ -28,6 +28,7 @@ UPPER = [
     "controller",
     "trajectory",
     "metrics",
+    "picture",
 ]
 LOWER = [
     "engine",
@@ -41,13 +42,16 @@ LOWER = [
     "scenario",
     "recording",
     "report",
+    "plots",
     "runs",
     "bench",
+    "tuning",
+    "reproduce",
 ]
 LAST = ["cli"]
 """The rooms from top to bottom. One that is not named here lies between the lower rooms and the last."""
 
-HEAVY = {"rerun": "recording", "matplotlib": "report"}
+HEAVY = {"rerun": "recording", "matplotlib": "plots"}
 """Imported by one room each, because it costs time."""
 
 

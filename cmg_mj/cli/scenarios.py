@@ -1,0 +1,158 @@
+"""The commands that run scenarios, and those that say what there is."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from cmg_mj.cli.arguments import check_observer, folder_of, names_of, of_a_run, of_observers, scenario_of
+from cmg_mj.cli.terminal import INTERRUPTED, WRONG_INPUT, CtrlC, progress, say, say_written, show
+from cmg_mj.errors import InputError
+
+
+@click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
+@click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
+@of_a_run
+@click.option(
+    "--driver",
+    type=click.Choice(["native", "callback"]),
+    default="native",
+    show_default=True,
+    help="Who calls the controller: the runner, or MuJoCo through its control callback.",
+)
+@click.option("--plot", is_flag=True, help="Write plot.png as well.")
+def run(
+    scenario: str,
+    settings: tuple[str, ...],
+    seed: int | None,
+    out: str | None,
+    as_json: bool,
+    observer: str | None,
+    driver: str,
+    plot: bool,
+) -> None:
+    """Run a scenario and write a folder.
+
+    Its files: summary.json, trajectory.parquet, recording.rrd (a rerun recording), and scenario.toml, which has every
+    default written out and reruns to the same numbers.
+    """
+    from cmg_mj import report, runs
+    from cmg_mj.scenario import prepare
+
+    if observer is not None:
+        check_observer("--observer", observer)
+    chosen = scenario_of(scenario, settings, seed, observer)
+    experiment = prepare(chosen)
+    kind = runs.file_name(chosen.observer.kind)
+    folder = folder_of(out, f"{Path(scenario).stem}-{kind}-{chosen.seed}", experiment)
+    with CtrlC() as ctrl_c:
+        with progress(chosen.title or scenario, chosen.duration_s, ctrl_c) as on_progress:
+            result = experiment.run(driver=driver, on_progress=on_progress)  # type: ignore[arg-type]
+        summary = runs.summary_of(experiment, result)
+        try:
+            runs.save_run(folder, experiment, result, plot=plot)
+        finally:
+            show(summary, report.summary_table(summary), as_json)
+    if not as_json:
+        say_written(folder)
+    outcome = result.outcomes[0]
+    if outcome.kind == "stopped":
+        raise InputError(f"{outcome.reason}; what was recorded until then is in {folder}")
+    if outcome.kind == "interrupted":
+        say(f"interrupted at {outcome.time_s:g} s; what was recorded until then is in {folder}")
+        sys.exit(INTERRUPTED)
+    if ctrl_c.noted:
+        say(f"interrupted when all was done; it is in {folder}")
+        sys.exit(INTERRUPTED)
+
+
+@click.command(short_help="Run several observers on the same plant, pushes and noise.")
+@of_observers
+@of_a_run
+@click.option(
+    "--worlds",
+    type=click.IntRange(min=1),
+    default=20,
+    show_default=True,
+    metavar="N",
+    help="Runs an observer, each with noise of its own; all observers get the same.",
+)
+@click.option("--markdown", is_flag=True, help="Print the table as Markdown.")
+def compare(
+    scenario: str,
+    settings: tuple[str, ...],
+    seed: int | None,
+    out: str | None,
+    as_json: bool,
+    observers: str,
+    worlds: int,
+    markdown: bool,
+) -> None:
+    """Run several observers on the same plant, pushes and noise: one table, one recording.
+
+    The table has the means over the worlds that stood to the end; the recording has world 0 of every observer.
+    """
+    from cmg_mj import report, runs
+
+    names = names_of(observers)
+    chosen = scenario_of(scenario, settings, seed, None)
+    for setting in settings:
+        if setting.startswith("observer.") and chosen.observer.kind not in names:
+            raise InputError(
+                f"--set {setting}: is a setting of {chosen.observer.kind}, which is not among "
+                f"--observers {observers}; the others are compared with their default parameters"
+            )
+    experiments = runs.prepare_comparison(chosen, names)
+    folder = folder_of(out, f"{Path(scenario).stem}-compare-{chosen.seed}", runs.asked_for(experiments))
+    with CtrlC() as ctrl_c:
+        with progress(f"{chosen.title or scenario}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
+            compared = runs.compare(experiments, worlds, on_progress)
+        if not compared:
+            say("interrupted before the first observer was done; nothing was written")
+            sys.exit(INTERRUPTED)
+        summaries = [entry.summary for entry in compared]
+        try:
+            runs.save_comparison(folder, compared)
+        finally:
+            title = f"{chosen.title or scenario}: {worlds} worlds an observer, seed {chosen.seed}"
+            table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
+            show(summaries, table, as_json)
+    if not as_json:
+        say_written(folder)
+    for entry in compared:
+        if entry.stopped:
+            say(f"{entry.kind}: {len(entry.stopped)} of {worlds} worlds stopped: {entry.stopped[0].reason}")
+    if ctrl_c.noted or len(compared) < len(names):
+        say(f"interrupted; {len(compared)} of {len(names)} observers are in {folder}")
+        sys.exit(INTERRUPTED)
+    if any(entry.stopped for entry in compared):
+        sys.exit(WRONG_INPUT)
+
+
+@click.command("list", short_help="List the bundled scenarios and the observers.")
+@click.argument("what", type=click.Choice(["scenarios", "observers"]), required=False)
+def list_names(what: str | None) -> None:
+    """List the bundled scenarios and the observers.
+
+    An observer's parameters are shown with their defaults; change them with --set observer.NAME=VALUE.
+    """
+    from cmg_mj import report
+
+    if what in (None, "scenarios"):
+        click.echo(report.scenario_list())
+    if what is None:
+        click.echo()
+    if what in (None, "observers"):
+        click.echo(report.observer_list())
+
+
+@click.command(short_help="Check a scenario file without running it.")
+@click.argument("file")
+def check(file: str) -> None:
+    """Check a scenario file without running it, and say what it amounts to."""
+    from cmg_mj import report
+    from cmg_mj.scenario import load_scenario, prepare
+
+    click.echo(report.description(file, prepare(load_scenario(file))))

@@ -1,0 +1,115 @@
+"""What the commands say and draw on the terminal, and how they hear Ctrl-C."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+import click
+
+DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
+"""Exit statuses."""
+
+
+class OnProgress(Protocol):
+    """Moves a progress bar."""
+
+    def __call__(self, done: float, now: str | None = None) -> None:
+        """Show how much is done, and perhaps what is done now."""
+
+
+class CtrlC:
+    """Ctrl-C while something is run and written: the first is noted and acted on by `check`, the second acts at once.
+
+    So a run ends between two ticks, and a file that is being written is finished.
+
+    Attributes:
+        noted: Whether there was one.
+    """
+
+    def __init__(self) -> None:
+        self.noted = False
+        self._before: Any = None
+
+    def __enter__(self) -> CtrlC:
+        # Where Ctrl-C is not Python's own affair (another thread, a job in the background), nothing is changed.
+        if (
+            threading.current_thread() is threading.main_thread()
+            and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        ):
+            self._before = signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
+
+    def _note(self, *signal: Any) -> None:
+        if self.noted:
+            raise KeyboardInterrupt
+        self.noted = True
+
+    def check(self) -> None:
+        """Act on what was noted.
+
+        Raises:
+            KeyboardInterrupt: There was a Ctrl-C.
+        """
+        if self.noted:
+            raise KeyboardInterrupt
+
+
+def say(message: str) -> None:
+    """One line on standard error."""
+    click.echo(f"cmg-mj: {' '.join(message.split())}", err=True)
+
+
+def say_written(folder: Path) -> None:
+    """Where the files are, and how to open the recording."""
+    click.echo(f"Written to {folder}. Open the recording: rerun {folder / 'recording.rrd'}", err=True)
+
+
+def show(value: Any, table: Any, as_json: bool) -> None:
+    """A table, or text, as wide as the terminal allows and as it is where there is none; or the value as JSON."""
+    from rich.console import Console
+
+    if as_json or isinstance(table, str):
+        click.echo(json.dumps(value, indent=2) if as_json else table)
+        return
+    console = Console(markup=False, highlight=False)  # [rad/s] is a unit
+    if console.is_terminal:
+        console.print(table)
+        return
+    console = Console(markup=False, highlight=False, width=1000)
+    with console.capture() as captured:
+        console.print(table)
+    click.echo("\n".join(line.rstrip() for line in captured.get().splitlines()).strip("\n"))
+
+
+@contextmanager
+def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[OnProgress]:
+    """A progress bar on standard error, gone when done; silent when that is not a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(label, total=total)
+
+        def on_progress(done: float, now: str | None = None) -> None:
+            if ctrl_c is not None:
+                ctrl_c.check()
+            progress.update(task, completed=done, description=now)  # None leaves the description as it is
+
+        yield on_progress

@@ -1,0 +1,69 @@
+"""Every figure, table, remark and proof of the four papers, beside what this software obtains.
+
+One module a paper, each with its example plants and a list `STEPS`; `write.py` makes the report.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from cmg_mj.reproduce.claim import Claim, Step
+
+PAPERS = {
+    "aranovskiy2020": "Experimental comparison of velocity observers: a scissored pair control moment gyroscope case study",
+    "sokolov2019": "Experimental comparison of velocity estimators for a control moment gyroscope inverted pendulum",
+    "dao2023": "A design method of adaptive disturbance observer based on Friedland-Tacker equation",
+    "andrieu2009": "High gain observers with updated gain and homogeneous correction terms",
+}
+"""Paper -> its title."""
+
+
+@dataclass
+class Reproduced:
+    """What was obtained for one paper.
+
+    Attributes:
+        paper: Its short name.
+        claims: One a figure, table, remark, proof or statement.
+        complete: Whether all steps were done (not interrupted).
+    """
+
+    paper: str
+    claims: list[Claim] = field(default_factory=list)
+    complete: bool = False
+
+
+def steps_of(paper: str) -> list[Step]:
+    """The steps in which a paper is reproduced."""
+    return importlib.import_module(f"cmg_mj.reproduce.{paper}").STEPS
+
+
+def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) -> list[Reproduced]:
+    """Obtain every claim of the papers.
+
+    Args:
+        papers: Their short names, of `PAPERS`.
+        on_progress: Called now and then with what is being done and the share done.
+
+    Returns:
+        One entry a paper. If the user interrupted, what was obtained until then.
+    """
+    work = [(paper, step) for paper in papers for step in steps_of(paper)]
+    total = sum(step.seconds for _, step in work)
+    entries = {paper: Reproduced(paper) for paper in papers}
+    before = 0.0
+    try:
+        for paper, step in work:
+
+            def on_share(share: float, before: float = before, step: Step = step, paper: str = paper) -> None:
+                on_progress(f"{paper}: {step.title}", (before + share * step.seconds) / total)
+
+            on_share(0.0)
+            entries[paper].claims += step.run(on_share)
+            before += step.seconds
+            entries[paper].complete = step is steps_of(paper)[-1]
+    except KeyboardInterrupt:
+        pass
+    return list(entries.values())

@@ -1,0 +1,7 @@
+"""andrieu2009."""
+
+from __future__ import annotations
+
+from cmg_mj.reproduce.claim import Step
+
+STEPS: list[Step] = []

@@ -1,0 +1,90 @@
+"""The report: Markdown, plots, and the figures as JSON."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections import Counter
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from cmg_mj.plots import draw
+from cmg_mj.reproduce import PAPERS, Reproduced
+from cmg_mj.reproduce.claim import Claim
+from cmg_mj.trajectory import whole_file
+
+
+def figures_of(entries: Sequence[Reproduced]) -> dict[str, Any]:
+    """Everything but the pictures, as `--json` prints it."""
+    return {
+        "versions": {name: version(name) for name in ("cmg_mj", "mujoco", "numpy", "scipy")}
+        | {"python": platform.python_version()},
+        "papers": {
+            entry.paper: {"complete": entry.complete, "claims": [_plain(claim) for claim in entry.claims]}
+            for entry in entries
+        },
+    }
+
+
+def _plain(claim: Claim) -> dict[str, Any]:
+    return {
+        "place": claim.place,
+        "says": claim.says,
+        "found": claim.found,
+        "verdict": claim.verdict,
+        "why": claim.why,
+        "figures": dict(claim.figures),
+        "pictures": [f"{picture.name}.png" for picture in claim.pictures],
+    }
+
+
+def verdict_table(entries: Sequence[Reproduced]) -> str:
+    """Every claim and its verdict, as a Markdown table."""
+    lines = ["| paper | place | the paper says | verdict |", "|---|---|---|---|"]
+    for entry in entries:
+        for claim in entry.claims:
+            lines.append(f"| {entry.paper} | {claim.place} | {_cell(claim.says)} | {claim.verdict} |")
+    return "\n".join(lines)
+
+
+def report(entries: Sequence[Reproduced]) -> str:
+    """The whole report in Markdown."""
+    parts = ["# Four papers, reproduced", _count(entries), verdict_table(entries)]
+    for entry in entries:
+        parts.append(f"## {entry.paper}: {PAPERS[entry.paper]}")
+        if not entry.complete:
+            parts.append("**Interrupted: not all of this paper's claims are here.**")
+        for claim in entry.claims:
+            parts += [f"### {claim.place}: {claim.verdict}", f"**The paper:** {claim.says}", f"**Here:** {claim.found}"]
+            if claim.why:
+                parts.append(f"**{'Why not' if claim.verdict == 'not reproduced' else 'Conditions'}:** {claim.why}")
+            parts += [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]
+    return "\n\n".join(parts) + "\n"
+
+
+def _count(entries: Sequence[Reproduced]) -> str:
+    counts = Counter(claim.verdict for entry in entries for claim in entry.claims)
+    total = sum(counts.values())
+    return f"{total} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.most_common()) + "."
+
+
+def save(folder: Path, entries: Sequence[Reproduced]) -> None:
+    """Write report.md, figures.json and the plots, each whole or not at all.
+
+    Args:
+        folder: Where; it exists.
+        entries: What was obtained.
+    """
+    for entry in entries:
+        for claim in entry.claims:
+            for picture in claim.pictures:
+                draw(folder / f"{picture.name}.png", picture)
+    for name, text in (("figures.json", json.dumps(figures_of(entries), indent=2)), ("report.md", report(entries))):
+        with whole_file(folder / name) as temporary:
+            temporary.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
