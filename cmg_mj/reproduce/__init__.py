@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from cmg_mj.reproduce.claim import Claim, Step
 
 PAPERS = {
-    "aranovskiy2020": "Experimental comparison of velocity observers: a scissored pair control moment gyroscope case study",
+    "aranovskiy2020": "Experimental comparison of velocity observers: a scissored pair CMG case study",
     "sokolov2019": "Experimental comparison of velocity estimators for a control moment gyroscope inverted pendulum",
     "dao2023": "A design method of adaptive disturbance observer based on Friedland-Tacker equation",
     "andrieu2009": "High gain observers with updated gain and homogeneous correction terms",
