@@ -11,7 +11,7 @@ import numpy as np
 
 from cmg_mj.elementwise import Scalar, clip, where
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.observers.protocol import Estimate, Measurement, Observer
+from cmg_mj.observers.protocol import BIAS, Estimate, Measurement, Observer, extra_signals
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.sensors import Ideal, SampledSensor, Sensors, normals
 from cmg_mj.tilt import RadialTilt
@@ -94,19 +94,26 @@ class Tick(NamedTuple):
     fog: Scalar
     u: Scalar
     x_e: Scalar
-    estimates: Sequence[Estimate]
-    """The observer's estimate, then those of the companions."""
+    estimates: Sequence[Sequence[Scalar]]
+    """The observer's estimate (x1, x2, x3, its extra signals), then those of the companions."""
+
+
+def _estimate(parts: Sequence[Scalar]) -> Sequence[Scalar]:
+    """An estimate of x alone has its parts' names."""
+    return Estimate(*parts) if len(parts) == 3 else tuple(parts)
 
 
 class _Lost:
     """A companion that raised: nothing is known any more."""
 
+    def __init__(self, width: int) -> None:
+        self.width = width
+
     def init(self, y: Measurement) -> None:
         return None
 
-    def step(self, state: None, y: Measurement, u: Scalar) -> tuple[None, Estimate]:
-        nothing = math.nan + 0.0 * y[0]
-        return None, Estimate(nothing, nothing, nothing)
+    def step(self, state: None, y: Measurement, u: Scalar) -> tuple[None, Any]:
+        return None, _estimate((math.nan + 0.0 * y[0],) * self.width)
 
 
 class Controller:
@@ -127,9 +134,14 @@ class Controller:
         feedback: Which rate the law uses: the observer's, the gyro's or the true one.
         angles: Whether the law uses y1, y2 as (8) says or the estimates, as the text after (10) says.
         companions: Observers that ride along open loop, by name.
+        trim_s: For so long from the start, the integrator is held at the value that the observer's bias estimate asks
+            for, k_e1/k_e4 e, instead of finding it by integration [s].
+
+    Attributes:
+        extra_signals: Names of what the observer, then each companion, estimates beyond x.
 
     Raises:
-        InputError: A rate or latency does not fit the physics step.
+        InputError: A rate or latency does not fit the physics step, or there is no bias estimate to trim with.
     """
 
     def __init__(
@@ -147,6 +159,7 @@ class Controller:
         feedback: Feedback = "observer",
         angles: Angles = "measured",
         companions: Mapping[str, Observer] | None = None,
+        trim_s: float = 0.0,
     ) -> None:
         self.observer = observer
         self.law = law
@@ -163,10 +176,30 @@ class Controller:
         self._single = isinstance(worlds, int)
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         self._observers: list[Observer] = []
+        self.extra_signals = [extra_signals(o) for o in (observer, *self.companions.values())]
+        self._widths = [3 + len(names) for names in self.extra_signals]
+        self.trim_s = trim_s
+        self._prepare_trim()
         # y2 = sum of share * encoder - offset: half the difference of the encoders of a scissored pair.
         self._shares = [direction / len(self.directions) for direction in self.directions]
         self._offset = sum(share * zero for share, zero in zip(self._shares, self.gimbal_zero, strict=True))
         self.reset()
+
+    def _prepare_trim(self) -> None:
+        """Until which step the integrator is trimmed, with what gain on which part of the estimate."""
+        self._trimmed_until = 0
+        if not self.trim_s:
+            return
+        self._trimmed_until = whole_steps(self.trim_s, self.timestep, "controller.trim_s", f"{self.trim_s:g} s")
+        k1, _, _, k4 = self.law.gains
+        if BIAS not in self.extra_signals[0]:
+            raise InputError(
+                f"controller.trim_s = {self.trim_s:g}: needs an observer in the loop that estimates the bias, "
+                "such as adaptive"
+            )
+        if k4 == 0.0:
+            raise InputError(f"controller.trim_s = {self.trim_s:g}: the gain on the integrator is zero")
+        self._trim_part, self._trim_gain = 3 + self.extra_signals[0].index(BIAS), k1 / k4
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
@@ -218,7 +251,8 @@ class Controller:
         y = Measurement(y1, y2)
         if self._states is None:
             self._states = [self._start(observer, y, step) for observer in self._observers]
-            estimates = [Estimate(y1, 0.0 * y1, y2)] * len(self._observers)
+            zero = 0.0 * y1
+            estimates = [_estimate((y1, zero, y2, *[zero] * (width - 3))) for width in self._widths]
             self._x_e = 0.0 * y1
         else:
             assert self.tick is not None
@@ -229,6 +263,8 @@ class Controller:
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else ideal.rate
         x_e = self._x_e
+        if step < self._trimmed_until:
+            x_e = self._trim_gain * estimates[0][self._trim_part]
         u, self._x_e = self.law(x1, x2, x3, x_e)
         self.tick = Tick(y1, y2, fog, u, x_e, estimates)
         return True
@@ -240,42 +276,43 @@ class Controller:
         except (Exception, SystemExit) as error:  # a user's observer may fail in any way
             self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
 
-    def _fits(self, x1: Scalar, x2: Scalar, x3: Scalar, y: Measurement) -> bool:
-        """Whether an estimate consists of floats (one world) or of arrays (n_worlds,)."""
+    def _fits(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> bool:
+        """Whether an estimate has all its parts, floats (one world) or arrays (n_worlds,)."""
         if self._single:
-            return type(x1) is float and type(x2) is float and type(x3) is float
+            return list(map(type, estimate)) == [float] * width
         shape = y[0].shape
-        return all(getattr(x, "shape", None) == shape for x in (x1, x2, x3))
+        return len(estimate) == width and all(getattr(part, "shape", None) == shape for part in estimate)
 
-    def _fitted(self, x1: Scalar, x2: Scalar, x3: Scalar, y: Measurement) -> Estimate:
+    def _fitted(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> Sequence[Scalar]:
         """Make a user's estimate, which may be NumPy's numbers or the same for all worlds, consist of these."""
+        if len(estimate) < width:
+            raise ValueError(f"the estimate has {len(estimate)} parts, not {width}: x1, x2, x3 and the extra signals")
         if self._single:
-            return Estimate(float(x1), float(x2), float(x3))
-        return Estimate(*(np.broadcast_to(np.asarray(x, dtype=float), y[0].shape) for x in (x1, x2, x3)))
+            return _estimate([float(part) for part in estimate[:width]])
+        return _estimate([np.broadcast_to(np.asarray(part, dtype=float), y[0].shape) for part in estimate[:width]])
 
-    def _observe(self, y: Measurement, u: Scalar, step: int) -> list[Estimate]:
+    def _observe(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
         """Advance every observer by one sample."""
-        states, estimates = self._states, []
+        states = self._states
+        estimates: list[Sequence[Scalar]] = []
         assert states is not None
         for i, observer in enumerate(self._observers):
             try:
                 states[i], estimate = observer.step(states[i], y, u)
-                x1, x2, x3 = estimate[:3]
-                if not self._fits(x1, x2, x3, y):
-                    estimate = self._fitted(x1, x2, x3, y)
+                if not self._fits(estimate, self._widths[i], y):
+                    estimate = self._fitted(estimate, self._widths[i], y)
             except (Exception, SystemExit) as error:  # a user's observer may fail in any way
                 if i == 0:
                     self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
                 # One that only rides along must not end the run: it is NaN from here on.
-                self._observers[i] = _Lost()
+                self._observers[i] = _Lost(self._widths[i])
                 states[i], estimate = self._observers[i].step(None, y, u)
             estimates.append(estimate)
-        if self._single:  # many worlds are judged one by one
-            x1, x2, x3 = estimates[0][:3]
-            if 0.0 * (x1 + x2 + x3) != 0.0:  # NaN and infinity alike
-                named = zip(("x1", "x2", "x3"), (x1, x2, x3), strict=True)
-                name, value = next((n, v) for n, v in named if not math.isfinite(v))
-                self._blame(self.observer, f"returned {value} for {name}", step)
+        # Many worlds are judged one by one, elsewhere. NaN and infinity alike are not zero times themselves.
+        if self._single and 0.0 * sum(estimates[0]) != 0.0:
+            named = zip(("x1", "x2", "x3", *self.extra_signals[0]), estimates[0], strict=True)
+            name, value = next((n, v) for n, v in named if not math.isfinite(v))
+            self._blame(self.observer, f"returned {value} for {name}", step)
         return estimates
 
     def _blame(self, observer: Observer, what: str, step: int, cause: BaseException | None = None) -> NoReturn:

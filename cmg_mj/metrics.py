@@ -20,10 +20,12 @@ class MetricsSettings:
     Attributes:
         settle_band_deg: Settled is |x1| inside this band until the end [deg].
         fall_angle_deg: Fallen is |q_b + pi/4| beyond this angle [deg].
+        bias_from_s: A bias estimate is judged from this time on, when it has had time to converge [s].
     """
 
     settle_band_deg: Positive = 1.0
     fall_angle_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 30.0
+    bias_from_s: Annotated[float, Field(ge=0.0)] = 5.0
 
 
 class Metrics:
@@ -31,7 +33,7 @@ class Metrics:
 
     Args:
         observers: The observer in the loop, then the companions.
-        n_worlds: Worlds.
+        biases: What an observer of the bias should find in each world, (n_worlds,) [rad].
         dt: Control period [s].
         push_end_s: End of the last push, 0 without one [s].
         rate_limit: Largest gimbal rate [rad/s].
@@ -41,7 +43,7 @@ class Metrics:
     def __init__(
         self,
         observers: Sequence[str],
-        n_worlds: int,
+        biases: Sequence[float],
         dt: float,
         push_end_s: float,
         rate_limit: float,
@@ -52,6 +54,10 @@ class Metrics:
         self._push_end = push_end_s
         self._limit = rate_limit
         self._band = math.radians(settings.settle_band_deg)
+        n_worlds = len(biases)
+        self._biases = np.array(biases)
+        self._bias_from = settings.bias_from_s
+        self._bias_sums: dict[str, np.ndarray] = {}  # observer -> count, sum, squared error, (3, n_worlds)
         self._ticks = 0
         self._count = np.zeros(n_worlds)
         self._squares = {name: np.zeros(n_worlds) for name in ("tilt", "command")}
@@ -96,6 +102,33 @@ class Metrics:
         self._last_outside = np.maximum(self._last_outside, np.where(outside, tick, -1).max(axis=0, initial=-1))
         self._last_tick = np.maximum(self._last_tick, np.where(counted, tick, -1).max(axis=0, initial=-1))
 
+    def update_bias(self, x1: np.ndarray, biases: Sequence[np.ndarray | None]) -> None:
+        """Add the bias estimates of the ticks that `update` was just given.
+
+        Args:
+            x1: True tilt, (n_rows, n_worlds) [rad].
+            biases: Each observer's estimate of e, (n_rows, n_worlds) [rad]; None for one that has none.
+        """
+        tick = self._ticks - len(x1) + np.arange(len(x1))[:, None]
+        counted = np.isfinite(x1) & (tick * self._dt >= self._bias_from - 1e-9)
+        for name, bias in zip(self.observers, biases, strict=True):
+            if bias is not None:
+                sums = self._bias_sums.setdefault(name, np.zeros((3, len(self._biases))))
+                sums[0] += counted.sum(axis=0)
+                sums[1] += np.where(counted, bias, 0.0).sum(axis=0)
+                sums[2] += _sum_of_squares(bias - self._biases, counted)
+
+    def _bias_summary(self, name: str, world: int) -> dict[str, float | None]:
+        """What was to be found, the mean estimate and its RMS error; None for these if the run ended too early."""
+        if name not in self._bias_sums:
+            return {}
+        n, total, squares = self._bias_sums[name][:, world]
+        return {
+            "bias_deg": math.degrees(self._biases[world]),
+            "bias_estimate_deg": _number(math.degrees(total / n)) if n else None,
+            "bias_rms_error_deg": _number(math.degrees(math.sqrt(squares / n))) if n else None,
+        }
+
     def summary(self, world: int, fell: bool) -> dict[str, Any]:
         """The numbers of one world.
 
@@ -117,6 +150,7 @@ class Metrics:
             name: {
                 "velocity_rms_error_rad_s": rms(self._errors[name]),
                 "velocity_rms_error_fog_rad_s": rms(self._fog_errors[name]),
+                **self._bias_summary(name, world),
             }
             for name in self.observers[1:]
         }
@@ -128,6 +162,7 @@ class Metrics:
             "gimbal_peak_deg": math.degrees(self._gimbal_peak[world]) if n else None,
             "command_rms_rad_s": rms(self._squares["command"]),
             "command_saturated_fraction": float(self._saturated[world] / n) if n else None,
+            **self._bias_summary(loop, world),
             **({"companions": companions} if companions else {}),
         }
 

@@ -22,7 +22,7 @@ from cmg_mj.mjcf import KEYFRAME, compile_model, lock_thrust_bearing, parse
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
-from cmg_mj.sensors import Ideal, Sensors
+from cmg_mj.sensors import Accelerometer, Ideal, Sensors
 from cmg_mj.tilt import RadialTilt
 
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -278,6 +278,7 @@ class Plant:
         feedback: Feedback = "observer",
         angles: Angles = "measured",
         companions: Mapping[str, Observer] | None = None,
+        trim_s: float = 0.0,
         **parameters: Any,
     ) -> Controller:
         """A fresh controller for this rig.
@@ -291,6 +292,7 @@ class Plant:
             feedback: Which rate the law uses: the observer's, the gyro's (`fog`) or the true one (`truth`).
             angles: Whether the law uses the measured or the estimated angles.
             companions: Observers that ride along open loop, by name.
+            trim_s: For so long the integrator is held where the observer's bias estimate asks for it [s].
             **parameters: The observer's parameters, if it is given by name.
 
         Returns:
@@ -315,7 +317,22 @@ class Plant:
             feedback=feedback,
             angles=angles,
             companions=companions,
+            trim_s=trim_s,
         )
+
+    def apparent_bias(self, accelerometer: Accelerometer) -> float:
+        """What an observer of the bias should find: e less the tilt that the accelerometers' own bias makes.
+
+        With y1 = x1 - e + offset, the two cannot be told apart.
+
+        Args:
+            accelerometer: The sensors of the tilt.
+
+        Returns:
+            The bias at the equilibrium [rad].
+        """
+        gravity = float(np.linalg.norm(self.model.opt.gravity))
+        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.bias, gravity)
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""

@@ -29,6 +29,11 @@ COLUMNS = (
 )
 """Summary key, heading, format."""
 
+BIAS_LABELS = {
+    "bias_estimate_deg": "Estimated equilibrium bias, mean [deg]",
+    "bias_rms_error_deg": "  its RMS error [deg]",
+}
+
 LABELS = {
     "settle_time_s": "Settle time after the last push [s]",
     "velocity_rms_error_rad_s": "Velocity RMS error [rad/s]",
@@ -89,6 +94,9 @@ def summary_table(summary: Mapping[str, Any]) -> Table:
     table.add_row("Outcome", end)
     for key, label in LABELS.items():
         table.add_row(label, _cell(summary[key], "{:.1%}" if key.endswith("fraction") else "{:.4f}"))
+    for key, label in BIAS_LABELS.items():
+        if key in summary:
+            table.add_row(label, _cell(summary[key], "{:.4f}"))
     for name, errors in summary.get("companions", {}).items():
         table.add_row(f"Velocity RMS error of {name} [rad/s]", _cell(errors["velocity_rms_error_rad_s"], "{:.4f}"))
     return table

@@ -10,6 +10,7 @@ import numpy as np
 from cmg_mj.controller import Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.metrics import Metrics
+from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
 from cmg_mj.trajectory import Trajectory, column_names
 
@@ -23,6 +24,7 @@ class Rows:
     Args:
         plants: The rigs, one a world.
         observers: The observer in the loop, then the companions.
+        extras: What each of them estimates beyond x.
         metrics: Takes every piece.
         dt: Control period [s].
         keep: Whether to keep the pieces for a trajectory.
@@ -33,6 +35,7 @@ class Rows:
         self,
         plants: Sequence[Plant],
         observers: Sequence[str],
+        extras: Sequence[Sequence[str]],
         metrics: Metrics,
         dt: float,
         *,
@@ -41,7 +44,8 @@ class Rows:
     ) -> None:
         self._rig = plants[0]
         self._bias = np.array([plant.bias for plant in plants])
-        self._names = column_names(observers, self._rig.joint_names)
+        self._names = column_names(observers, extras, self._rig.joint_names)
+        self._bias_parts = [3 + list(names).index(BIAS) if BIAS in names else None for names in extras]
         self._metrics = metrics
         self._dt = dt
         self._keep = keep
@@ -87,7 +91,9 @@ class Rows:
         ended = None if self._single else ~np.array(runnings)
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)
-        self._metrics.update(x1, x2, x3, u, fog, [rate for _, rate, _ in estimated])
+        self._metrics.update(x1, x2, x3, u, fog, [parts[1] for parts in estimated])
+        biases = zip(self._bias_parts, estimated, strict=True)
+        self._metrics.update_bias(x1, [None if part is None else parts[part] for part, parts in biases])
         if self._keep:
             columns = [
                 x1,

@@ -20,6 +20,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from cmg_mj.controller import Controller, Law
 from cmg_mj.errors import InputError, complaint, fields_of, not_allowed, shown
 from cmg_mj.observers import Measurement, Observer, make_observer
+from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.registry import observer_class
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.resources import find, folder
@@ -67,6 +68,7 @@ class Experiment:
             worlds=worlds,
             feedback=scenario.controller.feedback,
             angles=scenario.controller.angles,
+            trim_s=scenario.controller.trim_s,
             companions={name: make_observer(name, dt, model) for name in scenario.companion_names()},
         )
 
@@ -299,6 +301,8 @@ def _check_times(scenario: Scenario) -> None:
     rates |= {f"sensors.{kind}.rate_hz": sensor.rate_hz for kind, sensor in sensors.items()}
     times = {"duration_s": scenario.duration_s}
     times |= {f"sensors.{kind}.latency_s": sensor.latency_s for kind, sensor in sensors.items()}
+    if scenario.controller.trim_s:
+        times["controller.trim_s"] = scenario.controller.trim_s
     for i, push in enumerate(scenario.push):
         times |= {f"push.{i}.start_s": push.start_s, f"push.{i}.duration_s": push.duration_s}
     for field, rate in rates.items():
@@ -355,18 +359,23 @@ def _rehearse(observer: Observer, worlds: int | None) -> None:
     u: Any = 0.1 if worlds is None else np.full(worlds, 0.1)
     call = "init(y)"
     try:
+        names = ("x1", "x2", "x3", *extra_signals(observer))
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    try:
         state = observer.init(sample(0.01))
         call = "step(state, y, u)"
         returned = observer.step(state, sample(0.011), u)
     except Exception as error:  # a user's observer may fail in any way
         raise InputError(f"{call} raised {type(error).__name__}: {error}{hint}") from error
     try:
-        _, (x1, x2, x3) = returned
+        _, estimate = returned
+        parts = list(zip(names, estimate, strict=True))
     except (TypeError, ValueError) as error:
         pair = isinstance(returned, tuple) and len(returned) == 2
         given = f"(state, {shown(returned[1])})" if pair else shown(returned)
-        raise InputError(f"{call} must return (state, (x1, x2, x3)), not {given}") from error
-    for name, value in (("x1", x1), ("x2", x2), ("x3", x3)):
+        raise InputError(f"{call} must return (state, ({', '.join(names)})), not {given}") from error
+    for name, value in parts:
         number = np.asarray(value)
         if number.dtype.kind not in "fiu" or number.shape != np.shape(u):
             wanted = "a number" if worlds is None else f"an array of {worlds} numbers"

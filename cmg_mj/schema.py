@@ -45,6 +45,8 @@ class ControllerSettings(BaseModel):
     """Which rate the law uses."""
     angles: Angles = "measured"
     """Whether the law uses the measured angles, as (8), or the estimated ones, as the text after (10)."""
+    trim_s: NonNegative = 0.0
+    """For so long from the start the integrator is held where the observer's bias estimate asks for it."""
 
     @model_validator(mode="after")
     def _one_source_of_gains(self) -> ControllerSettings:

@@ -66,12 +66,18 @@ class Accelerometer:
         """Standard deviation of one sample [m/s^2]."""
         return self.noise_density_ug_rthz * 1e-6 * STANDARD_GRAVITY * math.sqrt(self.rate_hz / 2.0)
 
+    @property
+    def bias(self) -> tuple[float, float]:
+        """Offsets of the tangential axes of the inner and the outer accelerometer [m/s^2]."""
+        inner, outer = (bias * 1e-3 * STANDARD_GRAVITY for bias in self.bias_mg)
+        return inner, outer
+
     def meter(self) -> Callable[[Ideal, Sequence[Scalar]], Sequence[Scalar]]:
         """A function (ideal reading, standard normals) -> reading: inner x, z, outer x, z [m/s^2]."""
         sigma = self.sigma
         limit = self.range_g * STANDARD_GRAVITY
         step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
-        inner, outer = (b * 1e-3 * STANDARD_GRAVITY for b in self.bias_mg)
+        inner, outer = self.bias
         bias = np.array([[inner], [0.0], [outer], [0.0]])
 
         def measure(ideal: Ideal, normal: Sequence[Scalar]) -> Sequence[Scalar]:

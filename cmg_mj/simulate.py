@@ -128,8 +128,9 @@ def simulate(
     fall = np.radians(settings.fall_angle_deg).item()
     push_end = max((push.end_s for push in pushes), default=0.0)
     dt = controller.law.dt
-    metrics = Metrics(observers, len(plants), dt, push_end, controller.law.rate_limit, settings)
-    rows = Rows(plants, observers, metrics, dt, keep=keep_trajectory, single=single)
+    biases = [rig.apparent_bias(controller.sensors.accelerometer) for rig in plants]
+    metrics = Metrics(observers, biases, dt, push_end, controller.law.rate_limit, settings)
+    rows = Rows(plants, observers, controller.extra_signals, metrics, dt, keep=keep_trajectory, single=single)
     ends: list[Outcome | None] = [None] * len(plants)
     native = driver == "native"
     torque = 0.0
@@ -185,7 +186,7 @@ def simulate(
 def _stop_blind(worlds: ManyWorlds, tick: Tick, ends: list[Outcome | None], time: float) -> None:
     """Stop the worlds whose observer lost itself (in one world the controller raises)."""
     estimate = tick.estimates[0]
-    blind = ~np.isfinite(estimate[0] + estimate[1] + estimate[2]) & worlds.running
+    blind = ~np.isfinite(sum(estimate)) & worlds.running
     if blind.any():
         for i in np.flatnonzero(blind):
             ends[i] = Outcome(

@@ -6,6 +6,7 @@ degrees of freedom", ICRA 2010 (reference [8] of aranovskiy2020).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, atan2
@@ -44,3 +45,18 @@ class RadialTilt:
         gravity_x = w_inner * inner_x - w_outer * outer_x
         gravity_z = w_inner * inner_z - w_outer * outer_z
         return atan2(-gravity_x, gravity_z)
+
+    def offset(self, tilt: float, bias: tuple[float, float], gravity: float) -> float:
+        """How far y1 is off, at rest, for a bias of the accelerometers' tangential axes.
+
+        Args:
+            tilt: The true tilt of the radial line [rad].
+            bias: Of the inner and the outer accelerometer [m/s^2].
+            gravity: [m/s^2].
+
+        Returns:
+            y1 less the tilt [rad].
+        """
+        x, z = -gravity * math.sin(tilt), gravity * math.cos(tilt)
+        inner, outer = bias
+        return self(x + inner, z, x + outer, z) - tilt

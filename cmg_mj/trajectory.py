@@ -28,14 +28,18 @@ SIGNALS = (
 """Columns of every trajectory after `time_s`: true state, measurements, gyro, command, integrator [rad s], push."""
 
 ESTIMATES = ("x1_rad", "x2_rad_s", "x3_rad")
-"""Columns of every observer, under `estimate/<observer>/`."""
+"""Columns of every observer, under `estimate/<observer>/`; what it estimates beyond x comes after them."""
 
 
-def column_names(observers: Sequence[str], joints: Sequence[str]) -> list[str]:
+def column_names(observers: Sequence[str], extras: Sequence[Sequence[str]], joints: Sequence[str]) -> list[str]:
     """Names of a trajectory's columns after `time_s`, in order."""
     return [
         *SIGNALS,
-        *(f"estimate/{observer}/{name}" for observer in observers for name in ESTIMATES),
+        *(
+            f"estimate/{observer}/{name}"
+            for observer, more in zip(observers, extras, strict=True)
+            for name in (*ESTIMATES, *more)
+        ),
         *(f"angle/{joint}_rad" for joint in joints),
         *(f"rate/{joint}_rad_s" for joint in joints),
     ]
@@ -66,6 +70,11 @@ class Trajectory:
         return [
             name.split("/")[1] for name in self.columns if name.startswith("estimate/") and name.endswith("/x2_rad_s")
         ]
+
+    def extra_signals(self, observer: str) -> list[str]:
+        """Names of what an observer estimates beyond x."""
+        names = [name.split("/")[2] for name in self.columns if name.startswith(f"estimate/{observer}/")]
+        return [name for name in names if name not in ESTIMATES]
 
     @property
     def joints(self) -> list[str]:

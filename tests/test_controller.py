@@ -278,10 +278,10 @@ def reading(tilt: float, gimbal: float, rate: float) -> Ideal:
     return Ideal((x, z, x, z), [math.pi / 2.0 + gimbal, math.pi / 2.0 - gimbal], rate)
 
 
-def controller(observer: Any, **options: Any) -> Controller:
+def controller(observer: Any, law: Law | None = None, **options: Any) -> Controller:
     return Controller(
         observer,
-        Law(DT),
+        law or Law(DT),
         RadialTilt(0.1, 0.3),
         IDEAL_SENSORS,
         directions=[1.0, -1.0],
@@ -358,6 +358,56 @@ def test_companions_see_the_same_and_change_nothing() -> None:
     assert companion.asked == observer.asked
     assert [tick.u for tick in together] == [tick.u for tick in alone]
     assert [tick.estimates[1].x2 for tick in together] == [0.0, -9.0, -18.0, -27.0]
+
+
+class WithBias(Script):
+    """One that estimates the bias and something else besides."""
+
+    extra_signals = ("torque_n_m", "bias_rad")
+
+
+def test_extra_signals_follow_the_state() -> None:
+    of = controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4 * k, 0.5 * k)))
+    assert of.extra_signals == [("torque_n_m", "bias_rad")]
+    assert [tuple(tick.estimates[0])[3:] for tick in ticks(of)] == [(0.0, 0.0), (0.4, 0.5), (0.8, 1.0), (0.4 * 3, 1.5)]
+
+
+def test_signals_that_are_not_declared_are_left_out() -> None:
+    found = ticks(controller(Script(lambda k: (0.1, 0.2, 0.3, 0.4))))
+    assert [tuple(tick.estimates[0]) for tick in found[1:]] == [(0.1, 0.2, 0.3)] * 3
+
+
+def test_a_declared_signal_that_is_missing_or_nan_stops_the_run() -> None:
+    with pytest.raises(RunStopped, match="has 4 parts, not 5"):
+        ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4))))
+    with pytest.raises(RunStopped, match="returned nan for bias_rad"):
+        ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, math.nan))))
+
+
+@pytest.mark.parametrize("names", ["bias_rad", ("x1_rad",), ("a", "a"), ("Bias",), (3,), ("a/b",)])
+def test_names_of_signals_are_checked(names: Any) -> None:
+    observer: Any = Script(ESTIMATES.__getitem__)
+    observer.extra_signals = names
+    with pytest.raises(ValueError, match="extra_signals must be a tuple of names"):
+        controller(observer)
+
+
+def test_trim_holds_the_integrator_where_the_bias_asks_for_it() -> None:
+    """u = 0 at y1 = -e needs k_e4 x_e = k_e1 e; from the end of the trim on, x_e' = -x3 as ever."""
+    found = ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, 0.01 * k)), trim_s=2.0 * DT))
+    expected = [0.0, 35.0 / 0.3 * 0.01]
+    expected += [expected[-1] - DT * found[1].y2, expected[-1] - DT * (found[1].y2 + found[2].y2)]
+    assert [tick.x_e for tick in found] == pytest.approx(expected, rel=1e-12)
+    assert -35.0 * -0.01 - 0.3 * found[1].x_e == pytest.approx(0.0, abs=1e-15)  # at rest at y1 = -e nothing is asked
+
+
+def test_trim_needs_a_bias_and_an_integrator() -> None:
+    with pytest.raises(
+        InputError, match=r"controller\.trim_s = 1: needs an observer in the loop that estimates the bias"
+    ):
+        controller(Script(ESTIMATES.__getitem__), trim_s=1.0)
+    with pytest.raises(InputError, match=r"controller\.trim_s = 1: the gain on the integrator is zero"):
+        controller(WithBias(ESTIMATES.__getitem__), trim_s=1.0, law=Law(DT, (35.0, 4.0, 1.0, 0.0)))
 
 
 def test_reset_starts_the_same_run_again() -> None:

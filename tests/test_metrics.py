@@ -18,7 +18,7 @@ SIGNALS = ("x1", "x2", "x3", "u", "fog")
 
 
 def metrics(n_worlds: int = 1, push_end_s: float = 0.0, observers: tuple = ("mine",), **settings: Any) -> Metrics:
-    return Metrics(observers, n_worlds, DT, push_end_s, 4.7, MetricsSettings(**settings))
+    return Metrics(observers, [0.0] * n_worlds, DT, push_end_s, 4.7, MetricsSettings(**settings))
 
 
 def rows(values: Any, n: int) -> np.ndarray:
@@ -215,3 +215,31 @@ def test_an_estimate_that_is_not_finite_gives_none_not_nan() -> None:
 
 def test_settings_are_those_of_the_documentation() -> None:
     assert (MetricsSettings().settle_band_deg, MetricsSettings().fall_angle_deg) == (1.0, 30.0)
+
+
+# --- the bias estimate ---------------------------------------------------------------------------------------
+
+
+def test_bias_is_judged_from_its_time_on() -> None:
+    """Far off at first, then 0.3 degrees above and below 1.1 in turn, with 1.0 to be found: RMS of 0.4 and -0.2."""
+    of = Metrics(("adaptive", "other"), [DEG], DT, 0.0, 4.7, MetricsSettings(bias_from_s=5.0))
+    bias = np.where(T < 5.0 - DT / 2.0, 90.0 * DEG, (1.1 + 0.3 * (-1.0) ** np.arange(len(T))) * DEG)
+    for part in np.array_split(np.arange(len(T)), 7):
+        n = len(part)
+        of.update(**{name: rows(0.0, n) for name in SIGNALS}, rates=[rows(0.0, n)] * 2)
+        of.update_bias(rows(0.0, n), [rows(bias[part], n), None])
+    found = of.summary(0, False)
+    assert found["bias_deg"] == pytest.approx(1.0)
+    assert found["bias_estimate_deg"] == pytest.approx(1.1, rel=1e-12)
+    assert found["bias_rms_error_deg"] == pytest.approx(math.sqrt((0.4**2 + 0.2**2) / 2.0), rel=1e-12)
+    assert "bias_deg" not in found["companions"]["other"]
+
+
+def test_a_run_that_ends_before_has_no_bias_figures() -> None:
+    of = metrics(bias_from_s=5.0)
+    of.update(**{name: rows(0.0, 100) for name in SIGNALS}, rates=[rows(0.0, 100)])
+    of.update_bias(rows(0.0, 100), [rows(0.1, 100)])
+    found = of.summary(0, False)
+    assert found["bias_estimate_deg"] is None
+    assert found["bias_rms_error_deg"] is None
+    assert found["bias_deg"] == 0.0

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.plant import Plant, load_plant
+from cmg_mj.sensors import Accelerometer
+from cmg_mj.tilt import RadialTilt
 from tests.full_model import states
 
 N_STATES = 1_000
@@ -105,3 +107,27 @@ def test_a_step_of_latency_costs_the_tilt_of_that_step() -> None:
     assert error.max() == pytest.approx(math.degrees(fastest * h), rel=0.02)
     assert alone.max() > 1.0
     assert np.abs(now[-1]) < math.radians(1.0)  # it did recover
+
+
+def test_offset_of_biased_accelerometers() -> None:
+    """At rest and upright: an outward bias b of either shifts the horizontal part of gravity by its weight times b."""
+    tilt, g = RadialTilt(0.06, 0.18), 9.81
+    weights = (1.5, -0.5)  # r_outer/(r_outer - r_inner), -r_inner/(...)
+    for bias in ((0.3, 0.0), (0.0, 0.3), (-0.2, 0.1)):
+        shift = weights[0] * bias[0] + weights[1] * bias[1]
+        assert tilt.offset(0.0, bias, g) == pytest.approx(-math.atan2(shift, g), rel=1e-12)
+    assert tilt.offset(0.2, (0.0, 0.0), g) == pytest.approx(0.0, abs=1e-16)
+    both = tilt.offset(0.1, (0.3, 0.3), g)  # alike on both: gravity turned, whatever the distances
+    assert both == pytest.approx(math.atan2(g * math.sin(0.1) - 0.3, g * math.cos(0.1)) - 0.1, rel=1e-12)
+
+
+@pytest.mark.parametrize("bias_mg", [(0.0, 0.0), (8.0, 0.0), (-3.0, 5.0)])
+def test_apparent_bias_is_what_the_tilt_at_rest_lacks(bias_mg: tuple[float, float]) -> None:
+    """At the equilibrium gravity pulls at zero; what y1 shows there is the apparent bias, turned round."""
+    plant = load_plant(equilibrium_bias_deg=0.8, initial_tilt_deg=0.0)
+    accelerometer = Accelerometer(noise_density_ug_rthz=0.0, bias_mg=bias_mg, counts_per_g=0.0)
+    data = plant.new_data()
+    ideal = plant.ideal(data.qpos.tolist(), data.qvel.tolist(), data.sensordata.tolist())
+    shown = plant.radial_tilt(*accelerometer.meter()(ideal, (0.0, 0.0, 0.0, 0.0)))
+
+    assert plant.apparent_bias(accelerometer) == pytest.approx(-shown, abs=1e-9)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple, Protocol
 
 from pydantic import ConfigDict, Field
@@ -40,6 +42,10 @@ class Observer(Protocol):
 
     The estimate at sample k uses y_k (a filter, not a one-step predictor) and the input u held since sample
     k-1. All memory is in the state, so that one observer value serves any number of runs and worlds.
+
+    An observer that estimates more than x names it in an attribute `extra_signals`, a tuple of names that end in
+    their unit, such as ("bias_rad",), and appends the values to its estimate in that order. `BIAS` among them is what
+    the summary judges and the controller can trim its integrator with.
     """
 
     def init(self, y: Measurement) -> Any:
@@ -55,6 +61,33 @@ class Observer(Protocol):
             u: The gimbal rate commanded at sample k-1 and held since [rad/s].
 
         Returns:
-            The state and the estimate at sample k.
+            The state and the estimate at sample k: (x1, x2, x3), and the extra signals if there are any.
         """
         ...
+
+
+BIAS = "bias_rad"
+"""The extra signal of an observer that estimates e, the equilibrium bias [rad]."""
+
+RESERVED = ("x1_rad", "x2_rad_s", "x3_rad")
+
+
+def extra_signals(observer: Observer) -> tuple[str, ...]:
+    """Names of what an observer estimates beyond x.
+
+    Args:
+        observer: Any observer.
+
+    Returns:
+        Its `extra_signals`; none if it has no such attribute.
+
+    Raises:
+        ValueError: They are not distinct lower-case names.
+    """
+    names: Sequence[Any] = getattr(observer, "extra_signals", ())
+    fits = isinstance(names, (tuple, list)) and all(
+        isinstance(name, str) and re.fullmatch("[a-z][a-z0-9_]*", name) and name not in RESERVED for name in names
+    )
+    if not fits or len(set(names)) < len(names):
+        raise ValueError(f"extra_signals must be a tuple of names like ('bias_rad',), each once, not {names!r}")
+    return tuple(names)

@@ -41,6 +41,8 @@ TILT_PLOTS = (
     Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 3.0, needs_legend=True),
     Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), 2.0, _LOW),
 )
+BIAS_PLOT = Plot("Estimated equilibrium bias [deg]", ("bias/",), 1.5, _LOW)
+"""Only where an observer estimates it."""
 ACTUATOR_PLOTS = (
     Plot("Command, gimbal rate [rad/s]", ("command/",), 3.0),
     Plot("Gimbal angles from upright [deg]", ("gimbal/",), 2.4, _LOW),
@@ -94,11 +96,13 @@ def default_blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint
 
 def _dashboard(plant: Plant, branch: Branch) -> rrb.Container:
     """Everything about one run."""
+    has_bias = any(path.startswith("bias/") for path in branch.series)
+    tilt = (*TILT_PLOTS, BIAS_PLOT) if has_bias else TILT_PLOTS
     rig = _rig(plant, branch, f"Rig (flywheels drawn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed)")
     return _three_columns(
         branch.run.name,
         rrb.Vertical(rig, _pages(), row_shares=[3, 2]),
-        _column(_phases([branch]), 1, [_plot(plot, branch) for plot in TILT_PLOTS], TILT_PLOTS),
+        _column(_phases([branch]), 1, [_plot(plot, branch) for plot in tilt], tilt),
         _column(None, 0, [_plot(plot, branch) for plot in ACTUATOR_PLOTS], ACTUATOR_PLOTS),
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 import rerun as rr
 
 from cmg_mj.metrics import MetricsSettings
+from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.recording.recorded import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Recorded, phases
@@ -30,10 +31,13 @@ OBSERVERS: dict[str, Color] = {
     "finite_difference": (165, 110, 80),
     "super_twisting": (150, 115, 215),
     "linear_high_gain": (130, 185, 60),
+    "adaptive": (220, 60, 80),
+    "high_gain": (0, 190, 200),
+    "homogeneous_adaptive": (240, 160, 130),
 }
 """An observer has the same colour in every recording. Mostly Okabe and Ito's, which the colour-blind can tell apart."""
 
-OTHERS: tuple[Color, ...] = ((240, 228, 66), (0, 190, 200), (220, 60, 80), (240, 160, 130))
+OTHERS: tuple[Color, ...] = ((240, 228, 66), (170, 170, 255), (255, 120, 200), (120, 220, 160))
 """Colours of observers that are not bundled, in order of appearance."""
 
 PHASES: dict[str, Color] = {
@@ -120,6 +124,13 @@ def series(run: Recorded, plant: Plant, settings: MetricsSettings, rate_limit: f
             Series(f"rate_estimate/{part}", name, time, estimate, color, width),
             Series(f"rate_error/{part}", name, time, estimate - t["x2_rad_s"], color, width),
         ]
+        if BIAS in t.extra_signals(name):
+            bias = np.degrees(t[f"estimate/{name}/{BIAS}"])
+            summary = run.summary if name == t.observers[0] else run.summary.get("companions", {}).get(name, {})
+            rows.append(Series(f"bias/{part}", name, time, bias, color, width))
+            if (true := summary.get("bias_deg")) is not None:
+                ends = time[[0, -1]] if len(time) > 1 else time
+                rows.append(Series("bias/true", "true", ends, np.full(len(ends), true), TRUTH, 2.5))
     rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
     if rate_limit is not None:
         rows.append(_bounds("command/limit", "rate limit", time, rate_limit))

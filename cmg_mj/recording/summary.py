@@ -17,8 +17,13 @@ METRICS = {
     "gimbal_peak_deg": "Gimbal, peak [deg]",
     "command_rms_rad_s": "Command, RMS [rad/s]",
     "command_saturated_fraction": "Command at its limit [%]",
+    "bias_estimate_deg": "Estimated bias, mean [deg]",
+    "bias_rms_error_deg": "… its RMS error [deg]",
 }
 """The summary's numbers, in words and with their unit."""
+
+OPTIONAL = ("bias_estimate_deg", "bias_rms_error_deg")
+"""Those that only some observers have."""
 
 SHORT = {
     "settle_time_s": "Settle [s]",
@@ -70,7 +75,9 @@ def _by_column(runs: Sequence[Recorded]) -> list[str]:
     lines = [_row("", *(run.name for run in runs)), "|---|" + "---:|" * len(runs)]
     lines.append(_row("Outcome", *map(_outcome, runs)))
     return lines + [
-        _row(words, *(_number(key, run.summary.get(key)) for run in runs)) for key, words in METRICS.items()
+        _row(words, *(_number(key, run.summary.get(key)) for run in runs))
+        for key, words in METRICS.items()
+        if key not in OPTIONAL or any(key in run.summary for run in runs)
     ]
 
 
