@@ -213,7 +213,7 @@ class Plant:
             raise InputError(
                 f"{self.path}: at the keyframe {KEYFRAME!r} the rig must stand upright, its mass above the tilt axis"
             )
-        return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque))
+        return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n)
 
     # --- variations ----------------------------------------------------------------------------------------
 

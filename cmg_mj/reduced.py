@@ -29,6 +29,7 @@ class ReducedModel:
         J_d: Flywheel's spin inertia [kg m^2].
         omega_d: Flywheel's nominal speed [rad/s].
         gravity_torque: m g l/sqrt(2) [N m], the gravity torque at a tilt of 90 degrees.
+        gimbals: Among how many gimbals the rig is shared; a torque on the whole rig counts 1/gimbals here.
     """
 
     J1: float
@@ -36,6 +37,12 @@ class ReducedModel:
     J_d: float
     omega_d: float
     gravity_torque: float
+    gimbals: int = 1
+
+    def inertia(self, x3: Scalar) -> Scalar:
+        """D = J1 + J2 sin(x3)^2, one share's tilt inertia [kg m^2]."""
+        s = sin(x3)
+        return self.J1 + self.J2 * s * s
 
     def terms(self, x1: Scalar, x3: Scalar) -> tuple[Scalar, Scalar, Scalar]:
         """Parts of f2 in (4) that the angles decide: f2 = drift + u (gain - damping x2).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from typing import Any
@@ -190,3 +191,45 @@ def test_alpha_outside_its_interval_is_refused(alpha: float) -> None:
 @pytest.mark.parametrize("alpha", [0.501, 1.0])
 def test_alpha_inside_its_interval_is_taken(alpha: float) -> None:
     observer("homogeneous", alpha=alpha)
+
+
+# --- the friction model and a known bias: the papers' future work ---------------------------------------------
+
+
+@pytest.mark.parametrize("gimbals", [1, 2])
+def test_friction_enters_as_a_torque_on_the_whole_rig(gimbals: int) -> None:
+    """Sample by sample against (11) with f2 - T(x2)/(gimbals D); T(x2)/x2 is that of the last estimate."""
+    model = dataclasses.replace(HEAVY, gimbals=gimbals)
+    dry, viscous, width = 0.3, 0.2, 0.05
+    plain = homogeneous_slope(model)
+    y1, y2, u = rough_signals(60)
+    of = observer("homogeneous", DT, model, friction_n_m=dry, damping_n_m_s=viscous, friction_width_rad_s=width)
+    _, states = run(of, y1, y2, u)
+    for k in range(1, len(states)):
+        before = states[k - 1]
+        D = model.J1 + model.J2 * math.sin(y2[k - 1]) ** 2
+        c = (dry / math.hypot(before.x2, width) + viscous) / (gimbals * D)
+        now = slice(k - 1, k + 1)
+        (exact,) = integrate(
+            lambda x, a, b, held, c=c: plain(x, a, b, held) - [0.0, c * x[1]],
+            (before.x1, before.x2),
+            y1[now],
+            y2[now],
+            u[now],
+        )
+        np.testing.assert_allclose((states[k].x1, states[k].x2), exact, rtol=0.0, atol=1e-3)
+    still, _ = run(observer("homogeneous", DT, model), y1, y2, u)
+    assert np.abs(still[:, 1] - [state.x2 for state in states[1:]]).max() > 0.1  # friction matters here
+
+
+def test_a_known_bias_is_where_gravity_pulls() -> None:
+    """Without noise the observer that is told e has no rate error left; the one that is not has the closed form's."""
+    e = math.radians(2.0)
+    of: Any = observer("homogeneous")
+    y = Measurement(-e, 0.0)  # at rest at the equilibrium, x1 = 0
+    told, untold = of.init(y), of.init(y)
+    for _ in range(2000):
+        told, with_bias = of.step_with_bias(told, y, 0.0, e)
+        untold, without = of.step(untold, y, 0.0)
+    assert abs(with_bias.x2) < 1e-8
+    assert abs(without.x2) > 0.05
