@@ -57,6 +57,7 @@ for command in (
     scenarios.check,
     studies.bench,
     studies.reproduce,
+    studies.tune,
 ):
     cli.add_command(command)
 

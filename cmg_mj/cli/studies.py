@@ -1,13 +1,14 @@
-"""The commands that measure and study: the bench itself, the papers."""
+"""The commands that measure and study: the bench itself, an observer's parameters, the papers."""
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 
 import click
 
-from cmg_mj.cli.arguments import names_of, of_observers
+from cmg_mj.cli.arguments import check_observer, names_of, of_a_run, of_observers, scenario_of
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, show
 from cmg_mj.errors import InputError, nearest
 
@@ -35,16 +36,19 @@ def bench(observers: str, worlds: int, as_json: bool) -> None:
 def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     """Reproduce PAPER, or all of them: aranovskiy2020, sokolov2019, dao2023, andrieu2009.
 
+    And beyond, which is in none of them and takes half an hour: every observer, 100 seeds each, in one table.
+
     Writes a folder: report.md, its plots, and figures.json. Every claim of the paper stands beside what is obtained
     here, with a verdict: reproduced, reproduced within stated conditions, or not reproduced and why.
     """
-    from cmg_mj.reproduce import PAPERS
+    from cmg_mj.reproduce import BEYOND, PAPERS
     from cmg_mj.reproduce import reproduce as obtain
     from cmg_mj.reproduce.write import figures_of, save, verdict_table
     from cmg_mj.runs import output_folder
 
-    if paper not in (*PAPERS, "all"):
-        raise InputError(f"{paper!r}: no such paper; {nearest(paper, (*PAPERS, 'all'))}")
+    names = (*PAPERS, *BEYOND, "all")
+    if paper not in names:
+        raise InputError(f"{paper!r}: no such paper; {nearest(paper, names)}")
     if out == "":
         raise InputError("--out '': name a folder, . for the current one")
     folder = output_folder(Path(out) if out is not None else Path("runs") / f"reproduce-{paper}")
@@ -58,3 +62,90 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     if ctrl_c.noted:
         say(f"interrupted; what was obtained until then is in {folder}")
         sys.exit(INTERRUPTED)
+
+
+@click.command(short_help="Fit an observer's parameters to the gyro.")
+@click.option("--observer", metavar="NAME", help="What to tune: a name, or your own as package.module:Class.")
+@of_a_run
+@click.option(
+    "--worlds",
+    type=click.IntRange(min=2),
+    default=20,
+    show_default=True,
+    metavar="N",
+    help="Worlds that are fitted; as many more are held out to score on.",
+)
+@click.option("--parameters", default="", metavar="NAMES", help="What to tune, with commas between; all by default.")
+@click.option(
+    "--range",
+    "ranges",
+    multiple=True,
+    metavar="NAME=LOW:HIGH",
+    help="Where to search for a parameter; may be given again.",
+)
+@click.option("--noise", default="", metavar="LIST", help="Accelerometer noise densities to tune at [ug/rtHz].")
+def tune(
+    scenario: str,
+    settings: tuple[str, ...],
+    seed: int | None,
+    out: str | None,
+    as_json: bool,
+    observer: str | None,
+    worlds: int,
+    parameters: str,
+    ranges: tuple[str, ...],
+    noise: str,
+) -> None:
+    """Fit an observer's parameters to the gyro, as section V of aranovskiy2020 does; observer_tuning is its experiment.
+
+    The loop is closed on the gyro, whatever the scenario says, and the recording replayed through the observer. Scored
+    is the estimated rate less the gyro's from the first push to one second after the last, on worlds that were not
+    fitted, beside the observer's parameters as given (by default, the paper's). With several noise densities it says at
+    which the given parameters are the best ones.
+
+    With --out it writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
+    """
+    from cmg_mj.runs import output_folder
+    from cmg_mj.tuning import figures_of, save_study, tuning_table
+    from cmg_mj.tuning import tune as fit
+
+    if observer is not None:
+        check_observer("--observer", observer)
+    if out == "":
+        raise InputError("--out '': name a folder, . for the current one")
+    chosen = scenario_of(scenario, settings, seed, observer)
+    folder = None if out is None else output_folder(Path(out))
+    with progress(f"{chosen.title or scenario}: {chosen.observer.kind}", 1.0) as on_progress:
+        study = fit(
+            chosen,
+            worlds=worlds,
+            parameters=[name.strip() for name in parameters.split(",") if name.strip()],
+            ranges=dict(_range(text) for text in ranges),
+            noise_ug_rthz=[_density(text) for text in noise.split(",") if text.strip()],
+            on_share=on_progress,
+        )
+    show(figures_of(study), tuning_table(study), as_json)
+    if folder is not None:
+        files = save_study(folder, study)
+        if not as_json:
+            click.echo(f"Written to {folder}. Run with the tuned observer: cmg-mj run {files[1]}", err=True)
+
+
+def _range(text: str) -> tuple[str, tuple[float, float]]:
+    """`L=10.4:1000` -> its name and its ends."""
+    name, _, ends = text.partition("=")
+    low, _, high = ends.partition(":")
+    try:
+        return name.strip(), (float(low), float(high))
+    except ValueError as error:
+        raise InputError(f"--range {text!r}: write NAME=LOW:HIGH, for example tau=0.005:0.1") from error
+
+
+def _density(text: str) -> float:
+    try:
+        density = float(text)
+    except ValueError:
+        density = -1.0
+    if not 0.0 <= density < math.inf:
+        raise InputError(f"--noise {text.strip()!r}: must be numbers not below 0, with commas between")
+    return density

@@ -19,6 +19,9 @@ PAPERS = {
 }
 """Paper -> its title."""
 
+BEYOND = {"beyond": "A step beyond the papers"}
+"""What is reproduced only when asked for by name, because it takes long."""
+
 
 @dataclass
 class Reproduced:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cmg_mj.plots import draw
-from cmg_mj.reproduce import PAPERS, Reproduced
+from cmg_mj.reproduce import BEYOND, PAPERS, Reproduced
 from cmg_mj.reproduce.claim import Claim
 from cmg_mj.trajectory import whole_file
 
@@ -53,7 +53,7 @@ def report(entries: Sequence[Reproduced]) -> str:
     """The whole report in Markdown."""
     parts = ["# Four papers, reproduced", _count(entries), verdict_table(entries)]
     for entry in entries:
-        parts.append(f"## {entry.paper}: {PAPERS[entry.paper]}")
+        parts.append(f"## {entry.paper}: {(PAPERS | BEYOND)[entry.paper]}")
         if not entry.complete:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
         for claim in entry.claims:

@@ -1,0 +1,84 @@
+"""The homogeneous differentiator, told the equilibrium bias by the adaptive observer."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar
+from cmg_mj.observers.adaptive import Adaptive
+from cmg_mj.observers.homogeneous import Homogeneous
+from cmg_mj.observers.protocol import BIAS, CONFIG, Measurement, Positive
+from cmg_mj.reduced import ReducedModel
+
+
+class State(NamedTuple):
+    """The states of both."""
+
+    adaptive: Any
+    homogeneous: Any
+
+
+class BiasedEstimate(NamedTuple):
+    """The estimate and the bias it was made with."""
+
+    x1: Scalar
+    x2: Scalar
+    x3: Scalar
+    bias_rad: Scalar
+
+
+@dataclass(frozen=True, config=CONFIG)
+class HomogeneousAdaptive:
+    """aranovskiy2020 (11) with sin(y1 + e), e estimated by dao2023's observer beside it.
+
+    In (11) gravity is taken at y1, where it pulls at y1 + e: that error k1 (M e/J1/k2)^(alpha/(2 alpha - 1)) of the
+    rate is what the estimate of e removes. Nothing flows back: the adaptive observer does not see (11).
+
+    Attributes:
+        dt: Sample period [s].
+        model: The reduced model.
+        k1: First gain of (11).
+        k2: Second gain of (11).
+        alpha: Exponent of (11), in (1/2, 1].
+        L: Gains of the adaptive observer on (x1, x2).
+        Gamma: Weight of the bias in the adaptive observer [rad^2].
+        Sigma: Weight of the measured tilt in the adaptive observer [1/(rad^2 s)].
+    """
+
+    dt: Positive
+    model: ReducedModel
+    k1: Positive = 20.0
+    k2: Positive = 150.0
+    alpha: Annotated[float, Field(gt=0.5, le=1.0)] = 0.85
+    L: tuple[float, float] = Adaptive.L
+    Gamma: Positive = Adaptive.Gamma[0]
+    Sigma: Positive = Adaptive.Sigma
+
+    extra_signals = (BIAS,)
+
+    def __post_init__(self) -> None:
+        assert self._adaptive.extra_signals == self.extra_signals  # made here, so that its complaints are heard at once
+
+    @cached_property
+    def _homogeneous(self) -> Homogeneous:
+        return Homogeneous(self.dt, self.model, k1=self.k1, k2=self.k2, alpha=self.alpha)
+
+    @cached_property
+    def _adaptive(self) -> Adaptive:
+        weights = (self.Gamma, *Adaptive.Gamma[1:])
+        return Adaptive(self.dt, self.model, L=self.L, Gamma=weights, Sigma=self.Sigma)
+
+    def init(self, y: Measurement) -> State:
+        """Start both at rest at the measured tilt, the bias unknown."""
+        return State(self._adaptive.init(y), self._homogeneous.init(y))
+
+    def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, BiasedEstimate]:
+        """Advance by one sample period: first the bias, then (11) with it."""
+        adaptive, found = self._adaptive.step(state.adaptive, y, u)
+        bias = found[3]
+        homogeneous, estimate = self._homogeneous.step_with_bias(state.homogeneous, y, u, bias)
+        return State(adaptive, homogeneous), BiasedEstimate(*estimate, bias)

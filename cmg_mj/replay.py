@@ -1,0 +1,52 @@
+"""An observer replayed open loop on what a run recorded."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.observers import Estimate, Measurement, Observer
+from cmg_mj.trajectory import Trajectory
+
+
+def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
+    """What the observer makes of the recorded measurements y1, y2 and command u.
+
+    The loop may have been closed on anything else: the observer only rides along. From the first row on, its
+    estimates are bitwise those of a companion in the same run.
+
+    Args:
+        observer: The observer; its sample period must be the trajectory's.
+        trajectory: One world or many. It may begin in the middle of a run: the observer starts at its first row.
+
+    Returns:
+        Estimates of x1 [rad], x2 [rad/s] and x3 [rad], each of the recorded columns' shape, (n_ticks,) or
+        (n_ticks, n_worlds); NaN after a world's end.
+    """
+    y1, y2, u = (_rows(trajectory[name]) for name in ("y1_rad", "y2_rad", "u_rad_s"))
+    state = observer.init(Measurement(y1[0], y2[0]))
+    rows = [Estimate(y1[0], 0.0 * y1[0], y2[0])]
+    for k in range(1, len(y1)):
+        state, estimate = observer.step(state, Measurement(y1[k], y2[k]), u[k - 1])
+        rows.append(estimate)
+    shape = trajectory["y1_rad"].shape
+    columns = zip(*(row[:3] for row in rows), strict=True)
+    return Estimate(*(np.array(column, dtype=float).reshape(shape) for column in columns))
+
+
+def _rows(values: np.ndarray) -> Any:
+    """Ticks as floats (one world) or as arrays (n_worlds,): what the observers take."""
+    return values.tolist() if values.ndim == 1 else np.ascontiguousarray(values)
+
+
+def cropped(trajectory: Trajectory, start_s: float, end_s: float) -> Trajectory:
+    """The rows from one time to another, both included."""
+    kept = (trajectory["time_s"] >= start_s - 1e-9) & (trajectory["time_s"] <= end_s + 1e-9)
+    return Trajectory({name: values[kept] for name, values in trajectory.columns.items()}, trajectory.metadata)
+
+
+def of_worlds(trajectory: Trajectory, worlds: np.ndarray) -> Trajectory:
+    """Some of many worlds, by their indices or a mask (n_worlds,)."""
+    columns = {name: values if name == "time_s" else values[:, worlds] for name, values in trajectory.columns.items()}
+    return Trajectory(columns, trajectory.metadata)

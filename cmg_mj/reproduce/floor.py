@@ -1,0 +1,55 @@
+"""The floor under every observer's velocity error: the filter that knows model and noise statistics exactly."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+
+from cmg_mj.reduced import ReducedModel
+from cmg_mj.sensors import STANDARD_GRAVITY, Accelerometer
+from cmg_mj.tilt import RadialTilt
+
+
+def tilt_noise(accelerometer: Accelerometer, tilt: RadialTilt) -> float:
+    """Standard deviation of y1's noise near the upright [rad]: white noise and rounding of the tangential axes.
+
+    Args:
+        accelerometer: The pair of sensors.
+        tilt: Their places.
+
+    Returns:
+        The standard deviation of one sample [rad].
+    """
+    step = STANDARD_GRAVITY / accelerometer.counts_per_g if accelerometer.counts_per_g else 0.0
+    axis = math.hypot(accelerometer.sigma, step / math.sqrt(12.0))
+    span = tilt.r_outer - tilt.r_inner
+    return axis * math.hypot(tilt.r_outer / span, tilt.r_inner / span) / STANDARD_GRAVITY
+
+
+def kalman_filter(model: ReducedModel, dt: float, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The stationary Kalman filter of the linearised rig with every torque on it known, and its error.
+
+    Knowing the gimbals' motion, the push and e exactly, the error obeys x' = [[0, 1], [M/J1, 0]] x without any process
+    noise: only the measurement's noise is left. The rig being unstable, the error does not die out even so. In
+    continuous time, with R the noise's density and l the unstable pole, its variance is 2 l R [[1, l], [l, l^2]].
+
+    Args:
+        model: The reduced model.
+        dt: Sample period [s].
+        sigma: Standard deviation of y1's noise [rad].
+
+    Returns:
+        Phi, (2, 2); the filter's gain, (2,); the covariance of the error after each measurement, (2, 2).
+    """
+    Phi = expm(np.array([[0.0, 1.0], [model.gravity_torque / model.J1, 0.0]]) * dt)
+    C, R = np.array([[1.0, 0.0]]), np.array([[sigma**2]])
+    predicted = solve_discrete_are(Phi.T, C.T, np.zeros((2, 2)), R)
+    gain = predicted @ C.T / (C @ predicted @ C.T + R)
+    return Phi, gain[:, 0], predicted - gain @ C @ predicted
+
+
+def velocity_floor(model: ReducedModel, dt: float, sigma: float) -> float:
+    """RMS velocity error of that filter [rad/s]; no unbiased estimate from the same samples is better."""
+    return math.sqrt(kalman_filter(model, dt, sigma)[2][1, 1])

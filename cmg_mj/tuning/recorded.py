@@ -1,0 +1,153 @@
+"""The tuning experiment recorded: the loop closed on the gyro, and the part of it that is scored."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmg_mj.errors import InputError
+from cmg_mj.observers import Observer
+from cmg_mj.replay import cropped, of_worlds, replay
+from cmg_mj.scenario import Experiment, prepare
+from cmg_mj.schema import ObserverSettings, Scenario
+from cmg_mj.trajectory import Trajectory
+
+AFTER_PUSH_S = 1.0
+"""The window that is scored ends so long after the last push [s]."""
+WARM_UP_S = 2.0
+"""So much of the recording before the window is replayed as well, for the observer to settle [s]."""
+
+Window = tuple[float, float]
+"""Start and end of what is scored [s]."""
+
+
+def window_of(scenario: Scenario) -> Window:
+    """From the first push to one second after the last; the whole run if there is no push.
+
+    Over a whole run with a push the best differentiator would be none at all: outside that second the rig hardly
+    moves, and an estimate of zero has the smallest error.
+    """
+    if not scenario.push:
+        return 0.0, scenario.duration_s
+    end = max(push.end_s for push in scenario.push) + AFTER_PUSH_S
+    return min(push.start_s for push in scenario.push), min(end, scenario.duration_s)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What was measured and commanded in some worlds, all of which stood.
+
+    Attributes:
+        trajectory: From the warm-up to the window's end.
+        window: What is scored [s].
+        fell: How many more worlds there were, which fell.
+    """
+
+    trajectory: Trajectory
+    window: Window
+    fell: int = 0
+
+    @property
+    def worlds(self) -> int:
+        """How many."""
+        return self.trajectory["y1_rad"].shape[1]
+
+    @property
+    def largest_acceleration(self) -> float:
+        """Of the tilt, by differences of its true rate, which a differentiator has to follow [rad/s^2]."""
+        steps = np.diff(self.trajectory["x2_rad_s"], axis=0) / np.diff(self.trajectory["time_s"])[:, None]
+        return float(np.abs(steps).max())
+
+    @property
+    def zero_rms(self) -> float:
+        """The error of an estimate of zero: the RMS of the gyro's rate over the window, mean of the worlds [rad/s]."""
+        return float(np.sqrt(np.mean(self.trajectory["fog_rad_s"][self._scored] ** 2, axis=0)).mean())
+
+    @property
+    def _scored(self) -> np.ndarray:
+        """Which rows lie in the window, (n_ticks,)."""
+        time = self.trajectory["time_s"]
+        return (time >= self.window[0] - 1e-9) & (time <= self.window[1] + 1e-9)
+
+    def errors(self, observer: Observer) -> np.ndarray:
+        """RMS over the window of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN where it is lost."""
+        scored = self._scored
+        with np.errstate(all="ignore"):
+            difference = replay(observer, self.trajectory).x2[scored] - self.trajectory["fog_rad_s"][scored]
+            return np.sqrt(np.mean(difference**2, axis=0))
+
+
+def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> Scenario:
+    """The scenario as the observers are tuned in it: the law fed by the gyro and the measured angles.
+
+    No observer takes part in that loop, so one recording serves them all; it ends with the window.
+
+    Args:
+        scenario: The experiment.
+        noise_ug_rthz: Another noise density of the accelerometers [ug/sqrt(Hz)].
+
+    Returns:
+        The scenario to record.
+    """
+    sensors = scenario.sensors
+    if noise_ug_rthz is not None:
+        accelerometer = dataclasses.replace(sensors.accelerometer, noise_density_ug_rthz=noise_ug_rthz)
+        sensors = dataclasses.replace(sensors, accelerometer=accelerometer)
+    timestep = scenario.plant.timestep_s
+    duration = math.ceil(window_of(scenario)[1] / timestep - 1e-9) * timestep
+    feedback = "fog" if scenario.controller.feedback == "observer" else scenario.controller.feedback
+    loop = {"feedback": feedback, "angles": "measured", "trim_s": 0.0}
+    return scenario.model_copy(
+        update={
+            "duration_s": duration,
+            "controller": scenario.controller.model_copy(update=loop),
+            "observer": ObserverSettings(kind="finite_difference"),  # the quickest; nothing uses its estimate
+            "companions": [],
+            "sensors": sensors,
+        }
+    )
+
+
+def record(
+    scenario: Scenario,
+    worlds: Sequence[int],
+    *,
+    noise_ug_rthz: float | None = None,
+    warm_up_s: float = WARM_UP_S,
+    on_share: Callable[[float], None] | None = None,
+) -> Recorded:
+    """Run the tuning experiment.
+
+    Args:
+        scenario: The experiment; `tuning_scenario` says what is changed in it.
+        worlds: Their numbers: noise depends on (seed, number) alone.
+        noise_ug_rthz: Another noise density of the accelerometers [ug/sqrt(Hz)].
+        warm_up_s: How much of the time before the window is kept [s].
+        on_share: Called now and then with the share done.
+
+    Returns:
+        The worlds that stood.
+
+    Raises:
+        InputError: Fewer than two did.
+        KeyboardInterrupt: The user interrupted.
+    """
+    experiment: Experiment = prepare(tuning_scenario(scenario, noise_ug_rthz))
+    duration = experiment.scenario.duration_s
+    result = experiment.run_many(list(worlds), on_progress=on_share and (lambda time: on_share(time / duration)))
+    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        raise KeyboardInterrupt
+    stood = np.array([outcome.kind == "done" for outcome in result.outcomes])
+    if stood.sum() < 2:
+        raise InputError(
+            f"{scenario.title or 'the scenario'}: with the law fed by the {experiment.scenario.controller.feedback}, "
+            f"{len(stood) - stood.sum()} of {len(stood)} worlds fell before {duration:g} s: there is nothing to tune on"
+        )
+    window = window_of(scenario)
+    assert result.trajectory is not None
+    kept = cropped(of_worlds(result.trajectory, stood), window[0] - warm_up_s, window[1])
+    return Recorded(kept, window, int((~stood).sum()))

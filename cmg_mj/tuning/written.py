@@ -1,0 +1,165 @@
+"""A study as figures, as a table, and as files."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.table import Table
+
+from cmg_mj.errors import InputError
+from cmg_mj.scenario import prepare
+from cmg_mj.trajectory import whole_file
+from cmg_mj.tuning.intervals import Interval
+from cmg_mj.tuning.study import Level, Study, best_noise, tuned_scenario
+
+
+def figures_of(study: Study) -> dict[str, Any]:
+    """What `cmg-mj tune --json` prints."""
+    return {
+        "scenario": study.scenario.title,
+        "observer": study.kind,
+        "seed": study.scenario.seed,
+        "worlds_fitted": study.worlds,
+        "window_s": list(study.window),
+        "given_parameters": _plain(study.given),
+        "tuned": [number.name for number in study.numbers],
+        "idle": list(study.idle),
+        "levels": [_level(level) for level in study.levels],
+        "given_best_at_noise_density_ug_rthz": best_noise(study),
+    }
+
+
+def _level(level: Level) -> dict[str, Any]:
+    return {
+        "noise_density_ug_rthz": level.noise_ug_rthz,
+        "parameters": _plain(level.parameters),
+        "at_a_limit": list(level.edges),
+        "fit_rms_error_rad_s": _number(level.fit_rms),
+        "fit_given_rms_error_rad_s": _number(level.fit_given_rms),
+        "held_out_worlds": len(level.rms),
+        "held_out_rms_error_rad_s": _number(float(level.rms.mean())),
+        "held_out_given_rms_error_rad_s": _number(float(level.given_rms.mean())),
+        "held_out_gain_rad_s": _interval(level.gain),
+        "held_out_ratio": _interval(level.ratio),
+        "verdict": level.verdict,
+        "zero_estimate_rms_error_rad_s": level.zero_rms,
+        "largest_tilt_acceleration_rad_s2": level.largest_acceleration,
+        "worlds_that_fell": level.fell,
+    }
+
+
+def _plain(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: _listed(value) for name, value in parameters.items() if value is not None}
+
+
+def _listed(value: Any) -> Any:
+    """Tuples as lists, and nothing that JSON or TOML cannot hold."""
+    if isinstance(value, tuple):
+        return [_listed(item) for item in value]
+    return value if isinstance(value, (bool, int, float, str)) else str(value)
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _interval(interval: Interval) -> list[float | None]:
+    return [_number(value) for value in interval]
+
+
+def tuning_table(study: Study) -> Table:
+    """The table that `cmg-mj tune` prints."""
+    scenario = study.scenario
+    title = f"{scenario.title or 'Tuning'}: {study.kind}, seed {scenario.seed}"
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0), caption=_caption(study))
+    table.caption_justify = "left"
+    table.add_column("noise\n[ug/rtHz]", justify="right", vertical="bottom")
+    for number in study.numbers:
+        table.add_column(f"{number.name}\ngiven {abs(number.given):.4g}", justify="right", vertical="bottom")
+    for heading in (
+        "held out:\ntuned\n[rad/s]",
+        "\ngiven\n[rad/s]",
+        "\ngiven less tuned, 95 %\n[1e-3 rad/s]",
+        "\ngiven / tuned, 95 %",
+        "tuned is",
+    ):
+        table.add_column(heading, justify="right", vertical="bottom")
+    for level in study.levels:
+        sizes = (f"{size:.4g}{'*' if name in level.edges else ''}" for name, size in level.sizes.items())
+        table.add_row(
+            f"{level.noise_ug_rthz:g}",
+            *sizes,
+            f"{level.rms.mean():.4f}",
+            f"{level.given_rms.mean():.4f}",
+            _spread([1e3 * value for value in level.gain], 2),
+            _spread(level.ratio, 3),
+            level.verdict,
+        )
+    return table
+
+
+def _spread(values: Sequence[float], digits: int) -> str:
+    mean, low, high = (f"{value:.{digits}f}" for value in values)
+    return f"{mean} ({low} to {high})"
+
+
+def _caption(study: Study) -> str:
+    """What the table does not say by itself."""
+    start, end = study.window
+    lines = [f"RMS of the estimated rate less the gyro's, {start:g} s to {end:g} s, on worlds that were not fitted."]
+    if not study.scenario.push:
+        lines.append("There is no push: the window is the whole run, where an estimate of zero may do best.")
+    zero = [level.zero_rms for level in study.levels]
+    lines.append(f"An estimate of zero: {min(zero):.4f} to {max(zero):.4f} rad/s.")
+    if study.idle:
+        lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.idle)}.")
+    if any(level.edges for level in study.levels):
+        lines.append("* at a limit of its range.")
+    fell = sum(level.fell for level in study.levels)
+    if fell:
+        lines.append(f"Left out: {fell} worlds that fell.")
+    if len(study.levels) > 1:
+        lines.append(_best(study))
+    return "\n".join(lines)
+
+
+def _best(study: Study) -> str:
+    """At which noise the given parameters are the best ones, in words."""
+    best, levels = best_noise(study), study.levels
+    if best is not None:
+        about = "about " if len(study.numbers) == 1 else "among these "
+        return f"The given parameters are best at {about}{best:.3g} ug/rtHz."
+    least = min(levels, key=lambda level: level.ratio.mean)
+    side = "below" if least is levels[0] else "above" if least is levels[-1] else "outside"
+    return f"The given parameters are best at a noise {side} these, if at any."
+
+
+def save_study(folder: Path, study: Study) -> list[Path]:
+    """Write tuned.json and a scenario a sensor noise, which runs with the tuned observer.
+
+    Args:
+        folder: Where; it exists.
+        study: What to write.
+
+    Returns:
+        The files. One noise makes scenario.toml, several make scenario-NOISE.toml.
+
+    Raises:
+        InputError: A file cannot be written.
+    """
+    files = [folder / "tuned.json"]
+    try:
+        with whole_file(files[0]) as temporary:
+            temporary.write_text(json.dumps(figures_of(study), indent=2) + "\n", encoding="utf-8")
+        for level in study.levels:
+            one = len(study.levels) == 1
+            files.append(folder / ("scenario.toml" if one else f"scenario-{level.noise_ug_rthz:g}.toml"))
+            prepare(tuned_scenario(study, level)).save(files[-1])
+    except OSError as error:
+        raise InputError(f"{files[-1]}: cannot be written: {error.strerror or error}") from error
+    return files
