@@ -6,6 +6,7 @@ One module a paper, each with its example plants and a list `STEPS`; `write.py` 
 from __future__ import annotations
 
 import importlib
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -31,11 +32,13 @@ class Reproduced:
         paper: Its short name.
         claims: One a figure, table, remark, proof or statement.
         complete: Whether all steps were done (not interrupted).
+        seconds: How long it took [s].
     """
 
     paper: str
     claims: list[Claim] = field(default_factory=list)
     complete: bool = False
+    seconds: float = 0.0
 
 
 def steps_of(paper: str) -> list[Step]:
@@ -64,7 +67,9 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
                 on_progress(f"{paper}: {step.title}", (before + share * step.seconds) / total)
 
             on_share(0.0)
+            start = time.perf_counter()
             entries[paper].claims += step.run(on_share)
+            entries[paper].seconds += time.perf_counter() - start
             before += step.seconds
             entries[paper].complete = step is steps_of(paper)[-1]
     except KeyboardInterrupt:

@@ -22,7 +22,11 @@ def figures_of(entries: Sequence[Reproduced]) -> dict[str, Any]:
         "versions": {name: version(name) for name in ("cmg_mj", "mujoco", "numpy", "scipy")}
         | {"python": platform.python_version()},
         "papers": {
-            entry.paper: {"complete": entry.complete, "claims": [_plain(claim) for claim in entry.claims]}
+            entry.paper: {
+                "complete": entry.complete,
+                "seconds": entry.seconds,
+                "claims": [_plain(claim) for claim in entry.claims],
+            }
             for entry in entries
         },
     }
@@ -67,7 +71,8 @@ def report(entries: Sequence[Reproduced]) -> str:
 def _count(entries: Sequence[Reproduced]) -> str:
     counts = Counter(claim.verdict for entry in entries for claim in entry.claims)
     total = sum(counts.values())
-    return f"{total} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.most_common()) + "."
+    seconds = sum(entry.seconds for entry in entries)
+    return f"{total} claims: " + ", ".join(f"{n} {v}" for v, n in counts.most_common()) + f". Took {seconds:.0f} s."
 
 
 def save(folder: Path, entries: Sequence[Reproduced]) -> None:
