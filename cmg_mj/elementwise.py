@@ -47,9 +47,23 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
         return np.log(x + 1j * y).imag
 
 
+def exp(x: Scalar) -> Scalar:
+    """Exponential, elementwise, for x up to 700."""
+    # `np.exp` may take a vector instruction that rounds differently from the C library; for complex numbers it
+    # takes the library's.
+    return math.exp(x) if type(x) is float else np.exp(x + 0j).real
+
+
 def sign(x: Scalar) -> Scalar:
     """Sign of x, zero at zero, elementwise."""
     return float((x > 0.0) - (x < 0.0)) if type(x) is float else np.sign(x)
+
+
+def signed_power(x: Scalar, exponent: float) -> Scalar:
+    """[x]^a = |x|^a sign(x) for a > 0, elementwise."""
+    if type(x) is float:
+        return math.copysign(abs(x) ** exponent, x)
+    return np.copysign(np.float_power(np.abs(x), exponent), x)  # not `np.power`: see below
 
 
 def signed_powers(x: Scalar, exponent: float) -> tuple[Scalar, Scalar]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cmg_mj.elementwise import atan2, clip, cos, digitise, sign, signed_powers, sin, sqrt, where
+from cmg_mj.elementwise import atan2, clip, cos, digitise, exp, sign, signed_power, signed_powers, sin, sqrt, where
 
 SPECIAL = [0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 1e-300, -1e-300, 5e-324, 1e-9, -1e-9, 4.7, -4.7, 1e6, -1e6]
 
@@ -20,6 +20,8 @@ FUNCTIONS: list = [
     pytest.param(lambda x: atan2(x, x + 1.0), id="atan2"),
     *(pytest.param(lambda x, a=a: signed_powers(x, a)[0], id=f"power {a}") for a in (0.85, 0.7, 0.51, 1.0)),
     *(pytest.param(lambda x, a=a: signed_powers(x, a)[1], id=f"second power {a}") for a in (0.85, 0.7, 0.51, 1.0)),
+    pytest.param(lambda x: exp(-abs(x)), id="exp"),
+    *(pytest.param(lambda x, a=a: signed_power(x, a), id=f"one power {a}") for a in (0.41, 1.0, 1.9, 10.0)),
     pytest.param(lambda x: clip(x, -4.7, 4.7), id="clip"),
     pytest.param(lambda x: where(x > 0.1, x, 2.0 * x), id="where"),
     pytest.param(lambda x: digitise(x, math.inf, 2.0 * math.pi / 4096.0), id="round"),
@@ -70,8 +72,15 @@ def test_signed_powers(x: float, alpha: float) -> None:
 
 
 @pytest.mark.parametrize("x", X)
+@pytest.mark.parametrize("a", [0.41, 1.0, 1.9, 10.0])
+def test_signed_power(x: float, a: float) -> None:
+    assert signed_power(x, a) == pytest.approx(np.sign(x) * abs(x) ** a, rel=1e-14)
+
+
+@pytest.mark.parametrize("x", X)
 def test_simple_functions(x: float) -> None:
     assert (sin(x), cos(x), sqrt(abs(x))) == (math.sin(x), math.cos(x), math.sqrt(abs(x)))
+    assert exp(x) == math.exp(x)
     assert sign(x) == math.copysign(1.0, x)
     assert clip(x, -1.0, 2.0) == max(-1.0, min(2.0, x))
     assert where(x > 0.0, 5.0, 6.0) == (5.0 if x > 0.0 else 6.0)

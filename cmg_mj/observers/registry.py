@@ -20,6 +20,9 @@ OBSERVERS = {
     "finite_difference": "cmg_mj.observers.finite_difference:FiniteDifference",
     "super_twisting": "cmg_mj.observers.super_twisting:SuperTwisting",
     "linear_high_gain": "cmg_mj.observers.linear_high_gain:LinearHighGain",
+    "high_gain": "cmg_mj.observers.high_gain:HighGain",
+    "adaptive": "cmg_mj.observers.adaptive:Adaptive",
+    "homogeneous_adaptive": "cmg_mj.observers.homogeneous_adaptive:HomogeneousAdaptive",
 }
 """Name a user types -> dotted path of the class."""
 

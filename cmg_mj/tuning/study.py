@@ -252,8 +252,8 @@ def _get(value: Any, place: tuple[int, ...]) -> float:
 def best_noise(study: Study) -> float | None:
     """The sensor noise at which the given parameters are the best ones.
 
-    With one tuned number, where its best value crosses the given one, on straight lines between the levels. With
-    more, the level at which the given parameters lose least, if that is no end of the list.
+    With one tuned number, where its best value crosses the given one, on straight lines between the levels, both in the
+    logarithm. With more, the level at which the given parameters lose least, if that is no end of the list.
 
     Args:
         study: With several levels.
@@ -266,8 +266,10 @@ def best_noise(study: Study) -> float | None:
         return None
     if len(study.numbers) == 1:
         (number,) = study.numbers
-        sizes = [math.log(level.sizes[number.name] / abs(number.given)) for level in levels]
-        return crossing([level.noise_ug_rthz for level in levels], sizes)
+        noisy = [level for level in levels if level.noise_ug_rthz > 0.0]
+        sizes = [math.log(level.sizes[number.name] / abs(number.given)) for level in noisy]
+        crossed = crossing([math.log(level.noise_ug_rthz) for level in noisy], sizes) if noisy else None
+        return None if crossed is None else math.exp(crossed)
     least = min(range(len(levels)), key=lambda i: levels[i].ratio.mean)
     return levels[least].noise_ug_rthz if 0 < least < len(levels) - 1 else None
 

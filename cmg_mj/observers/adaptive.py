@@ -1,0 +1,182 @@
+"""The adaptive disturbance observer of dao2023 on the scissored pair."""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+from functools import cache, cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar, cos
+from cmg_mj.observers.protocol import BIAS, CONFIG, Measurement, NonNegative, Positive
+from cmg_mj.reduced import ReducedModel
+
+TORQUE, SINUSOID = "torque_n_m", "disturbance_n_m"
+
+
+class Column(NamedTuple):
+    """One entry of xm, and its column of T."""
+
+    value: Scalar
+    T1: Scalar
+    T2: Scalar
+
+
+class State(NamedTuple):
+    """The estimate, what is unknown with T's columns, and the last measurement."""
+
+    x1: Scalar
+    x2: Scalar
+    columns: tuple[Column, ...]
+    y: Measurement
+
+
+@cache
+def _estimate_type(extra_signals: tuple[str, ...]) -> Any:
+    """A named tuple of x1, x2, x3 and the extra signals."""
+    return namedtuple("Estimate", ("x1", "x2", "x3", *extra_signals))
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Adaptive:
+    """dao2023 (7) to (9) for the reduced model, with what is unknown about it as r.
+
+    The state is (x1 - e, x2), whose first entry y1 measures: as with the other observers, the estimate of x1 is one of
+    y1 without its noise, not of the tilt from the true equilibrium. With D = J1 + J2 sin^2 y2,
+
+        A = [[0, 1], [0, -u J2 sin(2 y2)/D]],  known input (u J_d w_d cos y2 + M sin y1)/D,
+        B0: M cos(y1)/D for the bias e, 1/D for a torque.
+
+    A constant torque and a bias act alike, so that only one of the two can be asked for. A sinusoidal torque has the
+    exosystem [[0, -w], [w, 0]]. Each step is that of `friedland_tacker.FriedlandTacker`, written out: the implicit
+    midpoint rule for x and T, the exosystem exactly, and the correction implicit in the new sample.
+
+    Attributes:
+        dt: Sample period [s].
+        model: The reduced model.
+        bias: Whether to estimate the equilibrium bias e.
+        torque: Whether to estimate a constant tilting torque on the whole rig instead.
+        sinusoid_hz: Frequency of a sinusoidal tilting torque to estimate, such as a gait's [Hz]; 0 for none.
+        known_bias_deg: e, where it is not estimated [deg].
+        L: Gain on (x1, x2); A + L C2 is Hurwitz if both are negative. Default: docs/studies/tune_adaptive.py, as are
+            the next two: poles of 25 rad/s and damping ratio 0.7, a bias learnt at 1/s.
+        Gamma: Weights, the diagonal of Gamma: of the bias [rad^2], of a constant torque and of the two parts of a
+            sinusoid [(N m)^2].
+        Sigma: Weight of the measured tilt [1/(rad^2 s)].
+    """
+
+    dt: Positive
+    model: ReducedModel
+    bias: bool = True
+    torque: bool = False
+    sinusoid_hz: NonNegative = 0.0
+    known_bias_deg: float = 0.0
+    L: tuple[float, float] = (-35.0, -625.0)
+    Gamma: tuple[Positive, Positive, Positive] = (1.0, 48.0, 48.0)
+    Sigma: Positive = 125.0
+
+    def __post_init__(self) -> None:
+        if self.bias and self.torque:
+            raise ValueError(
+                "bias, torque: both are true, but a constant torque and an equilibrium bias act alike; "
+                "one of them must be false"
+            )
+        if not (self.bias or self.torque or self.sinusoid_hz):
+            raise ValueError("bias, torque, sinusoid_hz: nothing to estimate; make one of them true or greater than 0")
+        if self.bias and self.known_bias_deg:
+            raise ValueError("known_bias_deg: the bias cannot be known and estimated; set bias to false")
+        if 2.0 * self.sinusoid_hz * self.dt >= 1.0:
+            raise ValueError(
+                f"sinusoid_hz = {self.sinusoid_hz:g}: must be below half the sample rate, {0.5 / self.dt:g} Hz"
+            )
+        poles = np.linalg.eigvals(self.error_matrix)
+        if poles.real.max() >= 0.0:
+            listed = ", ".join(f"{p:.3g}" for p in poles)
+            raise ValueError(f"L: A + L C must be Hurwitz (both negative), its eigenvalues are {listed}")
+
+    @property
+    def error_matrix(self) -> np.ndarray:
+        """A + L C at rest, (2, 2)."""
+        return np.array([[self.L[0], 1.0], [self.L[1], 0.0]])
+
+    @cached_property
+    def extra_signals(self) -> tuple[str, ...]:
+        """Names of what is estimated beyond x."""
+        constant = (BIAS,) * self.bias + (TORQUE,) * self.torque
+        return constant + ((SINUSOID,) if self.sinusoid_hz else ())
+
+    @cached_property
+    def _weights(self) -> list[float]:
+        """Diagonal of Gamma, an entry a column."""
+        bias, torque, sinusoid = self.Gamma
+        constant = [bias] * self.bias + [torque] * self.torque
+        return constant + ([sinusoid, sinusoid] if self.sinusoid_hz else [])
+
+    @cached_property
+    def _turn(self) -> tuple[float, float]:
+        """Cosine and sine of the angle by which the exosystem turns in a sample."""
+        angle = 2.0 * math.pi * self.sinusoid_hz * self.dt
+        return math.cos(angle), math.sin(angle)
+
+    @cached_property
+    def _known_bias(self) -> float:
+        return math.radians(self.known_bias_deg)
+
+    def init(self, y: Measurement) -> State:
+        """Start at rest at the measured tilt, with nothing known and T = 0."""
+        zero = 0.0 * y.y1
+        return State(y.y1, zero, (Column(zero, zero, zero),) * len(self._weights), y)
+
+    def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Any]:
+        """Advance by one sample period."""
+        h, (l1, l2), model = self.dt, self.L, self.model
+        x1, x2, columns, (y1_before, y2_before) = state
+        y1, y2 = y
+        tilt, gimbal = 0.5 * (y1_before + y1), 0.5 * (y2_before + y2)
+        drift, gain, damping = model.terms(tilt + self._known_bias, gimbal)
+        inertia = model.inertia(gimbal)
+        per_torque = 1.0 / (model.gimbals * inertia)  # of a torque on the whole rig, which the gimbals share
+        per_bias = model.gravity_torque * cos(tilt) / inertia
+        a = -u * damping
+
+        # (1 - k M) v+ = (1 + k M) v + h w, M = [[l1, 1], [l2, a]], k = h/2
+        k = 0.5 * h
+        scale = 1.0 / ((1.0 - k * l1) * (1.0 - k * a) - k * k * l2)
+
+        def onward(v1: Scalar, v2: Scalar, w1: Scalar, w2: Scalar) -> tuple[Scalar, Scalar]:
+            """Advance one column by the implicit midpoint rule."""
+            r1 = v1 + k * (l1 * v1 + v2) + h * w1
+            r2 = v2 + k * (l2 * v1 + a * v2) + h * w2
+            return scale * ((1.0 - k * a) * r1 + k * r2), scale * (k * l2 * r1 + (1.0 - k * l1) * r2)
+
+        unknown = 0.0
+        moved = []
+        for column in columns[:1] if self.bias or self.torque else ():
+            per = per_bias if self.bias else per_torque
+            unknown = per * column.value
+            moved.append(Column(column.value, *onward(column.T1, column.T2, 0.0, per)))
+        if self.sinusoid_hz:
+            c, s = self._turn
+            p, q = columns[-2:]
+            per_p, per_q = per_torque * 0.5 * s, per_torque * 0.5 * (1.0 + c)  # of the mean over the sample
+            unknown = unknown + per_p * p.value + per_q * q.value
+            p1, p2 = onward(p.T1, p.T2, 0.0, per_p)
+            q1, q2 = onward(q.T1, q.T2, 0.0, per_q)
+            moved.append(Column(c * p.value - s * q.value, c * p1 - s * q1, c * p2 - s * q2))
+            moved.append(Column(s * p.value + c * q.value, s * p1 + c * q1, s * p2 + c * q2))
+        x1, x2 = onward(x1, x2, -l1 * tilt, unknown + drift + u * gain - l2 * tilt)
+
+        weighted = [self.Sigma * weight * column.T1 for weight, column in zip(self._weights, moved, strict=True)]
+        stiffness = sum(v * column.T1 for v, column in zip(weighted, moved, strict=True))
+        nu = (x1 - y1) / (1.0 + h * stiffness)
+        corrected = []
+        for v, column in zip(weighted, moved, strict=True):
+            change = -h * v * nu
+            x1, x2 = x1 + column.T1 * change, x2 + column.T2 * change
+            corrected.append(column._replace(value=column.value + change))
+        values = [column.value for column in corrected]
+        extras = values[:1] * (self.bias or self.torque) + (values[-1:] if self.sinusoid_hz else [])
+        return State(x1, x2, tuple(corrected), y), _estimate_type(self.extra_signals)(x1, x2, y2, *extras)

@@ -1,0 +1,133 @@
+"""The high-gain observer with updated gain and homogeneous correction, andrieu2009 (7)-(10), on the scissored pair."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar, signed_power
+from cmg_mj.observers.bi_limit import BiLimitCorrection, largest_b
+from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
+from cmg_mj.observers.updated_high_gain import updated_gain
+from cmg_mj.reduced import ReducedModel
+
+
+class State(NamedTuple):
+    """The estimate, the gain, the last measurement, and the model's terms there."""
+
+    x1: Scalar
+    x2: Scalar
+    L: Scalar
+    y: Measurement
+    terms: tuple[Scalar, Scalar, Scalar]
+
+
+@dataclass(frozen=True, config=CONFIG)
+class HighGain:
+    """x1' = x2 - L^(1+b) q1(s), x2' = f2(y, x2, u) - L^(2+b) q2(l2 q1(s)), s = l1 (x1 - y1)/L^b, L' by (8).
+
+    q1(w) = w + [w]^(1/(1-d_inf)), q2(w) = w + [w]^(1+d_inf); both w alone if d_inf = 0. `UpdatedHighGain` written out for
+    n = 2 and f2 of the reduced model, one step a sample as there. L starts at phi2.
+
+    f2 is affine in x2, so the bound (9) on its increments is Omega = |u damping|, exactly and with c_inf = 0. On this rig it
+    stays below 0.01 1/s, against rates of 10 1/s of the observer: the update of the gain has nothing to do here.
+
+    Attributes:
+        dt: Sample period [s].
+        model: The reduced model.
+        l1: First gain, times L [1/s]. Default: docs/studies/tune_high_gain.py, as of l2, d_inf and b.
+        l2: Second gain over the first, times L [1/s]. (s^2 + l1 s + l1 l2 is Hurwitz for all positive l1, l2.)
+        d_inf: Degree at infinity, in [0, 1), the paper's p.
+        b: Exponent of the scaling, below (1 - d_inf)/d_inf by (21). s is in units of phi2^b: with phi2 = 1, b only
+            matters once L moves.
+        phi1: See `updated_gain`. Default: andrieu2009 section 3.1, as of phi2 and phi3.
+        phi2: See `updated_gain`.
+        phi3: See `updated_gain`.
+    """
+
+    dt: Positive
+    model: ReducedModel
+    l1: Positive = 29.5
+    l2: Positive = 12.4
+    d_inf: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.6
+    b: Positive = 0.333
+    phi1: Positive = 0.03
+    phi2: Positive = 1.0
+    phi3: Positive = 3.0
+
+    def __post_init__(self) -> None:
+        bound = largest_b(2, self.d_inf)
+        if not self.b < bound:
+            raise ValueError(f"b = {self.b:g}: must be below (1 - d_inf)/d_inf = {bound:.4g}, andrieu2009 (21)")
+        poles = self.phi2 * np.roots([1.0, self.l1, self.l1 * self.l2])
+        z = self.dt * poles
+        if np.abs(1.0 + z + z**2 / 2.0 + z**3 / 6.0 + z**4 / 24.0).max() >= 1.0:
+            shown = ", ".join(f"{pole:.3g}" for pole in poles)
+            raise ValueError(
+                f"l1, l2, phi2: too fast for the sample period: the poles {shown} 1/s of the linear part are outside "
+                f"the stability region of a Runge-Kutta step of {self.dt:g} s"
+            )
+
+    @cached_property
+    def correction(self) -> BiLimitCorrection:
+        """K, as the general form takes it."""
+        return BiLimitCorrection((self.l1, self.l2), self.d_inf)
+
+    def init(self, y: Measurement) -> State:
+        """Start at rest at the measured tilt."""
+        zero = 0.0 * y.y1
+        return State(y.y1, zero, self.phi2 + zero, y, self.model.terms(*y))
+
+    def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
+        """Advance by one sample period."""
+        h = self.dt
+        x1, x2, L, (y1_before, y2_before), (drift, gain, damping) = state
+        y1, y2 = y
+        y1_middle = 0.5 * (y1_before + y1)
+        middle = self.model.terms(y1_middle, 0.5 * (y2_before + y2))
+        end = self.model.terms(y1, y2)
+        Omega = abs(u * damping)
+        L_middle = updated_gain(L, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
+        L_end = updated_gain(L_middle, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
+
+        c1, c2 = self._corrections(x1 - y1_before, L)
+        p1 = x2 - c1
+        p2 = drift + u * (gain - damping * x2) - c2
+
+        drift, gain, damping = middle
+        w = x2 + 0.5 * h * p2
+        c1, c2 = self._corrections(x1 + 0.5 * h * p1 - y1_middle, L_middle)
+        q1 = w - c1
+        q2 = drift + u * (gain - damping * w) - c2
+
+        w = x2 + 0.5 * h * q2
+        c1, c2 = self._corrections(x1 + 0.5 * h * q1 - y1_middle, L_middle)
+        r1 = w - c1
+        r2 = drift + u * (gain - damping * w) - c2
+
+        drift, gain, damping = end
+        w = x2 + h * r2
+        c1, c2 = self._corrections(x1 + h * r1 - y1, L_end)
+        s1 = w - c1
+        s2 = drift + u * (gain - damping * w) - c2
+
+        x1 = x1 + h / 6.0 * (p1 + 2.0 * (q1 + r1) + s1)
+        x2 = x2 + h / 6.0 * (p2 + 2.0 * (q2 + r2) + s2)
+        return State(x1, x2, L_end, y, end), Estimate(x1, x2, y2)
+
+    def _corrections(self, e: Scalar, L: Scalar) -> tuple[Scalar, Scalar]:
+        """L^(1+b) q1(s) and L^(2+b) q2(l2 q1(s))."""
+        d_inf = self.d_inf
+        scale = signed_power(L, self.b)
+        s = self.l1 * e / scale
+        if d_inf > 0.0:
+            s = s + signed_power(s, 1.0 / (1.0 - d_inf))
+        w = self.l2 * s
+        if d_inf > 0.0:
+            w = w + signed_power(w, 1.0 + d_inf)
+        scale = L * scale
+        return scale * s, L * scale * w

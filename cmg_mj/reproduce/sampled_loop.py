@@ -1,0 +1,133 @@
+"""The closed loop of one gimbal, linearised and sampled: the servo, the age of the tilt, an observer, the law.
+
+From one control tick to the next the rig is linear near its equilibrium, and so are the linear observers and the law:
+the map of a period is a matrix, and the loop oscillates by itself when an eigenvalue leaves the unit circle. The
+matrix is made by running the observer and the law themselves on unit vectors, so it is the loop as implemented.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cmg_mj.controller import Law
+from cmg_mj.observers import Measurement, Observer
+from cmg_mj.observers.hold import hold_matrices
+from cmg_mj.reduced import ReducedModel
+
+
+@dataclass(frozen=True)
+class Servo:
+    """A gimbal's position loop; its setpoint is the integral of the commanded rate.
+
+    Attributes:
+        kp: Stiffness [N m/rad].
+        kv: Damping [N m s/rad].
+        inertia: I_c + I_d [kg m^2].
+    """
+
+    kp: float
+    kv: float
+    inertia: float
+
+    @property
+    def lag_s(self) -> float:
+        """How far the angle stays behind a setpoint that moves steadily [s]."""
+        return self.kv / self.kp
+
+    def damped(self, lag_s: float) -> Servo:
+        """As stiff, with another lag: more damping."""
+        return replace(self, kv=lag_s * self.kp)
+
+    def softened(self, lag_s: float) -> Servo:
+        """Critically damped, with another lag: less stiffness."""
+        kp = 4.0 * self.inertia / lag_s**2
+        return replace(self, kp=kp, kv=lag_s * kp)
+
+
+def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
+    """sokolov2019 (1) with the servo's torque, linearised upright: x' = A x + B u.
+
+    The state is tilt, tilt rate, gimbal angle, gimbal rate and setpoint. The flywheel's torque -J_d w_d x2 drives the
+    gimbal back.
+
+    Returns:
+        A (5, 5), B (5, 1).
+    """
+    h, J1, inertia = model.J_d * model.omega_d, model.J1, servo.inertia
+    A = np.zeros((5, 5))
+    A[0, 1] = 1.0
+    A[1, [0, 3]] = model.gravity_torque / J1, h / J1
+    A[2, 3] = 1.0
+    A[3, [1, 2, 3, 4]] = -h / inertia, -servo.kp / inertia, -servo.kv / inertia, servo.kp / inertia
+    B = np.zeros((5, 1))
+    B[4, 0] = 1.0
+    return A, B
+
+
+def period_map(
+    model: ReducedModel, servo: Servo, observer: Observer | None, law: Law, *, timestep: float, age_steps: int = 1
+) -> np.ndarray:
+    """The matrix that takes the loop from one control tick to the next.
+
+    Args:
+        model: The reduced model.
+        servo: The gimbal's servo.
+        observer: A linear observer; None for the true rate in the law.
+        law: The law; its rate limit does not count.
+        timestep: Physics step [s].
+        age_steps: How old y1 is at a tick [physics steps]; accelerometers show the state one step before.
+
+    Returns:
+        A square matrix. Its state is that of the rig, the tilts not yet seen, the observer's, x_e and the last u.
+    """
+    law = replace(law, rate_limit=math.inf)
+    steps = round(law.dt / timestep)
+    Phi, hold, _ = hold_matrices(*rig_matrices(model, servo), timestep)
+    gamma = hold[:, 0]
+    state_type: Any = type(observer.init(Measurement(0.0, 0.0))) if observer else tuple
+    n_observer = len(observer.init(Measurement(0.0, 0.0))) if observer else 0
+    parts = np.cumsum([5, age_steps, n_observer])
+
+    def period(v: np.ndarray) -> np.ndarray:
+        rig, seen, inside, (x_e, u) = np.split(v, parts)
+        y1, y2 = (seen[-1] if age_steps else rig[0]), rig[2]
+        x2 = rig[1]
+        if observer:
+            state, estimate = observer.step(state_type(*inside), Measurement(y1, y2), u)
+            inside, x2 = np.array(state), estimate.x2
+        u, x_e = law(y1, x2, y2, x_e)
+        for _ in range(steps):
+            seen = np.concatenate([rig[:1], seen])[:age_steps]
+            rig = Phi @ rig + gamma * u
+        return np.concatenate([rig, seen, inside, [x_e, u]])
+
+    return np.column_stack([period(unit) for unit in np.eye(parts[-1] + 2)])
+
+
+def modes(matrix: np.ndarray, dt: float) -> np.ndarray:
+    """The poles s = log(z)/dt of a period's map, the least damped first [1/s]."""
+    z = np.linalg.eigvals(matrix)
+    s = np.log(z[np.abs(z) > 1e-9].astype(complex)) / dt
+    return s[np.argsort(-s.real)]
+
+
+def oscillation(matrix: np.ndarray, dt: float) -> complex:
+    """The least damped oscillating pole with a frequency above 1 rad/s [1/s]: the integrator's pair is slower."""
+    return complex(next(s for s in modes(matrix, dt) if s.imag > 1.0))
+
+
+def first_crossing(value: Callable[[float], float], low: float, high: float, points: int = 40) -> float | None:
+    """The smallest argument at which a function rises through zero; None if it does not."""
+    grid = np.linspace(low, high, points)
+    values = [value(float(x)) for x in grid]
+    for a, b, at_a, at_b in zip(grid, grid[1:], values, values[1:], strict=False):
+        if at_a < 0.0 <= at_b:
+            root: Any = brentq(value, a, b, xtol=1e-7)
+            return float(root)
+    return None

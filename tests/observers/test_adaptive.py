@@ -1,0 +1,242 @@
+"""The adaptive observer on the scissored pair: against the general form and the reduced model."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import solve_continuous_lyapunov
+
+from cmg_mj.errors import InputError
+from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.observers.adaptive import Adaptive
+from cmg_mj.observers.friedland_tacker import FriedlandTacker, System
+from cmg_mj.observers.protocol import extra_signals
+from cmg_mj.reduced import ReducedModel
+from tests.observers.reference import DT, HEAVY, PAPER, Signal, rough_signals
+
+PAIR = dataclasses.replace(PAPER, gimbals=2)
+HEAVY_PAIR = dataclasses.replace(HEAVY, gimbals=2)
+
+MODES: dict[str, dict[str, Any]] = {
+    "bias": {},
+    "bias and sinusoid": {"sinusoid_hz": 1.3},
+    "torque": {"bias": False, "torque": True, "known_bias_deg": -1.2},
+    "torque and sinusoid": {"bias": False, "torque": True, "sinusoid_hz": 7.0, "known_bias_deg": 0.8},
+    "sinusoid": {"bias": False, "sinusoid_hz": 0.4},
+}
+SIGNALS = {
+    "bias": ("bias_rad",),
+    "bias and sinusoid": ("bias_rad", "disturbance_n_m"),
+    "torque": ("torque_n_m",),
+    "torque and sinusoid": ("torque_n_m", "disturbance_n_m"),
+    "sinusoid": ("disturbance_n_m",),
+}
+GAINS: dict[str, Any] = {"L": (-9.0, -60.0), "Gamma": (2.0, 3.0, 5.0), "Sigma": 40.0}
+
+
+def adaptive(model: ReducedModel = PAIR, dt: float = DT, **parameters: Any) -> Any:
+    return make_observer("adaptive", dt, model, **parameters)
+
+
+def general(of: Adaptive) -> tuple[FriedlandTacker, Callable[[float, float, float], System]]:
+    """The same observer in the general form, and the matrices at measured angles and a gimbal rate."""
+    m, known = of.model, math.radians(of.known_bias_deg)
+    w = 2.0 * math.pi * of.sinusoid_hz
+    constants = int(of.bias or of.torque)
+    nm = constants + 2 * bool(w)
+    Am, Cm = np.zeros((nm, nm)), np.zeros((constants + bool(w), nm))
+    Cm[:constants, :constants] = np.eye(constants)
+    weights = [of.Gamma[0] if of.bias else of.Gamma[1]] * constants
+    if w:
+        Am[-2, -1], Am[-1, -2], Cm[-1, -1] = -w, w, 1.0
+        weights += [of.Gamma[2]] * 2
+    observer = FriedlandTacker(of.dt, Am, Cm, np.array(of.L)[:, None], np.diag(weights), np.array([[of.Sigma]]))
+
+    def at(y1: float, y2: float, u: float) -> System:
+        D = m.J1 + m.J2 * math.sin(y2) ** 2
+        A = np.array([[0.0, 1.0], [0.0, -u * m.J2 * math.sin(2.0 * y2) / D]])
+        per_bias, per_torque = m.gravity_torque * math.cos(y1) / D, 1.0 / (m.gimbals * D)
+        lower = [per_bias if of.bias else per_torque] * constants + [per_torque] * bool(w)
+        known_input = (u * m.J_d * m.omega_d * math.cos(y2) + m.gravity_torque * math.sin(y1 + known)) / D
+        return System(
+            A,
+            np.array([[0.0] * len(lower), lower]),
+            np.array([[0.0], [known_input]]),
+            np.array([[1.0, 0.0]]),
+            np.zeros((1, len(lower))),
+        )
+
+    return observer, at
+
+
+@pytest.mark.parametrize("model", [PAIR, HEAVY_PAIR, HEAVY], ids=["pair", "heavy pair", "heavy"])
+@pytest.mark.parametrize("mode", MODES)
+def test_equals_the_general_form(mode: str, model: ReducedModel) -> None:
+    of = adaptive(model, **MODES[mode], **GAINS)
+    observer, at = general(of)
+    y1, y2, u = rough_signals(400, seed=1)
+    state = of.init(Measurement(float(y1[0]), float(y2[0])))
+    reference = observer.init(y1[:1], x=np.array([y1[0], 0.0]))
+    worst, largest = 0.0, 0.0
+    for k in range(1, 400):
+        state, estimate = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        here = at(0.5 * (y1[k - 1] + y1[k]), 0.5 * (y2[k - 1] + y2[k]), u[k - 1])
+        reference = observer.step(reference, here, np.ones(1), y1[k : k + 1])
+        expected = [*reference.x, y2[k], *(observer.Cm @ reference.xm)]
+        worst = max(worst, np.abs(np.array(estimate) - expected).max())
+        largest = max(largest, abs(estimate[3]))
+    print(f"{mode}: rig's form less general form {worst:.1e}; extra signal up to {largest:.2g}")
+    assert largest > 1e-3
+    assert worst < 1e-12
+
+
+def test_equals_the_general_form_with_the_default_gains() -> None:
+    of = adaptive()
+    observer, at = general(of)
+    y1, y2, u = rough_signals(400, seed=2)
+    state = of.init(Measurement(float(y1[0]), float(y2[0])))
+    reference = observer.init(y1[:1], x=np.array([y1[0], 0.0]))
+    for k in range(1, 400):
+        state, estimate = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        here = at(0.5 * (y1[k - 1] + y1[k]), 0.5 * (y2[k - 1] + y2[k]), u[k - 1])
+        reference = observer.step(reference, here, np.ones(1), y1[k : k + 1])
+        np.testing.assert_allclose(estimate, [*reference.x, y2[k], *reference.xm], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_names_what_it_estimates(mode: str) -> None:
+    of = adaptive(**MODES[mode])
+    assert extra_signals(of) == SIGNALS[mode]
+    _, estimate = of.step(of.init(Measurement(0.01, 0.2)), Measurement(0.012, 0.21), 0.4)
+    assert estimate._fields == ("x1", "x2", "x3", *SIGNALS[mode])
+    assert estimate.x3 == 0.21
+
+
+# --- what it finds on the reduced model ----------------------------------------------------------------
+
+
+def reduced_run(
+    model: ReducedModel,
+    e: float,
+    torque: Callable[[float], float],
+    duration: float,
+    noise: float = 0.0,
+    seed: int = 0,
+    dt: float = DT,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """y1, y2, u, x2 of the reduced rig, held upright by the exact state, with a torque on the whole rig."""
+    n = round(duration / dt)
+    x, rows = np.array([0.01, 0.0, 0.0]), []
+    rng = np.random.default_rng(seed)
+    x_e = 35.0 / 0.3 * e
+    for k in range(n + 1):
+        u = float(np.clip(-(35.0 * (x[0] - e) + 4.0 * x[1] - x[2] + 0.3 * x_e), -4.7, 4.7))
+        rows.append((x[0] - e, x[2], u, x[1]))
+        x_e -= dt * x[2]
+
+        def slope(s: float, x: np.ndarray, u: float = u, t: float = k * dt) -> list[float]:
+            D = model.J1 + model.J2 * math.sin(x[2]) ** 2
+            gyroscopic = u * (model.J_d * model.omega_d * math.cos(x[2]) - model.J2 * x[1] * math.sin(2.0 * x[2]))
+            share = torque(t + s) / model.gimbals
+            return [x[1], (gyroscopic + model.gravity_torque * math.sin(x[0]) + share) / D, u]
+
+        x = solve_ivp(slope, (0.0, dt), x, rtol=1e-8, atol=1e-10).y[:, -1]
+    y1, y2, u, x2 = np.array(rows).T
+    return y1 + rng.normal(0.0, noise, n + 1) if noise else y1, y2, u, x2
+
+
+def replay(of: Adaptive, y1: Signal, y2: Signal, u: Signal) -> np.ndarray:
+    """Estimates after the first sample."""
+    state, rows = of.init(Measurement(float(y1[0]), float(y2[0]))), []
+    for k in range(1, len(y1)):
+        state, estimate = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        rows.append(estimate)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("e_deg", [-1.5, 0.3, 2.0])
+def test_finds_the_bias(e_deg: float) -> None:
+    """Without noise; what is left is sin(y1 + e) less sin y1 + e cos y1, 1e-4 of e."""
+    y1, y2, u, x2 = reduced_run(PAIR, math.radians(e_deg), lambda t: 0.0, 8.0)
+    found = replay(adaptive(), y1, y2, u)
+    assert math.degrees(found[-1, 3]) == pytest.approx(e_deg, rel=2e-3)
+    assert abs(found[-1, 1] - x2[-1]) < 1e-3
+
+
+def test_finds_the_torque_on_the_whole_rig_if_the_bias_is_known() -> None:
+    y1, y2, u, x2 = reduced_run(PAIR, math.radians(1.0), lambda t: 0.15, 8.0)
+    found = replay(adaptive(bias=False, torque=True, known_bias_deg=1.0), y1, y2, u)
+    assert found[-1, 3] == pytest.approx(0.15, rel=2e-3)
+    assert abs(found[-1, 1] - x2[-1]) < 1e-3
+    wrong = replay(adaptive(bias=False, torque=True), y1, y2, u)  # the bias is taken for a torque: 2 M sin e more
+    assert wrong[-1, 3] == pytest.approx(0.15 + 2.0 * PAIR.gravity_torque * math.sin(math.radians(1.0)), rel=2e-3)
+
+
+def test_finds_bias_and_sinusoid() -> None:
+    w, e = 2.0 * math.pi * 1.0, math.radians(0.8)
+    y1, y2, u, x2 = reduced_run(PAIR, e, lambda t: 0.2 * math.sin(w * t + 0.7), 14.0)
+    found = replay(adaptive(sinusoid_hz=1.0), y1, y2, u)
+    t = DT * np.arange(1, len(y1))
+    late = t > 12.0
+    assert np.abs(found[late, 3] - e).max() < 0.02 * e
+    assert np.abs(found[late, 4] - 0.2 * np.sin(w * t[late] + 0.7)).max() < 0.004
+    assert np.abs(found[late, 1] - x2[1:][late]).max() < 2e-3
+    blind = replay(adaptive(), y1, y2, u)
+    rms = [float(np.sqrt(np.mean((rows[late, 1] - x2[1:][late]) ** 2))) for rows in (found, blind)]
+    print(f"velocity RMS error with a gait's torque: knowing of it {rms[0]:.1e}, not {rms[1]:.1e} rad/s")
+    assert rms[0] < 0.1 * rms[1]
+
+
+def test_noise_moves_the_bias_by_what_the_linear_filter_says() -> None:
+    """With T at rest, (7) to (9) are a linear filter of y1; its variance is a Lyapunov equation's. 40 seeds."""
+    sigma, e, many = math.radians(0.3), math.radians(1.0), 40
+    of, errors = adaptive(), []
+    y1, y2, u, _ = reduced_run(PAIR, e, lambda t: 0.0, 10.0)
+    noisy = y1[:, None] + np.random.default_rng(9).normal(0.0, sigma, (len(y1), many))
+    ones = np.ones(many)
+    state = of.init(Measurement(noisy[0], y2[0] * ones))
+    for k in range(1, len(y1)):
+        state, estimate = of.step(state, Measurement(noisy[k], y2[k] * ones), u[k - 1] * ones)
+        if k * DT >= 7.0:
+            errors.append(estimate.bias_rad - e)
+
+    b, (l1, l2) = PAIR.gravity_torque / PAIR.J1, of.L
+    T = np.array([b / -l2, l1 * b / l2])  # 0 = (A + L C2) T + B0
+    gain = -of.Gamma[0] * of.Sigma * T[0]  # (9)
+    correction = np.array([l1 + T[0] * gain, l2 + T[1] * gain, gain])
+    F = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, b], [0.0, 0.0, 0.0]]) + np.outer(correction, [1.0, 0.0, 0.0])
+    g = np.array([0.0, b, 0.0]) - correction  # gravity at the measured tilt, and the correction
+    variance = solve_continuous_lyapunov(F, -np.outer(g, g) * sigma**2 * DT)[2, 2]
+    found, expected = float(np.degrees(np.std(errors))), math.degrees(math.sqrt(variance))
+    print(f"bias error: mean {np.degrees(np.mean(errors)):.4f} deg, RMS {found:.4f}, expected {expected:.4f}")
+    assert found == pytest.approx(expected, rel=0.1)
+    assert abs(np.degrees(np.mean(errors))) < 0.02
+
+
+# --- what is refused -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"torque": True}, r"a constant torque and an equilibrium bias act alike; one of them must be false"),
+        ({"bias": False}, r"nothing to estimate"),
+        ({"known_bias_deg": 1.0}, r"known_bias_deg: the bias cannot be known and estimated; set bias to false"),
+        ({"L": (-1.0, 0.0)}, r"L: A \+ L C must be Hurwitz \(both negative\), its eigenvalues are"),
+        ({"L": (1.0, -100.0)}, r"L: A \+ L C must be Hurwitz"),
+        ({"L": (-1.0, 100.0)}, r"L: A \+ L C must be Hurwitz"),
+        ({"Gamma": (1.0, 0.0, 1.0)}, r"Gamma = \[1\.0, 0\.0, 1\.0\]: must be a list of 3 numbers greater than 0"),
+        ({"sinusoid_hz": -1.0}, r"sinusoid_hz = -1\.0: must be a number greater than or equal to 0"),
+        ({"sinusoid_hz": 100.0}, r"sinusoid_hz = 100: must be below half the sample rate, 100 Hz"),
+        ({"sigma": 1.0}, r"adaptive has no such parameter; did you mean 'Sigma'"),
+    ],
+)
+def test_refused(parameters: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=rf"^observer.*{message}"):
+        adaptive(**parameters)
