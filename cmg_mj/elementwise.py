@@ -62,7 +62,10 @@ def sign(x: Scalar) -> Scalar:
 def signed_power(x: Scalar, exponent: float) -> Scalar:
     """[x]^a = |x|^a sign(x) for a > 0, elementwise."""
     if type(x) is float:
-        return math.copysign(abs(x) ** exponent, x)
+        try:
+            return math.copysign(abs(x) ** exponent, x)
+        except OverflowError:  # as on arrays
+            return math.copysign(math.inf, x)
     return np.copysign(np.float_power(np.abs(x), exponent), x)  # not `np.power`: see below
 
 

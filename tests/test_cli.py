@@ -36,7 +36,7 @@ SUMMARY = [
 ]
 """Names that users' scripts rely on."""
 
-COMMANDS = ["bench", "check", "compare", "list", "run"]
+COMMANDS = ["bench", "check", "compare", "list", "reproduce", "run", "tune"]
 
 
 @pytest.fixture(autouse=True)

@@ -77,6 +77,12 @@ def test_signed_power(x: float, a: float) -> None:
     assert signed_power(x, a) == pytest.approx(np.sign(x) * abs(x) ** a, rel=1e-14)
 
 
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_a_power_that_is_too_large_is_infinite_on_both() -> None:
+    assert signed_power(-1e200, 2.0) == -math.inf
+    assert signed_power(np.array([-1e200, 1e200]), 2.0).tolist() == [-math.inf, math.inf]
+
+
 @pytest.mark.parametrize("x", X)
 def test_simple_functions(x: float) -> None:
     assert (sin(x), cos(x), sqrt(abs(x))) == (math.sin(x), math.cos(x), math.sqrt(abs(x)))

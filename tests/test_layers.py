@@ -27,6 +27,7 @@ UPPER = [
     "observers",
     "controller",
     "trajectory",
+    "replay",
     "metrics",
     "picture",
 ]

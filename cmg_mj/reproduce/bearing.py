@@ -6,9 +6,9 @@ With yaw at rest, the bodies' angular momentum about the vertical is, with q_c =
 
     H = cos q_b (J_d w_d cos x3 - (J2/2) sin(2 x3) w_b) - sin q_b (I_c + I_d) w_c
 
-of which nearly all is the flywheel's: upright, at q_b = -pi/4, it has J_d w_d/sqrt(2). A locked bearing carries dH/dt. On a
-free one I_z q_a' + H stays what it was, and the yaw rate's gyroscopic torque acts back on the tilt like a spring of
-stiffness (J_d w_d)^2/(2 I_z).
+of which nearly all is the flywheel's: upright, at q_b = -pi/4, it has J_d w_d/sqrt(2). A locked bearing carries dH/dt.
+On a free one I_z q_a' + H stays what it was, and the yaw rate's gyroscopic torque acts back on the tilt like a spring
+of stiffness (J_d w_d)^2/(2 I_z).
 """
 
 from __future__ import annotations
@@ -128,4 +128,3 @@ def free_bearing() -> Free:
     A_e = r.A_e.copy()
     A_e[1, 0] = (r.gravity_torque - stiffness) / r.J1
     return Free(I_z, stiffness, r.gravity_torque, np.linalg.eigvals(A_e - r.B_e @ np.array([law.gains])))
-

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 from cmg_mj.controller import TABLE_2_GAINS
 from cmg_mj.plant import Plant, load_plant
@@ -146,9 +145,9 @@ def equations_3_and_4(states: int = 500, seed: int = 70_000) -> Claim:
         place="(2) to (4)",
         says="Under Hypotheses 1 to 3 the six bodies move as one pendulum with one gimbal, and body A stands still.",
         found=(
-            f"At {states} random symmetric states the six-body model's tilt acceleration (RMS {r.size:.1f} rad/s^2) equals "
-            f"(3) to {r.tilt:.1e} once J_d omega_d' sin x3 is added, and body A's is {r.yaw:.1e}. With motor torques up to "
-            f"0.2 N m what (3) leaves out is {r.tilt_as_printed:.2f} rad/s^2; J2's sign turned would be "
+            f"At {states} random symmetric states the six-body model's tilt acceleration (RMS {r.size:.1f} rad/s^2) "
+            f"equals (3) to {r.tilt:.1e} once J_d omega_d' sin x3 is added, and body A's is {r.yaw:.1e}. With motor "
+            f"torques up to 0.2 N m what (3) leaves out is {r.tilt_as_printed:.2f} rad/s^2; J2's sign turned would be "
             f"{r.tilt_turned_J2:.1e} off."
         ),
         verdict=verdict(holds),
@@ -196,8 +195,9 @@ def linearisation() -> Claim:
         place="(6), Section III",
         says="A and B linearise (4); the pair (A_e, B_e) with the integrator is controllable.",
         found=(
-            f"Central differences of (4) give A and B to {error:.1e}. The controllability matrix of (A_e, B_e) has full "
-            f"rank: its least singular value is {margin:.1e} of the largest; with the flywheels at rest it is {without:.0e}."
+            f"Central differences of (4) give A and B to {error:.1e}. The controllability matrix of (A_e, B_e) has "
+            f"full rank: its least singular value is {margin:.1e} of the largest; with the flywheels at rest it is "
+            f"{without:.0e}."
         ),
         verdict=verdict(error < 1e-6 and margin > 1e-9 and without < 1e-15),
         figures={"finite_difference_error": error, "rank_margin": margin, "rank_margin_flywheels_at_rest": without},
@@ -220,9 +220,7 @@ def law_equilibria() -> Claim:
     rest_7, poles_7 = equilibrium(model.A, model.B, K, 1.0)
     rest_8, poles_8 = equilibrium(model.A_e, model.B_e, K_e, 1.0)
     expected_7, expected_8 = np.array([0.0, 0.0, K[0] / K[2]]), np.array([0.0, 0.0, 0.0, K_e[0] / K_e[3]])
-    off = max(
-        np.abs(rest_7 - expected_7).max() / abs(expected_7[2]), np.abs(rest_8 - expected_8).max() / expected_8[3]
-    )
+    off = max(np.abs(rest_7 - expected_7).max() / abs(expected_7[2]), np.abs(rest_8 - expected_8).max() / expected_8[3])
     stable = max(np.real(poles_7).max(), np.real(poles_8).max()) < 0.0
     return Claim(
         place="(7), (8)",
@@ -231,8 +229,8 @@ def law_equilibria() -> Claim:
             "k_e1/k_e4 e (both printed with a minus)."
         ),
         found=(
-            f"Per radian of e, (7) rests at x3 = {rest_7[2]:+.1f} and (8) at x = 0 with x_e = {rest_8[3]:+.1f} s; the closed "
-            f"forms agree to {off:.0e}. Poles of (7): {shown(poles_7)}; of (8): {shown(poles_8)} 1/s."
+            f"Per radian of e, (7) rests at x3 = {rest_7[2]:+.1f} and (8) at x = 0 with x_e = {rest_8[3]:+.1f} s; the "
+            f"closed forms agree to {off:.0e}. Poles of (7): {shown(poles_7)}; of (8): {shown(poles_8)} 1/s."
         ),
         verdict=verdict(off < 1e-9 and stable, "sign"),
         why="With y1 = x1 - e the bias enters (7) and (8) as +k1 e: both offsets have a plus where a minus is printed.",
@@ -251,107 +249,10 @@ def shown(poles: np.ndarray) -> str:
     return ", ".join(f"{p.real:.3g}+-{p.imag:.3g}j" if p.imag > 1e-9 else f"{p.real:.3g}" for p in upper)
 
 
-# --- are the gains an LQR's? --------------------------------------------------------------------------------
-
-
-class Inverse(NamedTuple):
-    """What return difference says of a gain."""
-
-    least: float
-    """min over w of |1 + K (jw - A)^-1 B|."""
-    optimal: bool
-    """Whether some Q >= 0 makes K the LQR gain (Kalman 1964: the minimum is not below 1)."""
-    Q: np.ndarray | None
-    """Such a Q, (n, n), of rank 1."""
-    recovered: float
-    """How far the Riccati equation's gain for that Q is off, relative."""
-    diagonal: np.ndarray
-    """The one diagonal of Q that would give K: with a negative entry no diagonal Q >= 0 does."""
-
-
-def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
-    """Is K the LQR gain of x' = A x + B u for some cost x' Q x + u^2?
-
-    With d the open-loop and p the closed-loop polynomial and n_i/d the transfer function to x_i, a cost Q = diag(q)
-    gives |p(jw)|^2 - |d(jw)|^2 = sum of q_i |n_i(jw)|^2, and Q = c c' gives |sum of c_i n_i|^2.
-
-    Args:
-        A: State matrix, (n, n).
-        B: Input matrix, (n, 1).
-        K: Gain, (n,).
-
-    Returns:
-        The answer.
-    """
-    n = len(A)
-    d, p = np.poly(A), np.poly(A - B @ K[None, :])
-    unit = np.eye(n)
-    numerators = np.array([np.poly(A - B @ unit[i][None, :]) - d for i in range(n)])  # d + n_i is that of u = -x_i
-    gap = (_squared(p) - _squared(d))[1:]  # in w^2, degree n - 1
-    roots = np.roots(gap)
-    crossings = [w for w in roots if abs(w.imag) < 1e-9 * (1.0 + abs(w)) and w.real > 0.0]
-    grid = np.concatenate([np.logspace(-6, 8, 4001), [abs(w.real) for w in crossings]])
-    ratio = np.polyval(_squared(p), grid) / np.polyval(_squared(d), grid)
-    optimal = bool(np.polyval(gap, grid).min() >= 0.0 and gap[-1] >= 0.0)
-    basis = np.column_stack([_squared(row) for row in numerators])[1:]
-    diagonal = np.linalg.lstsq(basis, gap, rcond=None)[0]
-    if not optimal:
-        return Inverse(float(np.sqrt(ratio.min())), False, None, math.inf, diagonal)
-    # Spectral factor: the half of the roots of gap(-s^2) to the left.
-    left = [-np.sqrt(-w) if np.sqrt(-w).real > 0.0 else np.sqrt(-w) for w in roots.astype(complex)]
-    factor = math.sqrt(abs(gap[0])) * np.real(np.poly(left))
-    c = np.linalg.solve(numerators[:, 1:].T, factor)
-    Q = np.outer(c, c)
-    P = solve_continuous_are(A, B, Q, np.eye(1))
-    recovered = float(np.abs((B.T @ P)[0] / K - 1.0).max())
-    return Inverse(float(np.sqrt(ratio.min())), True, Q, recovered, diagonal)
-
-
-def _squared(polynomial: np.ndarray) -> np.ndarray:
-    """|p(jw)|^2 as a polynomial in w^2, highest power first."""
-    n = len(polynomial) - 1
-    mirrored = polynomial * (-1.0) ** (n - np.arange(n + 1))
-    even = np.convolve(polynomial, mirrored)[::2]  # p(s) p(-s) in s^2
-    return even * (-1.0) ** (n - np.arange(n + 1))  # s^2 = -w^2
-
-
-def lqr_gains() -> Claim:
-    """Whether Table 2's K_e is an LQR gain."""
-    model = printed_model()
-    found = inverse_optimality(model.A_e, model.B_e, np.array(TABLE_2_GAINS))
-    negative = [f"q{i + 1} = {q:.3g}" for i, q in enumerate(found.diagonal) if q < 0.0]
-    diagonal = (
-        f"No diagonal Q does it: the only candidate has {', '.join(negative)}."
-        if negative
-        else "A diagonal Q does it: " + ", ".join(f"{q:.3g}" for q in found.diagonal) + "."
-    )
-    some = (
-        f"and a Q >= 0 of rank 1 returns K_e from the Riccati equation to {found.recovered:.0e}"
-        if found.optimal
-        else "so no Q >= 0 has it"
-    )
-    return Claim(
-        place="Table 2, K_e",
-        says="K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
-        found=(
-            f"The return difference |1 + K_e (jw - A_e)^-1 B_e| is nowhere below {found.least:.6f}: K_e "
-            f"{'is' if found.optimal else 'is not'} optimal for some quadratic cost, {some}. {diagonal}"
-        ),
-        verdict=verdict(found.optimal and found.recovered < 1e-6, "weights"),
-        why="The cost is not a weighted sum of squares of the single states, so the paper's weights remain unknown.",
-        figures={
-            "least_return_difference": found.least,
-            "recovered_gain_relative_error": found.recovered if found.optimal else None,
-            "Q": None if found.Q is None else found.Q.tolist(),
-            "diagonal_candidate": found.diagonal.tolist(),
-        },
-    )
-
-
 def run(on_share: OnShare) -> list[Claim]:
     """All claims of this module."""
     claims: list[Claim] = []
-    makers: list[Callable[[], Claim]] = [table_1, equations_3_and_4, linearisation, law_equilibria, lqr_gains]
+    makers: list[Callable[[], Claim]] = [table_1, equations_3_and_4, linearisation, law_equilibria]
     for i, make in enumerate(makers):
         claims.append(make())
         on_share((i + 1) / len(makers))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import statistics
-import time
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
@@ -12,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.observers import Measurement
 from cmg_mj.observers.ltv import LinearTimeVarying, State
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.linearisation import printed_model, rank_margin
+from cmg_mj.reproduce.linearisation import printed_model
 from cmg_mj.scenario import load_scenario, prepare
 from cmg_mj.trajectory import Trajectory
 
@@ -38,85 +36,6 @@ def closed_loop(seed: int = SEED) -> Trajectory:
     trajectory = prepare(load_scenario("push_recovery", [f"seed={seed}", "duration_s=6"], "ltv")).run().trajectory
     assert trajectory is not None
     return trajectory
-
-
-# --- observability --------------------------------------------------------------------------------------------
-
-
-def observability_margin(a: float, outputs: np.ndarray = C) -> float:
-    """Rank margin of [C; C A'; C A'^2] for A' = [[0, 1, 0], [0, a, 0], [0, 0, 0]]."""
-    A = np.array([[0.0, 1.0, 0.0], [0.0, a, 0.0], [0.0, 0.0, 0.0]])
-    return rank_margin(np.vstack([outputs, outputs @ A, outputs @ A @ A]))
-
-
-def gramian_bounds(damping: np.ndarray, dt: float, span_s: float) -> tuple[float, float]:
-    """Least and largest eigenvalue of the observability Gramian over every span of a run.
-
-    Phi(t, s) of A' has the first row [1, phi, 0] with phi' = exp(integral of a): Simpson's rule over the span, a held
-    between ticks.
-
-    Args:
-        damping: The entry a of A' tick by tick, (n_ticks,) [1/s].
-        dt: Between ticks [s].
-        span_s: T_0 [s], an even number of ticks.
-
-    Returns:
-        delta_1 and delta_2 of the condition after (10) [s], [s^3].
-    """
-    n = round(span_s / dt)
-    weights = np.ones(n + 1)
-    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
-    weights *= dt / 3.0
-    least, largest = math.inf, 0.0
-    for start in range(len(damping) - n):
-        growth = np.exp(np.concatenate([[0.0], np.cumsum(damping[start : start + n] * dt)]))
-        held = damping[start : start + n]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            step = np.where(np.abs(held) < 1e-9, dt, np.expm1(held * dt) / held)
-        phi = np.concatenate([[0.0], np.cumsum(growth[:-1] * step)])
-        gramian = np.array([[span_s, weights @ phi], [weights @ phi, weights @ phi**2]])
-        values = np.linalg.eigvalsh(gramian)
-        least, largest = min(least, float(values[0]), span_s), max(largest, float(values[1]), span_s)
-    return least, largest
-
-
-def observability(seed: int = SEED, span_s: float = 0.5) -> Claim:
-    """The uniform observability that (10) needs."""
-    model = printed_model()
-    grid = [(u, y2) for u in np.linspace(-4.7, 4.7, 21) for y2 in np.linspace(-math.pi, math.pi, 41)]
-    dampings = [-u * float(model.terms(0.0, float(y2))[2]) for u, y2 in grid]
-    margin = min(observability_margin(a) for a in dampings)
-    without = max(observability_margin(a, C[1:]) for a in dampings)
-    run = closed_loop(seed)
-    along = -run["u_rad_s"] * model.terms(0.0, run["y2_rad"])[2]
-    least, largest = gramian_bounds(along, DT, span_s)
-    worst = [gramian_bounds(np.full(round(span_s / DT) + 1, a), DT, span_s) for a in (min(dampings), max(dampings))]
-    bound = min(pair[0] for pair in worst), max(pair[1] for pair in worst)
-    holds = margin > 0.1 and without < 1e-12 and bound[0] > 0.0 and math.isfinite(bound[1])
-    return Claim(
-        place="After (10)",
-        says="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
-        found=(
-            f"[C; C A'; C A'^2] has rank 3 for every u and y2: its rows hold e1, e3 and e2, whatever a = "
-            f"-u J2 sin(2 y2)/D is (least by largest singular value at least {margin:.2f}; without the tilt measured "
-            f"{without:.0e}). Uniformity needs a bounded a besides, which the rate limit gives: |a| <= "
-            f"{max(map(abs, dampings)):.4f} 1/s. Over every {span_s:g} s of a closed-loop run the Gramian's eigenvalues lie "
-            f"between {least:.5f} and {largest:.5f}; for any a within the bound, between {bound[0]:.5f} and {bound[1]:.5f}."
-        ),
-        verdict=verdict(holds, "a bounded u"),
-        why="Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap.",
-        figures={
-            "rank_margin": margin,
-            "rank_margin_without_tilt": without,
-            "largest_damping_1_s": max(map(abs, dampings)),
-            "span_s": span_s,
-            "gramian_along_run": [least, largest],
-            "gramian_any_u": list(bound),
-        },
-    )
-
-
-# --- Remark 1: delicacy ---------------------------------------------------------------------------------------
 
 
 def slope_of(H: np.ndarray, A: np.ndarray) -> np.ndarray:
@@ -285,21 +204,23 @@ def delicacy() -> Claim:
     ours_fine = at_200["exact step (ours)"].error < 1e-8 and definite["exact step (ours)"] is None
     return Claim(
         place="Remark 1, delicacy",
-        says="The Riccati equation is sensitive to the numerical method, and six decades between Q's entries amplify it.",
+        says="The Riccati equation is sensitive to the numerical method; six decades between Q's entries amplify it.",
         found=(
-            f"From H_0 = I at rest, H stays positive definite with explicit Euler {down_to(definite['explicit Euler'])}, with "
-            f"Runge-Kutta 4 {down_to(definite['Runge-Kutta 4'])}, with the exact step {down_to(definite['exact step (ours)'])}. "
-            f"At 200 Hz H12 is off, by its steady value, by up to {at_200['explicit Euler'].error:.0%} (Euler), "
-            f"{at_200['Runge-Kutta 4'].error:.1e} (Runge-Kutta 4) and {at_200['exact step (ours)'].error:.0e} (exact); in single "
-            f"precision by {single['explicit Euler'].error:.0%} and {single['Runge-Kutta 4'].error:.1e}. Along a closed-loop run "
-            f"H's condition number rises to {conditions.max():.2g}, its least eigenvalue stays above {least:.2f}; all twelve "
-            f"equations by Euler would change the estimated rate by {estimate.difference:.3f} rad/s RMS and its error from "
-            f"{estimate.exact_error:.3f} to {estimate.euler_error:.3f} rad/s."
+            "From H_0 = I at rest, H stays positive definite with explicit Euler "
+            f"{down_to(definite['explicit Euler'])}, with Runge-Kutta 4 {down_to(definite['Runge-Kutta 4'])}, with "
+            f"the exact step {down_to(definite['exact step (ours)'])}. At 200 Hz H12 is off, by its steady value, by "
+            f"up to {at_200['explicit Euler'].error:.0%} (Euler), {at_200['Runge-Kutta 4'].error:.1e} (Runge-Kutta 4) "
+            f"and {at_200['exact step (ours)'].error:.0e} (exact); in single precision by "
+            f"{single['explicit Euler'].error:.0%} and {single['Runge-Kutta 4'].error:.1e}. Along a closed-loop run "
+            f"H's condition number rises to {conditions.max():.2g}, its least eigenvalue stays above {least:.2f}; all "
+            f"twelve equations by Euler would change the estimated rate by {estimate.difference:.3f} rad/s RMS and "
+            f"its error from {estimate.exact_error:.3f} to {estimate.euler_error:.3f} rad/s."
         ),
         verdict=verdict(euler_first and rk4_fine and ours_fine, "method"),
         why=(
-            "At 200 Hz the equation is delicate for explicit Euler alone, and H only until it has settled, the estimate "
-            "throughout; Runge-Kutta 4 does well enough even in single precision, the exact (Davison-Maki) step at any rate."
+            "At 200 Hz the equation is delicate for explicit Euler alone, and H only until it has settled, the "
+            "estimate throughout; Runge-Kutta 4 does well enough even in single precision, the exact (Davison-Maki) "
+            "step at any rate."
         ),
         figures={
             "definite_above_hz": definite,
@@ -342,7 +263,14 @@ def _delicacy_picture() -> Picture:
         "aranovskiy2020-remark-1",
         "aranovskiy2020, Remark 1: the Riccati equation of (10) from H(0) = I, Q of Table 2",
         [
-            Panel("error of H12\nby its steady value", errors, "largest in the first 0.2 s or 50 steps", rate, "log", "log"),
+            Panel(
+                "error of H12\nby its steady value",
+                errors,
+                "largest in the first 0.2 s or 50 steps",
+                rate,
+                "log",
+                "log",
+            ),
             Panel("least eigenvalue\nof H", least, "none where negative", rate, "log", y_range=(0.0, 1.1)),
             Panel("H12 [1/s]", paths, "at 200 Hz", "time [ms]"),
         ],
@@ -350,70 +278,6 @@ def _delicacy_picture() -> Picture:
     )
 
 
-# --- Remark 1: cost -------------------------------------------------------------------------------------------
-
-
-def update_times(worlds: int | None, repeats: int, updates: int) -> dict[str, float]:
-    """Median time of an update [us], the observers taking turns.
-
-    Args:
-        worlds: So many at once, on arrays; None for one, on floats, and then the plain forms of (10) too.
-        repeats: Turns.
-        updates: Updates a turn.
-
-    Returns:
-        Time by observer.
-    """
-    model = printed_model()
-    cases: dict[str, Any] = {name: make_observer(name, DT, model) for name in ("linear", "homogeneous", "ltv")}
-    if worlds is None:
-        cases |= {"ltv, plain Euler": Plain(euler), "ltv, plain Runge-Kutta 4": Plain(rk4)}
-    value: Any = 0.01 if worlds is None else np.full(worlds, 0.01)
-    y, u = Measurement(value, 2.0 * value), 3.0 * value
-    states = {name: observer.init(y) for name, observer in cases.items()}
-    times: dict[str, list[float]] = {name: [] for name in cases}
-    for _ in range(repeats):
-        for name, observer in cases.items():
-            state, step = states[name], observer.step
-            start = time.perf_counter()
-            for _ in range(updates):
-                state, _ = step(state, y, u)
-            times[name].append((time.perf_counter() - start) / updates * 1e6)
-            states[name] = state
-    return {name: statistics.median(values) for name, values in times.items()}
-
-
-def cost() -> Claim:
-    """Time of an update of (10) relative to (9) and (11)."""
-    one = update_times(None, repeats=15, updates=200)
-    worlds = 4096
-    many = update_times(worlds, repeats=5, updates=4)
-    ratios = {name: one[name] / one["linear"] for name in one}
-    arithmetic = {name: many[name] / many["linear"] for name in many}
-    dearest = one["ltv"] > one["homogeneous"] > one["linear"] and arithmetic["ltv"] > 1.0
-    return Claim(
-        place="Remark 1, cost",
-        says="The observer (10) is computationally heavy: its gain takes differential equations solved online.",
-        found=(
-            f"An update takes, by that of (9): (11) {ratios['homogeneous']:.1f}, (10) {ratios['ltv']:.1f} with the exact step "
-            f"on the 2x2 block that is left of H; written out with 3x3 matrices {ratios['ltv, plain Euler']:.0f} with Euler "
-            f"and {ratios['ltv, plain Runge-Kutta 4']:.0f} with Runge-Kutta 4 (one world, in Python). The arithmetic alone, on "
-            f"{worlds} worlds at once: (11) {arithmetic['homogeneous']:.1f}, (10) {arithmetic['ltv']:.1f}. (10) takes "
-            f"{one['ltv']:.0f} us of the 5000 us of a control period here."
-        ),
-        verdict=verdict(dearest),
-        figures={
-            "update_us": one,
-            "update_by_linear": ratios,
-            "update_by_linear_4096_worlds": arithmetic,
-        },
-    )
-
-
 def run(on_share: OnShare) -> list[Claim]:
     """All claims of this module."""
-    claims = []
-    for i, make in enumerate((observability, cost, delicacy)):
-        claims.append(make())
-        on_share((i + 1) / 3.0)
-    return claims
+    return [delicacy()]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
@@ -10,9 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.plant import load_plant
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.linearisation import printed_model
 from cmg_mj.scenario import load_scenario, prepare
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
@@ -31,8 +28,8 @@ DURATION_S = 10.0
 COMPARABLE = 1.5
 """Errors within this factor count as comparable."""
 WHOLE_RUN = (
-    "Over the whole run. In the second after our push (1 N m for 0.1 s) they are not: (10) and (11) know the command but not "
-    "the push, and take the command's effect for a rate; (11), the slowest to learn otherwise, most."
+    "Over the whole run. In the second after our push (1 N m for 0.1 s) they are not: (10) and (11) know the command "
+    "but not the push, and take the command's effect for a rate; (11), the slowest to learn otherwise, most."
 )
 
 
@@ -60,6 +57,11 @@ def errors(result: Result) -> np.ndarray:
 def falls(result: Result) -> float:
     """Share of the worlds that fell."""
     return sum(outcome.fell for outcome in result.outcomes) / len(result.outcomes)
+
+
+def stood(values: np.ndarray) -> Interval:
+    """Mean and interval over the worlds that stood, where the value is a number."""
+    return mean_interval(values[np.isfinite(values)])
 
 
 def with_interval(interval: Interval, digits: int = 4) -> str:
@@ -122,7 +124,7 @@ def figure_4(worlds: int = WORLDS, seed: int = SEED) -> Claim:
     narrow = spread < COMPARABLE and spread_pushed < COMPARABLE
     return Claim(
         place="Fig. 4",
-        says="With the loop closed on the gyro and a push at 2 s, the three tuned observers perform comparably open loop.",
+        says="With the loop closed on the gyro and a push at 2 s, the three tuned observers are comparable open loop.",
         found=(
             f"RMS of the estimated rate less the gyro's, {worlds} seeds, with 95 % intervals [rad/s], over 10 s: "
             f"{listed(whole)}; the largest is {spread:.2f} times the smallest. From the push to a second after it: "
@@ -156,7 +158,9 @@ def _figure_4_picture(example: Trajectory) -> Picture:
             Line(t, example["fog_rad_s"], "gyro", color=0, width=1.2),
         ]
         panels.append(Panel("tilt rate [rad/s]", lines, "(b)" if i == 0 else "", shaded=shaded, y_range=(-0.5, 0.45)))
-    return Picture("aranovskiy2020-fig-4", "aranovskiy2020, Fig. 4: tuning, the law fed by the gyro, a push at 2 s", panels)
+    return Picture(
+        "aranovskiy2020-fig-4", "aranovskiy2020, Fig. 4: tuning, the law fed by the gyro, a push at 2 s", panels
+    )
 
 
 # --- Figs 5 to 7 ----------------------------------------------------------------------------------------------
@@ -170,10 +174,7 @@ def closed_loop(observer: str, angles: Angles, worlds: int, seed: int, duration_
 
 def ordered(found: dict[str, np.ndarray]) -> tuple[bool, Interval, Interval]:
     """Whether homogeneous < ltv < linear beyond chance, world by world, and the two differences."""
-    steps = (
-        mean_interval(found["ltv"] - found["homogeneous"]),
-        mean_interval(found["linear"] - found["ltv"]),
-    )
+    steps = (stood(found["ltv"] - found["homogeneous"]), stood(found["linear"] - found["ltv"]))
     return all(step.low > 0.0 for step in steps), *steps
 
 
@@ -192,7 +193,7 @@ def figures_5_to_7(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED + 1
 
 def _figure(name: str, results: dict[Angles, Result]) -> Claim:
     """One of Figs 5 to 7."""
-    rms = {angles: mean_interval(errors(result)) for angles, result in results.items()}
+    rms = {angles: stood(errors(result)) for angles, result in results.items()}
     tilt = {a: mean_interval([s["tilt_rms_deg"] for s in r.summaries]) for a, r in results.items()}
     shares = {angles: falls(result) for angles, result in results.items()}
     settled = {a: float(np.mean([s["settle_time_s"] is not None for s in r.summaries])) for a, r in results.items()}
@@ -206,7 +207,10 @@ def _figure(name: str, results: dict[Angles, Result]) -> Claim:
     return Claim(
         place=FIGURES[name],
         says=f"With the estimate of {OBSERVERS[name]} in the law the rig stands, and recovers from a push.",
-        found=f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, velocity RMS error with the law on {listed}.",
+        found=(
+            f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, velocity RMS error with the "
+            f"law on {listed}."
+        ),
         verdict=verdict(stands),
         why="" if stands else "It falls in some worlds.",
         figures={
@@ -241,11 +245,14 @@ def _loop_picture(name: str, examples: dict[Angles, Trajectory]) -> Picture:
         rows[1].append(Panel("tilt rate [rad/s]", rates, shaded=shaded))
         gimbal = [Line(t, np.degrees(example["x3_rad"]), "true x3", color=0)]
         rows[2].append(Panel("gimbal angle [deg]", gimbal, shaded=shaded))
-        rows[3].append(Panel("command u [rad/s]", [Line(t, example["u_rad_s"], "u", color=3, width=0.6)], shaded=shaded))
+        rows[3].append(
+            Panel("command u [rad/s]", [Line(t, example["u_rad_s"], "u", color=3, width=0.6)], shaded=shaded)
+        )
     number = FIGURES[name].removeprefix("Fig. ")
     return Picture(
         f"aranovskiy2020-fig-{number}",
-        f"aranovskiy2020, Fig. {number}: the loop closed on {OBSERVERS[name]}, the law on measured and on estimated angles",
+        f"aranovskiy2020, Fig. {number}: the loop closed on {OBSERVERS[name]}, the law on measured and on estimated "
+        "angles",
         [panel for row in rows for panel in row],
         columns=2,
     )
@@ -259,8 +266,8 @@ def _order(results: dict[Angles, dict[str, Result]], worlds: int) -> Claim:
     def words(angles: Angles) -> str:
         holds, first, second = orders[angles]
         return (
-            f"{angles} angles: (11) below (10) by {with_interval(first)}, (10) below (9) by {with_interval(second)} rad/s: "
-            f"the order {'holds' if holds else 'does not hold'}"
+            f"{angles} angles: (11) below (10) by {with_interval(first)}, (10) below (9) by {with_interval(second)} "
+            f"rad/s: the order {'holds' if holds else 'does not hold'}"
         )
 
     panels = []
@@ -276,10 +283,10 @@ def _order(results: dict[Angles, dict[str, Result]], worlds: int) -> Claim:
         found=f"Velocity RMS error over {worlds} seeds, world by world, {'; '.join(map(words, ANGLES))}.",
         verdict=verdict(orders["measured"][0] and orders["estimated"][0], "noise and bias"),
         why=(
-            "At e = 0.5 deg and 400 ug/rtHz under this push. At low noise or large bias the order turns round, because (11) "
-            "mistakes the bias for a rate most: the map over noise and bias is in docs/results.md."
+            "At e = 0.5 deg and 400 ug/rtHz under this push. At low noise or large bias the order turns round, "
+            "because (11) mistakes the bias for a rate most: the map over noise and bias is in docs/results.md."
             if orders["measured"][0] and orders["estimated"][0]
-            else "The differences are as stated; the map over noise and bias in docs/results.md shows where the order holds."
+            else "The map over noise and bias in docs/results.md shows where the order holds."
         ),
         figures={
             f"{pair}_{angles}_angles_rad_s": list(step)
@@ -296,119 +303,8 @@ def _order(results: dict[Angles, dict[str, Result]], worlds: int) -> Claim:
     )
 
 
-# --- the time-invariant observer ------------------------------------------------------------------------------
-
-BIASES_DEG = (0.0, 0.25, 0.5, 1.0)
-
-
-def frozen_gains() -> tuple[float, float]:
-    """H11 and H12 at which the Riccati equation of (10) settles at rest, Q of Table 2 [1/s], [1/s^2]."""
-    q1, q2 = 1.0, 5e6
-    return math.sqrt(q1 + 2.0 * math.sqrt(q2)), math.sqrt(q2)
-
-
-TIME_INVARIANT = {
-    "luenberger": ("luenberger", []),
-    "(10), frozen gain": (
-        "homogeneous",
-        [f"observer.k1={frozen_gains()[0]}", f"observer.k2={frozen_gains()[1]}", "observer.alpha=1"],
-    ),
-    "(10)": ("ltv", []),
-}
-"""Label -> observer and its settings. With alpha = 1, (11) is the first two states of (10) with a constant gain."""
-
-
-def shares_of_falls(label: str, biases_deg: Sequence[float], worlds: int, seed: int) -> dict[float, tuple[float, float]]:
-    """Share of falls and mean velocity RMS error of the worlds that stood, by bias [deg]."""
-    observer, settings = TIME_INVARIANT[label]
-    experiment = prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], observer))
-    plant = experiment.scenario.plant
-    rigs = [load_plant(dataclasses.replace(plant, equilibrium_bias_deg=e)) for e in biases_deg]
-    result = experiment.run_many(
-        [*range(worlds)] * len(rigs), plants=[rig for rig in rigs for _ in range(worlds)], keep_trajectory=False
-    )
-    fell = np.array([outcome.fell for outcome in result.outcomes]).reshape(len(rigs), worlds)
-    rms = errors(result).reshape(len(rigs), worlds)
-    return {
-        e: (float(f.mean()), float(np.nanmean(r)) if not f.all() else math.nan)
-        for e, f, r in zip(biases_deg, fell, rms, strict=True)
-    }
-
-
-def time_invariant(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED + 2) -> list[Claim]:
-    """The time-invariant observer that the paper could not stabilise the rig with."""
-    counts = {"luenberger": worlds, "(10), frozen gain": max(2, worlds // 4), "(10)": max(2, worlds // 4)}
-    found = {}
-    for i, (label, count) in enumerate(counts.items()):
-        found[label] = shares_of_falls(label, BIASES_DEG, count, seed)
-        on_share((i + 1) / len(counts))
-    model = printed_model()
-    lever = model.gravity_torque / model.J1
-    h11, h12 = frozen_gains()
-    luenberger_bias = 20.0 * lever / (150.0 - lever)  # of its estimated rate at rest, per radian of e [1/s]
-    frozen_bias = lever * h11 / h12
-    fails = [e for e in BIASES_DEG if found["luenberger"][e][0] == 1.0]
-    stands = [e for e in BIASES_DEG if found["luenberger"][e][0] == 0.0]
-    listed = ", ".join(f"{share:.0%} at {e:g} deg" for e, (share, _) in found["luenberger"].items())
-    frozen_fall = max(share for share, _ in found["(10), frozen gain"].values())
-    half = found["(10), frozen gain"][0.5][1], found["(10)"][0.5][1]
-    return [
-        Claim(
-            place="Section V, the time-invariant observer",
-            says="A linear time-invariant observer, a particular case of (10), could not stabilise the rig.",
-            found=(
-                f"The Luenberger observer of the predecessor on the linearisation (6), {worlds} seeds, the same push: share of "
-                f"falls {listed}. But (10) with its gain frozen at H's steady value, {counts['(10), frozen gain']} seeds a "
-                f"bias, falls in {frozen_fall:.0%} and has a velocity RMS error of {half[0]:.4f} rad/s at 0.5 deg, (10) itself "
-                f"{half[1]:.4f}: J2 is so small that H hardly varies. What fails is not the constant gain but its size and the "
-                f"model: at rest e biases the estimated rate by {luenberger_bias:.1f} e/s there and by {frozen_bias:.1f} e/s in (10)."
-            ),
-            verdict=verdict(bool(fails), "bias"),
-            why=(
-                f"For the Luenberger observer with the predecessor's gain and a bias of {min(fails):g} deg or more; it stands "
-                f"at {', '.join(f'{e:g}' for e in stands)} deg. (10) with a frozen gain does not fail."
-                if fails
-                else "It stands at every bias tried."
-            ),
-            figures={
-                "bias_deg": list(BIASES_DEG),
-                **{
-                    f"fell_fraction_{label}": [share for share, _ in by_bias.values()]
-                    for label, by_bias in found.items()
-                },
-                **{
-                    f"velocity_rms_error_{label}_rad_s": [None if math.isnan(r) else r for _, r in by_bias.values()]
-                    for label, by_bias in found.items()
-                },
-                "rate_bias_luenberger_rad_s_per_rad": luenberger_bias,
-                "rate_bias_10_rad_s_per_rad": frozen_bias,
-            },
-            pictures=[_falls_picture(found)],
-        )
-    ]
-
-
-def _falls_picture(found: dict[str, dict[float, tuple[float, float]]]) -> Picture:
-    styles = ("o-", "s-", ".--")
-    shares, rms = (
-        [
-            Line(BIASES_DEG, [factor * values[part] for values in by_bias.values()], label, style)
-            for style, (label, by_bias) in zip(styles, found.items(), strict=True)
-        ]
-        for part, factor in ((0, 100.0), (1, 1.0))
-    )
-    return Picture(
-        "aranovskiy2020-time-invariant",
-        "aranovskiy2020, Section V: a time-invariant observer in the loop, with the push",
-        [
-            Panel("share of falls [%]", shares, y_range=(-5.0, 105.0)),
-            Panel("velocity\nRMS error [rad/s]", rms, "of the worlds that stood", "equilibrium bias e [deg]"),
-        ],
-    )
-
-
-def run_figures(on_share: OnShare) -> list[Claim]:
-    """Figs 4 to 7."""
+def run(on_share: OnShare) -> list[Claim]:
+    """All claims of this module."""
     first = figure_4()
     on_share(0.15)
     return [first, *figures_5_to_7(lambda share: on_share(0.15 + 0.85 * share))]

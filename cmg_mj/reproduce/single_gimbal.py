@@ -58,10 +58,11 @@ def rig_with(settings: PlantSettings, servo: Servo) -> Plant:
     Raises:
         ValueError: The servo is too stiffly damped for RK4 at this timestep: it would chatter by itself.
     """
-    if servo.kv * settings.timestep_s / servo.inertia > RK4_LIMIT:
+    decay = servo.kv * settings.timestep_s / servo.inertia
+    if decay > RK4_LIMIT:
         raise ValueError(
-            f"servo lag {1e3 * servo.lag_s:.3g} ms: kv h/I = {servo.kv * settings.timestep_s / servo.inertia:.3g} must be "
-            f"at most {RK4_LIMIT} at timestep_s = {settings.timestep_s:g}"
+            f"servo lag {1e3 * servo.lag_s:.3g} ms: kv h/I = {decay:.3g} must be at most {RK4_LIMIT} at timestep_s = "
+            f"{settings.timestep_s:g}"
         )
     plant = load_plant(settings)
     for i in plant.servos:
@@ -237,3 +238,10 @@ def main_frequency(trajectory: Trajectory, seconds: float = 5.0) -> float:
     late = late[:, np.isfinite(late).all(axis=0)]
     spectrum = (np.abs(np.fft.rfft(late - late.mean(axis=0), axis=0)) ** 2).mean(axis=1)
     return float(np.fft.rfftfreq(len(late), t[1] - t[0])[spectrum.argmax()])
+
+
+def pushed(trajectory: Trajectory) -> list[tuple[float, float]]:
+    """When the push acted, to shade it [s]."""
+    push = trajectory["push_n_m"].reshape(len(trajectory), -1)[:, 0]
+    times = trajectory["time_s"][np.nan_to_num(push) != 0.0]
+    return [(float(times[0]), float(times[-1]))] if len(times) else []

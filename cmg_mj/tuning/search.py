@@ -83,14 +83,14 @@ def search(loss: Loss, numbers: Sequence[Number], *, starts: int = 2) -> tuple[l
         return value
 
     if len(numbers) == 1:
-        _search_line(height, float(low[0]), float(high[0]), float(given[0]))
+        _search_line(height, float(low[0]), float(high[0]))
     else:
         _search_simplex(height, low, high, given, starts)
     return [float(size) for size in np.exp(np.clip(best[1], low, high))], math.exp(best[0])
 
 
-def _search_line(height: Callable, low: float, high: float, given: float) -> None:
-    points = sorted({*np.linspace(low, high, GRID).tolist(), given})
+def _search_line(height: Callable, low: float, high: float) -> None:
+    points = np.linspace(low, high, GRID).tolist()
     heights = [height(np.array([point])) for point in points]
     lowest = int(np.argmin(heights))
     around = points[max(lowest - 1, 0)], points[min(lowest + 1, len(points) - 1)]

@@ -19,7 +19,7 @@ def test_bias_is_found_in_95_of_100_seeds() -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_velocity_error_is_the_smallest_from_half_a_degree_up(sign: float) -> None:
     biases = [sign * size for size in (0.5, 1.0, 1.5)]
-    errors = rig.velocity_errors(61_000, 4, ("adaptive", *dao2023.OTHERS), biases)
+    errors = rig.velocity_errors(61_000, 3, ("adaptive", *dao2023.OTHERS), biases)
     for name in dao2023.OTHERS:
         mean, half = dao2023.mean_and_interval(errors[name] - errors["adaptive"])
         print(f"{name} less adaptive: {mean} +- {half} rad/s at e = {biases} deg")

@@ -1,0 +1,76 @@
+"""Observers replayed on a recording against the same observers in the run itself."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.replay import cropped, of_worlds, replay
+from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.simulate import Result
+from cmg_mj.trajectory import Trajectory
+
+SETTINGS = ["duration_s=0.8", "push.0.start_s=0.3", 'companions="all"', 'controller.feedback="fog"']
+
+
+@cache
+def experiment() -> Experiment:
+    return prepare(load_scenario("push_recovery", [*SETTINGS, "seed=11"]))
+
+
+@cache
+def recorded(worlds: int | None) -> Trajectory:
+    result: Result = experiment().run() if worlds is None else experiment().run_many(worlds)
+    assert result.trajectory is not None
+    return result.trajectory
+
+
+@pytest.mark.parametrize("worlds", [None, 3])
+@pytest.mark.parametrize("name", OBSERVERS)
+def test_replay_is_bitwise_what_the_run_recorded(name: str, worlds: int | None) -> None:
+    controller = experiment().controller()
+    observer = controller.companions.get(name, controller.observer)
+    estimate = replay(observer, recorded(worlds))
+    for column, value in zip(("x1_rad", "x2_rad_s", "x3_rad"), estimate, strict=True):
+        original = recorded(worlds)[f"estimate/{name}/{column}"]
+        assert value.shape == original.shape
+        np.testing.assert_array_equal(value, original)
+
+
+def test_replay_knows_what_it_is_fed_with() -> None:
+    """Another command gives another estimate: the comparison above is not an empty one."""
+    moved = Trajectory({**recorded(3).columns, "u_rad_s": recorded(3)["u_rad_s"] + 0.1})
+    of = experiment().controller().observer
+    assert np.abs(replay(of, moved).x2 - replay(of, recorded(3)).x2).max() > 1e-3
+
+
+def test_it_starts_at_the_first_row_it_is_given() -> None:
+    part = cropped(recorded(3), 0.2, 0.6)
+    assert part["time_s"][0] == pytest.approx(0.2)
+    assert part["time_s"][-1] == pytest.approx(0.6)
+    assert len(part) == 81
+    x1, x2, x3 = replay(experiment().controller().observer, part)
+    np.testing.assert_array_equal(x1[0], part["y1_rad"][0])
+    np.testing.assert_array_equal(x2[0], 0.0)
+    np.testing.assert_array_equal(x3[0], part["y2_rad"][0])
+
+
+def test_some_worlds_of_many() -> None:
+    chosen = of_worlds(recorded(3), np.array([True, False, True]))
+    np.testing.assert_array_equal(chosen["y1_rad"], recorded(3)["y1_rad"][:, [0, 2]])
+    np.testing.assert_array_equal(chosen["time_s"], recorded(3)["time_s"])
+
+
+def test_a_world_that_fell_is_nan_from_there_and_leaves_the_others_alone() -> None:
+    columns = {name: values.copy() for name, values in recorded(3).columns.items()}
+    for name in columns:
+        if name != "time_s":
+            columns[name][50:, 1] = np.nan
+    of = experiment().controller().observer
+    rate, whole = replay(of, Trajectory(columns)).x2, replay(of, recorded(3)).x2
+    assert np.isnan(rate[50:, 1]).all()
+    np.testing.assert_array_equal(rate[:50, 1], whole[:50, 1])
+    np.testing.assert_array_equal(rate[:, [0, 2]], whole[:, [0, 2]])
