@@ -172,6 +172,8 @@ def chain_errors(
 
     def slope(_: float, E: np.ndarray) -> list[float]:
         *numbers, last = correction(float(E[0]))
+        if not math.isfinite(last):  # LSODA would go on for ever
+            raise OverflowError
         return [*(float(E[i + 1]) + number for i, number in enumerate(numbers)), last]
 
     for size in sizes:

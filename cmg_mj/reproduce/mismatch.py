@@ -186,9 +186,11 @@ class Ran(NamedTuple):
     """How many worlds fell."""
 
 
-def run_all(mismatches: Sequence[Mismatch], worlds: int, seed: int, duration_s: float) -> Ran:
+def run_all(
+    mismatches: Sequence[Mismatch], worlds: int, seed: int, duration_s: float, settings: Sequence[str] = ()
+) -> Ran:
     """Run every mismatch in some worlds, all at once, with (11) in the loop and the push of Figs 5 to 7."""
-    experiment = prepare(load_scenario("push_recovery", [f"seed={seed}", f"duration_s={duration_s}"]))
+    experiment = prepare(load_scenario("push_recovery", [f"seed={seed}", f"duration_s={duration_s}", *settings]))
     cases = [(m.kind, size) for m in mismatches for size in m.sizes]
     changes = {m.kind: m.change for m in mismatches}
     symmetric = rig(experiment)

@@ -89,11 +89,11 @@ def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple
     return float(estimate.x1[settling:].mean()), float(estimate.x2[settling:].mean())
 
 
-def expected_integrator(case: str, e_deg: float, sigma: float) -> float:
+def expected_integrator(case: str, e_deg: float, sigma: float, seed: int = SEED) -> float:
     """x_e at which the law's command is zero [rad s]: 0 = k1 x1 + k2 x2 + k4 x_e, of what the law is fed with."""
     k1, k2, _, k4 = TABLE_2_GAINS
     observer, settings = CASES[case]
-    x1, x2 = steady(observer, e_deg, sigma)
+    x1, x2 = steady(observer, e_deg, sigma, seed)
     if any("truth" in setting for setting in settings):
         x2 = 0.0
     if not any("estimated" in setting for setting in settings):

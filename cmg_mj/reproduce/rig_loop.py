@@ -208,8 +208,8 @@ def _figure(name: str, results: dict[Angles, Result]) -> Claim:
         place=FIGURES[name],
         says=f"With the estimate of {OBSERVERS[name]} in the law the rig stands, and recovers from a push.",
         found=(
-            f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, velocity RMS error with the "
-            f"law on {listed}."
+            f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, velocity RMS error with "
+            f"the law on {listed}."
         ),
         verdict=verdict(stands),
         why="" if stands else "It falls in some worlds.",

@@ -10,6 +10,7 @@ import numpy as np
 from cmg_mj.plant import Plant, PlantSettings, load_plant
 from cmg_mj.reproduce.sampled_loop import Servo
 from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.schema import ControllerSettings
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 
@@ -29,8 +30,12 @@ WINDOW_S = 2.0
 """Two windows of this length, the last of a release, are compared."""
 FLOOR_RAD_S = 1e-3
 """A tilt rate below this is no oscillation: a release begins with thirty times as much."""
+RATE_LIMIT = ControllerSettings().rate_limit_rad_s
+"""Largest command [rad/s]."""
 RK4_LIMIT = 2.7
 """Runge-Kutta 4 follows x' = -x only for steps below 2.785."""
+LATE_S = 4.0
+"""The end of a run with noise that counts as after the push [s]."""
 STEADY = 0.98
 """Share of the amplitude that an oscillation keeps from one window to the next if it is sustained."""
 
@@ -189,7 +194,7 @@ class Runs(NamedTuple):
     tilt: np.ndarray
     """RMS tilt, (n_worlds,) [deg]."""
     shaking: np.ndarray
-    """Standard deviation of the tilt over the last five seconds, (n_worlds,) [deg]."""
+    """Standard deviation of the tilt over the last `LATE_S`, (n_worlds,) [deg]."""
     fell: np.ndarray
     """Which worlds fell, (n_worlds,)."""
     trajectory: Trajectory
@@ -222,22 +227,31 @@ def runs(
     trajectory = result.trajectory
     assert trajectory is not None
     fell = np.array([outcome.kind != "done" for outcome in result.outcomes])
-    late = trajectory["time_s"] >= prepared.scenario.duration_s - 5.0
+    late = trajectory["time_s"] >= prepared.scenario.duration_s - LATE_S
 
     def of(name: str) -> np.ndarray:
         return np.array([np.nan if down else s[name] for s, down in zip(result.summaries, fell, strict=True)])
 
-    shaking = np.degrees(trajectory["x1_rad"][late].std(axis=0))
+    x1 = np.degrees(trajectory["x1_rad"][late])
+    shaking = np.where(fell, np.nan, x1.std(axis=0) if len(x1) else np.nan)
     return Runs(of("velocity_rms_error_rad_s"), of("tilt_rms_deg"), shaking, fell, trajectory)
 
 
-def main_frequency(trajectory: Trajectory, seconds: float = 5.0) -> float:
-    """Where the tilt rate's spectrum has its peak over the last seconds, averaged over the worlds that stood [Hz]."""
+def main_frequency(trajectory: Trajectory) -> float:
+    """Where the tilt rate's spectrum has its peak over the last `LATE_S`, averaged over the worlds that stood [Hz]."""
     t = trajectory["time_s"]
-    late = trajectory["x2_rad_s"][t >= t[-1] - seconds]
+    late = trajectory["x2_rad_s"][t >= t[-1] - LATE_S]
     late = late[:, np.isfinite(late).all(axis=0)]
-    spectrum = (np.abs(np.fft.rfft(late - late.mean(axis=0), axis=0)) ** 2).mean(axis=1)
-    return float(np.fft.rfftfreq(len(late), t[1] - t[0])[spectrum.argmax()])
+    padded = 8 * len(late)
+    spectrum = (np.abs(np.fft.rfft(late - late.mean(axis=0), padded, axis=0)) ** 2).mean(axis=1)
+    return float(np.fft.rfftfreq(padded, t[1] - t[0])[spectrum.argmax()])
+
+
+def limited_share(trajectory: Trajectory) -> float:
+    """Share of the ticks of the last `LATE_S` at which the command is at its limit, over the worlds that stood."""
+    t = trajectory["time_s"]
+    late = np.abs(trajectory["u_rad_s"][t >= t[-1] - LATE_S])
+    return float((late[:, np.isfinite(late).all(axis=0)] >= RATE_LIMIT).mean())
 
 
 def pushed(trajectory: Trajectory) -> list[tuple[float, float]]:

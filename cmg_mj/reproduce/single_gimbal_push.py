@@ -207,5 +207,9 @@ def _picture(tuning: Tuning) -> Picture:
             Line(t, one["fog_rad_s"], "gyro", color=0, width=1.2),
         ]
         panels.append(Panel("tilt rate [rad/s]", lines, "(b)" if i == 0 else "", shaded=push, y_range=(-1.0, 0.6)))
-    title = "sokolov2019, Fig. 3: the law fed by the gyro, a push at 1 s (0.5 N m, 0.1 s; e = 0.5 deg)"
+    (torque,) = tuning.prepared.scenario.push
+    title = (
+        f"sokolov2019, Fig. 3: the law fed by the gyro, a push at {torque.start_s:g} s ({torque.torque_n_m:g} N m, "
+        f"{torque.duration_s:g} s; e = {tuning.prepared.scenario.plant.equilibrium_bias_deg:g} deg)"
+    )
     return Picture("sokolov2019-fig-3", title, panels)

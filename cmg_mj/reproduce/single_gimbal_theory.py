@@ -131,7 +131,7 @@ def law_equilibria() -> Claim:
         np.abs(rest_6 - [0.0, 0.0, K[0] / K[2]]).max() / abs(K[0] / K[2]),
         np.abs(rest_7 - [0.0, 0.0, 0.0, K_E[0] / K_E[3]]).max() / (K_E[0] / K_E[3]),
     )
-    stable = float(max(poles_6.real.max(), poles_7.real.max()))
+    slowest = float(max(np.real(poles_6).max(), np.real(poles_7).max()))
     return Claim(
         place="(5), (6), (7)",
         says=(
@@ -144,7 +144,7 @@ def law_equilibria() -> Claim:
             f"at x = 0, x_e = {rest_7[3]:+.1f} s = +k_e1/k_e4. Poles of (6): {shown(poles_6)}; of (7): "
             f"{shown(poles_7)} 1/s."
         ),
-        verdict=verdict(error < 1e-6 and margin > 1e-9 and off < 1e-9 and stable < 0.0, "sign"),
+        verdict=verdict(error < 1e-6 and margin > 1e-9 and off < 1e-9 and slowest < 0.0, "sign"),
         why="With y1 = x1 - e the bias enters (6) and (7) as +k1 e: both offsets have a plus where a minus is printed.",
         figures={
             "finite_difference_error": error,
@@ -210,7 +210,7 @@ def biased_observer(e_deg: float = 0.25) -> Claim:
     still = max(float(rest.x.max()) for rest in rests.values())
     off = max(abs(rest.x2_estimate / x_hat[1] - 1.0) for rest in rests.values())
     off_x_e = max(abs(rest.x_e / expected_x_e[angles] - 1.0) for angles, rest in rests.items())
-    holds = still < 2e-3 and off < 0.02 and off_x_e < 0.02 and float(poles.real.max()) < 0.0
+    holds = still < 2e-3 and off < 0.02 and off_x_e < 0.02 and float(np.real(poles).max()) < 0.0
     return Claim(
         place="Section IV-B",
         says="A - L C is Hurwitz; with a bias e the estimate of (9) is off, but the integrator still brings x to zero.",

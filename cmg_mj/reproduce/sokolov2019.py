@@ -1,7 +1,37 @@
-"""sokolov2019."""
+"""sokolov2019: one gimbal on a locked thrust bearing, and three velocity estimators."""
 
 from __future__ import annotations
 
-from cmg_mj.reproduce.claim import Step
+from cmg_mj.reproduce import (
+    bearing,
+    plvcc,
+    single_gimbal_lag,
+    single_gimbal_loop,
+    single_gimbal_push,
+    single_gimbal_theory,
+)
+from cmg_mj.reproduce.claim import Claim, OnShare, Step
 
-STEPS: list[Step] = []
+
+def _proposition(on_share: OnShare) -> list[Claim]:
+    return [plvcc.claim("sokolov2019")]
+
+
+def _loops(on_share: OnShare) -> list[Claim]:
+    """Figs 4 to 6 need the lags: what oscillates by itself is told there, without noise."""
+    lags = single_gimbal_lag.lags(lambda share: on_share(0.3 * share))
+    found = single_gimbal_loop.loops(lambda share: on_share(0.3 + 0.7 * share))
+    return [*single_gimbal_loop.figures_4_to_6(found, lags), single_gimbal_lag.claim(lags)]
+
+
+def _bearing(on_share: OnShare) -> list[Claim]:
+    return [bearing.claim(bearing.study(on_share))]
+
+
+STEPS: list[Step] = [
+    Step("the equations", 5.0, single_gimbal_theory.run),
+    Step("Proposition 1", 3.0, _proposition),
+    Step("Fig. 3", 3.0, single_gimbal_push.figure_3),
+    Step("Figs 4 to 6, and the lag", 24.0, _loops),
+    Step("the thrust bearing", 5.0, _bearing),
+]

@@ -22,7 +22,7 @@ WARM_UP_S = 2.0
 """So much of the recording before the window is replayed as well, for the observer to settle [s]."""
 
 Window = tuple[float, float]
-"""Start and end of what is scored [s]."""
+"""Start, included, and end, excluded, of what is scored [s]."""
 
 
 def window_of(scenario: Scenario) -> Window:
@@ -71,7 +71,7 @@ class Recorded:
     def _scored(self) -> np.ndarray:
         """Which rows lie in the window, (n_ticks,)."""
         time = self.trajectory["time_s"]
-        return (time >= self.window[0] - 1e-9) & (time <= self.window[1] + 1e-9)
+        return (time > self.window[0] - 1e-9) & (time < self.window[1] - 1e-9)
 
     def errors(self, observer: Observer) -> np.ndarray:
         """RMS over the window of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN where it is lost."""
@@ -100,12 +100,12 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     timestep = scenario.plant.timestep_s
     duration = math.ceil(window_of(scenario)[1] / timestep - 1e-9) * timestep
     feedback = "fog" if scenario.controller.feedback == "observer" else scenario.controller.feedback
-    loop = {"feedback": feedback, "angles": "measured", "trim_s": 0.0}
+    loop = {"feedback": feedback, "trim_s": 0.0}
     return scenario.model_copy(
         update={
             "duration_s": duration,
             "controller": scenario.controller.model_copy(update=loop),
-            "observer": ObserverSettings(kind="finite_difference"),  # the quickest; nothing uses its estimate
+            "observer": ObserverSettings(kind="finite_difference"),  # its angles are the measured ones
             "companions": [],
             "sensors": sensors,
         }

@@ -45,8 +45,8 @@ def idle(loss: Loss, numbers: Sequence[Number], given: float, factor: float = 10
         changes = []
         for moved in (max(sizes[i] / factor, number.low), min(sizes[i] * factor, number.high)):
             value = loss([*sizes[:i], moved, *sizes[i + 1 :]])
-            changes.append(abs(value / given - 1.0) if math.isfinite(value) else math.inf)
-        if max(changes) < 1e-6:
+            changes.append(abs(value - given) if math.isfinite(value) else math.inf)
+        if math.isfinite(given) and max(changes) <= 1e-6 * given:
             found.append(number)
     return found
 

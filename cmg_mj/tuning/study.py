@@ -270,7 +270,10 @@ def best_noise(study: Study) -> float | None:
         sizes = [math.log(level.sizes[number.name] / abs(number.given)) for level in noisy]
         crossed = crossing([math.log(level.noise_ug_rthz) for level in noisy], sizes) if noisy else None
         return None if crossed is None else math.exp(crossed)
-    least = min(range(len(levels)), key=lambda i: levels[i].ratio.mean)
+    ratios = [level.ratio.mean for level in levels]
+    if not np.isfinite(ratios).all():
+        return None
+    least = int(np.argmin(ratios))
     return levels[least].noise_ug_rthz if 0 < least < len(levels) - 1 else None
 
 

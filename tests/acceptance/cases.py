@@ -15,6 +15,9 @@ STANDING = {
     "ltv": (),
     "linear": (),
     "linear_high_gain": (),
+    "adaptive": (),
+    "high_gain": (),
+    "homogeneous_adaptive": (),
     "luenberger": ("plant.equilibrium_bias_deg=0.1",),
     "finite_difference": ("sensors.accelerometer.noise_density_ug_rthz=100.0",),
     "super_twisting": ("observer.L=15.0",),
@@ -44,7 +47,9 @@ def ride_along(seed: int, worlds: int) -> Result:
 def closed_loop_figures(result: Result, first: int = 0) -> dict[str, float]:
     """Figures of a group of GROUP worlds."""
     group = result.summaries[first : first + GROUP]
+    has_bias = "bias_rms_error_deg" in group[0]
     return {
+        **({"bias_rms_error_deg": statistics.fmean(s["bias_rms_error_deg"] for s in group)} if has_bias else {}),
         "velocity_rms_error_rad_s": statistics.fmean(s["velocity_rms_error_rad_s"] for s in group),
         "tilt_rms_deg": statistics.fmean(s["tilt_rms_deg"] for s in group),
         "command_rms_rad_s": statistics.fmean(s["command_rms_rad_s"] for s in group),

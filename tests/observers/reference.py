@@ -29,7 +29,7 @@ HEAVY = ReducedModel(J1=0.06, J2=0.05, J_d=2e-3, omega_d=150.0, gravity_torque=2
 """A rig whose gimbal and flywheel matter, so that no term is small. In Table 1, J2 is 0.3 % of J1."""
 
 EPSILON, BOUND = 0.0287, 10.4
-"""Defaults that are not a paper's: epsilon of linear_high_gain and L of super_twisting, from docs/tuning.md."""
+"""Defaults that are not a paper's: epsilon of linear_high_gain and L of super_twisting, from `cmg-mj tune`."""
 
 Signal = Sequence[float] | np.ndarray
 

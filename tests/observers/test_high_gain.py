@@ -1,0 +1,202 @@
+"""`high_gain` against andrieu2009 (7), (8) on the reduced model, and against the general form."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from cmg_mj.errors import InputError
+from cmg_mj.observers import Measurement
+from cmg_mj.observers.bi_limit import BiLimitCorrection, violated_conditions
+from cmg_mj.observers.high_gain import HighGain
+from cmg_mj.observers.updated_high_gain import UpdatedHighGain
+from cmg_mj.reduced import ReducedModel
+from tests.observers.reference import DT, HEAVY, PAPER, Slope, integrate, observer, power, rough_signals, run
+
+DEFAULTS = {"l1": 29.5, "l2": 12.4, "d_inf": 0.6, "b": 0.333, "phi1": 0.03, "phi2": 1.0, "phi3": 3.0}
+
+
+def high_gain(dt: float = DT, model: ReducedModel = PAPER, **parameters: Any) -> HighGain:
+    made = observer("high_gain", dt, model, **parameters)
+    assert isinstance(made, HighGain)
+    return made
+
+
+def printed_slope(m: ReducedModel, **parameters: float) -> Slope:
+    """(7), (8) for n = 2 with K of section 3; state x1, x2, L."""
+    k = DEFAULTS | parameters
+    d, b = k["d_inf"], k["b"]
+
+    def q(s: float, a: float) -> float:
+        return s + power(s, a) if d > 0.0 else s
+
+    def slope(z: np.ndarray, y1: float, y2: float, u: float) -> np.ndarray:
+        x1, x2, L = z
+        D = m.J1 + m.J2 * math.sin(y2) ** 2
+        damping = m.J2 * math.sin(2.0 * y2) / D
+        f2 = (u * m.J_d * m.omega_d * math.cos(y2) + m.gravity_torque * math.sin(y1)) / D - u * damping * x2
+        q1 = q(k["l1"] * (x1 - y1) / L**b, 1.0 / (1.0 - d))
+        q2 = q(k["l2"] * q1, 1.0 + d)
+        growth = k["phi1"] * (k["phi2"] - L) + k["phi3"] * abs(u * damping)
+        return np.array([x2 - L ** (1.0 + b) * q1, f2 - L ** (2.0 + b) * q2, L * growth])
+
+    return slope
+
+
+CASES = [
+    pytest.param({}, PAPER, id="defaults"),
+    pytest.param({"l1": 45.0}, PAPER, id="l1"),
+    pytest.param({"l2": 25.0}, PAPER, id="l2"),
+    pytest.param({"d_inf": 0.2}, PAPER, id="d_inf"),
+    pytest.param({"d_inf": 0.0}, PAPER, id="linear"),
+    pytest.param({"l1": 10.0, "l2": 4.0, "phi2": 3.0, "b": 0.6}, PAPER, id="phi2 and b"),
+    pytest.param({}, HEAVY, id="a rig whose gain moves"),
+    pytest.param({"phi1": 0.3}, HEAVY, id="phi1"),
+    pytest.param({"phi3": 0.5}, HEAVY, id="phi3"),
+]
+
+
+@pytest.mark.parametrize(("parameters", "model"), CASES)
+def test_follows_the_printed_observer_at_200_hz(parameters: dict, model: ReducedModel) -> None:
+    y1, y2, u = rough_signals(150)
+    phi2 = parameters.get("phi2", 1.0)
+    expected = integrate(printed_slope(model, **parameters), [y1[0], 0.0, phi2], y1, y2, u)
+    estimates, states = run(high_gain(model=model, **parameters), y1, y2, u)
+    gains = np.array([state.L for state in states[1:]])
+    error = np.sqrt(np.mean((estimates[:, 1] - expected[:, 1]) ** 2)) / np.std(expected[:, 1])
+    print(f"{parameters}: relative error {error:.1e}, L up to {gains.max():.3f}")
+    assert error < 1e-2
+    # Omega is held over a sample, in which the gimbal turns by up to 0.02 rad.
+    assert gains - 1.0 == pytest.approx(expected[:, 2] - 1.0, rel=0.02, abs=1e-5)
+    if model is HEAVY:
+        assert gains.max() > 1.1
+
+
+@pytest.mark.parametrize(("parameters", "model"), CASES)
+def test_equals_the_general_form(parameters: dict, model: ReducedModel) -> None:
+    k = DEFAULTS | parameters
+
+    def terms(y: Any) -> Any:
+        return model.terms(y[0], y[1])
+
+    def f2(u: float, y: Any, x: Any) -> float:
+        drift, gain, damping = terms(y)
+        return drift + u * (gain - damping * x[0])
+
+    general = UpdatedHighGain(
+        dt=DT,
+        f=(lambda u, y, x: 0.0, f2),
+        correction=BiLimitCorrection((k["l1"], k["l2"]), k["d_inf"]),
+        Omega=lambda u, y, x: abs(u * terms(y)[2]),
+        b=k["b"],
+        phi1=k["phi1"],
+        phi2=k["phi2"],
+        phi3=k["phi3"],
+    )
+    y1, y2, u = rough_signals(300, seed=4)
+    estimates, states = run(high_gain(model=model, **parameters), y1, y2, u)
+    state = general.init((float(y1[0]), float(y2[0])))
+    for i in range(1, len(y1)):
+        state, x = general.step(state, (float(y1[i]), float(y2[i])), float(u[i - 1]))
+        ours = (*estimates[i - 1, :2], states[i].L)
+        assert ours == pytest.approx((*x, state.L), rel=1e-12, abs=1e-12)
+
+
+def test_the_defaults_are_inside_the_theorem() -> None:
+    of = high_gain()
+    assert violated_conditions(2, of.d_inf, of.b) == []
+    assert of.correction == BiLimitCorrection((29.5, 12.4), 0.6)
+    assert np.roots([1.0, of.l1, of.l1 * of.l2]).real.max() < -10.0
+
+
+def test_omega_bounds_the_increments_exactly() -> None:
+    """(6) for f2, affine in x2: |f2(x2) - f2(x2_hat)| = |u damping| |x2 - x2_hat|."""
+    rng = np.random.default_rng(0)
+    for y1, y2, u, a, b in rng.normal(0.0, 1.0, (50, 5)):
+        increment = HEAVY.tilt_acceleration(y1, a, y2, u) - HEAVY.tilt_acceleration(y1, b, y2, u)
+        assert abs(increment) == pytest.approx(abs(u * HEAVY.terms(y1, y2)[2]) * abs(a - b), rel=1e-9, abs=1e-12)
+
+
+def test_without_noise_and_bias_it_finds_the_rate() -> None:
+    """Along a free motion of the reduced model, the true x1, x3 measured."""
+    u, dt = 0.5, 5e-4
+    t = np.arange(0.0, 0.8, dt)
+
+    def motion(s: float, x: np.ndarray) -> list[float]:
+        return [x[1], PAPER.tilt_acceleration(float(x[0]), float(x[1]), u * s - 0.1, u)]
+
+    x1, x2 = solve_ivp(motion, (0.0, 0.8), [-0.04, 0.25], "DOP853", t, rtol=1e-11, atol=1e-12).y
+    estimates, _ = run(high_gain(dt), x1, u * t - 0.1, np.full(len(t), u))
+    error = np.abs(estimates[:, 1] - x2[1:])
+    assert error[:10].min() > 0.1
+    assert error[t[1:] > 0.7].max() < 1e-4
+
+
+@pytest.mark.parametrize("d_inf", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("e_deg", [0.5, -2.0])
+def test_a_bias_leaves_the_rate_error_of_its_equilibrium(e_deg: float, d_inf: float) -> None:
+    """At rest y1 = -e, L = 1: q2(l2 q1) balances gravity, and x2 = q1."""
+    y1 = -math.radians(e_deg)
+    estimates, _ = run(high_gain(d_inf=d_inf), [y1] * 600, [0.0] * 600, [0.0] * 600)
+    pull = PAPER.gravity_torque * math.sin(y1) / PAPER.J1
+
+    def balance(q1: float) -> float:
+        w = 12.4 * q1
+        return w + (power(w, 1.0 + d_inf) if d_inf else 0.0) - pull
+
+    expected = brentq(balance, -10.0, 10.0, xtol=1e-14)
+    assert estimates[-1, 1] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_larger_error_is_corrected_more_than_in_proportion() -> None:
+    """What d_inf > 0 is for, and the opposite of `homogeneous`."""
+
+    def pull(error: float, d_inf: float) -> float:
+        of = high_gain(d_inf=d_inf)
+        state = of.init(Measurement(0.0, 0.0))._replace(x1=error)
+        _, estimate = of.step(state, Measurement(0.0, 0.0), 0.0)
+        return abs(estimate.x2) / error
+
+    assert pull(0.1, 0.6) > 2.0 * pull(0.001, 0.6)
+    assert pull(0.1, 0.0) == pytest.approx(pull(0.001, 0.0), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"d_inf": 1.0}, r"^observer\.d_inf = 1\.0: must be a number greater than or equal to 0 and less than 1"),
+        ({"d_inf": -0.1}, r"^observer\.d_inf = -0\.1"),
+        ({"b": 0.7}, r"b = 0\.7: must be below \(1 - d_inf\)/d_inf = 0\.6667, andrieu2009 \(21\)"),
+        ({"d_inf": 0.9, "b": 0.41}, r"b = 0\.41: must be below \(1 - d_inf\)/d_inf = 0\.1111"),
+        ({"l1": 1000.0}, r"l1, l2, phi2: too fast for the sample period: the poles .* Runge-Kutta step of 0\.005 s"),
+        ({"phi2": 60.0}, r"too fast for the sample period"),
+        ({"phi2": 0.0}, r"^observer\.phi2 = 0\.0"),
+        ({"l3": 1.0}, r"^observer\.l3: high_gain has no such parameter"),
+    ],
+)
+def test_what_the_theorem_does_not_allow_is_refused(parameters: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        high_gain(**parameters)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_fastest_gains_that_are_taken_are_stable() -> None:
+    """Just inside the limit of the step, the linear observer still forgets; beyond it, it would not."""
+    low, high = 30.0, 1000.0
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        try:
+            high_gain(l1=middle, d_inf=0.0)
+            low = middle
+        except InputError:
+            high = middle
+    of = high_gain(l1=0.99 * low, d_inf=0.0)
+    state = of.init(Measurement(0.0, 0.0))._replace(x1=1e-6)
+    for _ in range(3000):
+        state, _ = of.step(state, Measurement(0.0, 0.0), 0.0)
+    assert abs(state.x1) < 1e-9
