@@ -29,7 +29,7 @@ def bench(observers: str, worlds: int, as_json: bool) -> None:
     show(figures, bench_table(figures), as_json)
 
 
-@click.command(short_help="Reproduce the papers: every figure, table, remark and proof, with a verdict.")
+@click.command(short_help="Reproduce the four papers, claim by claim, with verdicts.")
 @click.argument("paper")
 @click.option("--out", metavar="FOLDER", help="Folder to write to; by default one in runs/.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures alone, as JSON, on standard output.")

@@ -9,5 +9,5 @@ STEPS: list[Step] = [
     Step("inequalities and theorems", 3.0, bi_limit_theory.claims),
     Step("the bioreactor's bounds", 1.0, bioreactor_bounds.claims),
     Step("Figs 1 and 2", 9.0, bioreactor_figures.claims),
-    Step("on the rig", 12.0, high_gain_rig.run),
+    Step("on the rig", 13.0, high_gain_rig.run),
 ]
