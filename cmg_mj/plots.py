@@ -67,7 +67,8 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
     axes.set_ylabel(panel.y_label)
     axes.set_title(panel.title, loc="left", fontsize="medium")
     axes.grid(alpha=0.3)
-    axes.margins(x=0.0 if panel.x_scale == "linear" else 0.02)
+    marks_only = all(set(line.style) <= set("o.x+s") for line in panel.lines)
+    axes.margins(x=0.0 if panel.x_scale == "linear" and not marks_only else 0.03)
     if panel.y_range is not None:
         axes.set_ylim(*panel.y_range)
     if any(line.label for line in panel.lines):

@@ -80,7 +80,7 @@ def tuning_table(study: Study) -> Table:
     table.caption_justify = "left"
     table.add_column("noise\n[ug/rtHz]", justify="right", vertical="bottom")
     for number in study.numbers:
-        table.add_column(f"{number.name}\ngiven {abs(number.given):.4g}", justify="right", vertical="bottom")
+        table.add_column(f"{number.name}\ngiven {number.given:.4g}", justify="right", vertical="bottom")
     for heading in (
         "held out:\ntuned\n[rad/s]",
         "\ngiven\n[rad/s]",
@@ -90,7 +90,8 @@ def tuning_table(study: Study) -> Table:
     ):
         table.add_column(heading, justify="right", vertical="bottom")
     for level in study.levels:
-        sizes = (f"{size:.4g}{'*' if name in level.edges else ''}" for name, size in level.sizes.items())
+        signed = {n.name: math.copysign(level.sizes[n.name], n.given) for n in study.numbers}
+        sizes = (f"{size:.4g}{'*' if name in level.edges else ''}" for name, size in signed.items())
         table.add_row(
             f"{level.noise_ug_rthz:g}",
             *sizes,
