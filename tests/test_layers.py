@@ -29,6 +29,7 @@ UPPER = [
     "trajectory",
     "replay",
     "metrics",
+    "intervals",
     "picture",
 ]
 LOWER = [

@@ -16,14 +16,14 @@ from scipy import stats
 
 from cmg_mj.cli import studies
 from cmg_mj.errors import InputError
+from cmg_mj.intervals import Interval, mean_interval, paired_verdict, ratio_interval
 from cmg_mj.observers import Estimate, make_observer
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.replay import replay
 from cmg_mj.scenario import load_scenario, prepare
 from cmg_mj.schema import Scenario
 from cmg_mj.trajectory import Trajectory
-from cmg_mj.tuning import Recorded, best_noise, mean_interval, paired_verdict, ratio_interval, record, tune
-from cmg_mj.tuning.intervals import Interval
+from cmg_mj.tuning import Recorded, best_noise, record, tune
 from cmg_mj.tuning.parameters import Number, numbers_of, parameters_of, replaced
 from cmg_mj.tuning.recorded import tuning_scenario, window_of
 from cmg_mj.tuning.search import crossing, search

@@ -4,21 +4,16 @@ The loop is closed on the gyro, what was measured and commanded is replayed thro
 are fitted on one set of worlds and scored on another.
 """
 
-from cmg_mj.tuning.intervals import Interval, mean_interval, paired_verdict, ratio_interval
 from cmg_mj.tuning.recorded import Recorded, record
 from cmg_mj.tuning.study import Level, Study, best_noise, tune, tuned_scenario
 from cmg_mj.tuning.written import figures_of, save_study, tuning_table
 
 __all__ = [
-    "Interval",
     "Level",
     "Recorded",
     "Study",
     "best_noise",
     "figures_of",
-    "mean_interval",
-    "paired_verdict",
-    "ratio_interval",
     "record",
     "save_study",
     "tune",

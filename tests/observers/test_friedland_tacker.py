@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from cmg_mj.observers.friedland_tacker import FriedlandTacker, State, System
-from cmg_mj.reproduce import pendulum_robot as robot
+from cmg_mj.reproduce.dao2023 import pendulum_robot as robot
 
 N, NM, R, M, P = 3, 4, 2, 2, 2
 """n, nm, r, m, p of the random plants."""

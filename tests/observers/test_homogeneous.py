@@ -228,6 +228,8 @@ def test_a_known_bias_is_where_gravity_pulls() -> None:
     of: Any = observer("homogeneous")
     y = Measurement(-e, 0.0)  # at rest at the equilibrium, x1 = 0
     told, untold = of.init(y), of.init(y)
+    with_bias: Any = None
+    without: Any = None
     for _ in range(2000):
         told, with_bias = of.step_with_bias(told, y, 0.0, e)
         untold, without = of.step(untold, y, 0.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.reproduce import adaptive_rig as rig
-from cmg_mj.reproduce import dao2023
+from cmg_mj.reproduce.dao2023 import adaptive_rig as rig
+from cmg_mj.reproduce.dao2023 import claims as dao2023
 
 
 def test_bias_is_found_in_95_of_100_seeds() -> None:

@@ -11,11 +11,18 @@ import pytest
 import sympy as sp
 
 from cmg_mj.picture import Picture
-from cmg_mj.reproduce import bi_limit_theory, bioreactor_bounds, bioreactor_figures, high_gain_rig
-from cmg_mj.reproduce.andrieu2009 import STEPS
-from cmg_mj.reproduce.bioreactor import Bioreactor, dilution
-from cmg_mj.reproduce.bioreactor_figures import Study, study
-from cmg_mj.reproduce.bioreactor_study import CONSTANT, HOMOGENEOUS, UPDATED, replay, rms_late, run_plant, window_means
+from cmg_mj.reproduce.andrieu2009 import STEPS, bi_limit_theory, bioreactor_bounds, bioreactor_figures, high_gain_rig
+from cmg_mj.reproduce.andrieu2009.bioreactor import Bioreactor, dilution
+from cmg_mj.reproduce.andrieu2009.bioreactor_figures import Study, study
+from cmg_mj.reproduce.andrieu2009.bioreactor_study import (
+    CONSTANT,
+    HOMOGENEOUS,
+    UPDATED,
+    replay,
+    rms_late,
+    run_plant,
+    window_means,
+)
 from cmg_mj.reproduce.claim import Claim
 
 SEEDS, FIRST = 6, 500

@@ -12,11 +12,19 @@ from scipy.linalg import solve_continuous_are
 
 from cmg_mj.controller import TABLE_2_GAINS
 from cmg_mj.observers import Estimate, Measurement, make_observer
-from cmg_mj.reproduce import gains, hypotheses, linearisation, mismatch, observability, rest, riccati
-from cmg_mj.reproduce import rig_loop as loop
-from cmg_mj.reproduce import time_invariant as invariant
-from cmg_mj.reproduce.aranovskiy2020 import STEPS
-from cmg_mj.reproduce.optimality import inverse_optimality
+from cmg_mj.reproduce.aranovskiy2020 import (
+    STEPS,
+    gains,
+    hypotheses,
+    linearisation,
+    mismatch,
+    observability,
+    rest,
+    riccati,
+)
+from cmg_mj.reproduce.aranovskiy2020 import rig_loop as loop
+from cmg_mj.reproduce.aranovskiy2020 import time_invariant as invariant
+from cmg_mj.reproduce.aranovskiy2020.optimality import inverse_optimality
 from tests import paper_model as paper
 
 SEED = 910_000

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from cmg_mj.observers import Measurement, make_observer
-from cmg_mj.reproduce import beyond
-from cmg_mj.reproduce.character import Motion, character, push_lag, record_motion, update_us
-from cmg_mj.reproduce.league import league, markdown
+from cmg_mj.reproduce.beyond import claims as beyond
+from cmg_mj.reproduce.beyond.character import Motion, character, push_lag, record_motion, update_us
+from cmg_mj.reproduce.beyond.league import league, markdown
 from tests.observers.reference import DT, PAPER
 
 SEED = 410_000

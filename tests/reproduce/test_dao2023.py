@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from cmg_mj.reproduce import dao2023
-from cmg_mj.reproduce import pendulum_robot as robot
+from cmg_mj.reproduce.dao2023 import claims as dao2023
+from cmg_mj.reproduce.dao2023 import pendulum_robot as robot
 
 
 @cache

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.reproduce.floor import kalman_filter, tilt_noise, velocity_floor
+from cmg_mj.reproduce.beyond.floor import kalman_filter, tilt_noise, velocity_floor
 from cmg_mj.scenario import load_scenario, prepare
 from tests.observers.reference import PAPER
 

@@ -10,7 +10,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 from sympy.diffgeom import CoordSystem, Manifold, Patch, TensorProduct, metric_to_Riemann_components
 
-from cmg_mj.reproduce import plvcc
+from cmg_mj.reproduce.aranovskiy2020 import plvcc
 
 q1, q2 = plvcc.coordinates()
 

@@ -11,13 +11,21 @@ from scipy.integrate import solve_ivp
 
 from cmg_mj.plant import load_plant
 from cmg_mj.replay import replay
-from cmg_mj.reproduce import bearing, single_gimbal_theory, sokolov2019
-from cmg_mj.reproduce import single_gimbal as rig
-from cmg_mj.reproduce import single_gimbal_lag as lag
-from cmg_mj.reproduce import single_gimbal_loop as loop
-from cmg_mj.reproduce import single_gimbal_push as push
+from cmg_mj.reproduce import sokolov2019
 from cmg_mj.reproduce.claim import Claim
-from cmg_mj.reproduce.sampled_loop import Servo, first_crossing, modes, oscillation, period_map, rig_matrices
+from cmg_mj.reproduce.sokolov2019 import bearing, single_gimbal_theory
+from cmg_mj.reproduce.sokolov2019 import single_gimbal as rig
+from cmg_mj.reproduce.sokolov2019 import single_gimbal_lag as lag
+from cmg_mj.reproduce.sokolov2019 import single_gimbal_loop as loop
+from cmg_mj.reproduce.sokolov2019 import single_gimbal_push as push
+from cmg_mj.reproduce.sokolov2019.sampled_loop import (
+    Servo,
+    first_crossing,
+    modes,
+    oscillation,
+    period_map,
+    rig_matrices,
+)
 from cmg_mj.trajectory import Trajectory
 from tests import paper_model as paper
 
@@ -224,7 +232,7 @@ def test_thresholds_on_mujoco_are_the_predicted_ones(lags: lag.Lags) -> None:
 
 def test_the_flywheels_torque_on_the_gimbal_counts(lags: lag.Lags, monkeypatch: pytest.MonkeyPatch) -> None:
     """A loop model without it predicts another threshold, and MuJoCo tells the two apart."""
-    from cmg_mj.reproduce import sampled_loop
+    from cmg_mj.reproduce.sokolov2019 import sampled_loop
 
     def without(model, servo):
         A, B = rig_matrices(model, servo)

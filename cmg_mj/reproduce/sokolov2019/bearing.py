@@ -21,13 +21,13 @@ import mujoco
 import numpy as np
 
 from cmg_mj.callback import control
+from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.single_gimbal import Runs, experiment, pushed, runs, servo_of
+from cmg_mj.reproduce.sokolov2019.single_gimbal import Runs, experiment, pushed, runs, servo_of
 from cmg_mj.scenario import Experiment, load_scenario, prepare
 from cmg_mj.timing import whole_steps
-from cmg_mj.tuning import Interval, mean_interval
 
 SEED, WORLDS = 84_000, 20
 LOCKED_S = 3.0

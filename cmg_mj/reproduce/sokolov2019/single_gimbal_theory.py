@@ -14,9 +14,14 @@ from cmg_mj.observers import make_observer
 from cmg_mj.observers.luenberger import Luenberger
 from cmg_mj.plant import Plant
 from cmg_mj.reduced import ReducedModel
+from cmg_mj.reproduce.aranovskiy2020.linearisation import (
+    controllability_margin,
+    equilibrium,
+    finite_difference_error,
+    shown,
+)
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.linearisation import controllability_margin, equilibrium, finite_difference_error, shown
-from cmg_mj.reproduce.single_gimbal import NO_NOISE, experiment, servo_of
+from cmg_mj.reproduce.sokolov2019.single_gimbal import NO_NOISE, experiment, servo_of
 
 TABLE_I = {
     "m": 2.62,

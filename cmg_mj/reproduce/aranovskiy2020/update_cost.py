@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.reproduce.aranovskiy2020.linearisation import printed_model
+from cmg_mj.reproduce.aranovskiy2020.riccati import DT, Plain, euler, rk4
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.linearisation import printed_model
-from cmg_mj.reproduce.riccati import DT, Plain, euler, rk4
 
 
 def update_times(worlds: int | None, repeats: int, updates: int) -> dict[str, float]:

@@ -11,7 +11,7 @@ from scipy.signal import detrend
 
 from cmg_mj.observers.bi_limit import BiLimitCorrection
 from cmg_mj.observers.updated_high_gain import Signals, UpdatedHighGain
-from cmg_mj.reproduce.bioreactor import Bioreactor, dilution
+from cmg_mj.reproduce.andrieu2009.bioreactor import Bioreactor, dilution
 
 HBAR, HBAR_OF_OBSERVERS = 1.0, 0.8
 NOISE, NOISE_PERIOD = 0.05, 0.01

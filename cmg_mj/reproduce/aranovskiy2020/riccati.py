@@ -14,8 +14,8 @@ from cmg_mj.observers import Measurement
 from cmg_mj.observers.ltv import LinearTimeVarying, State
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
+from cmg_mj.reproduce.aranovskiy2020.linearisation import printed_model
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.linearisation import printed_model
 from cmg_mj.scenario import load_scenario, prepare
 from cmg_mj.trajectory import Trajectory
 

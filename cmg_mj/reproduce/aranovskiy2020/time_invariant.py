@@ -10,9 +10,9 @@ import numpy as np
 
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.plant import load_plant
+from cmg_mj.reproduce.aranovskiy2020.linearisation import printed_model
+from cmg_mj.reproduce.aranovskiy2020.rig_loop import DURATION_S, WORLDS, errors
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.linearisation import printed_model
-from cmg_mj.reproduce.rig_loop import DURATION_S, WORLDS, errors
 from cmg_mj.scenario import load_scenario, prepare
 
 SEED = 72_002

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from cmg_mj.reproduce import (
+from cmg_mj.reproduce.aranovskiy2020 import plvcc
+from cmg_mj.reproduce.claim import Claim, OnShare, Step
+from cmg_mj.reproduce.sokolov2019 import (
     bearing,
-    plvcc,
     single_gimbal_lag,
     single_gimbal_loop,
     single_gimbal_push,
     single_gimbal_theory,
 )
-from cmg_mj.reproduce.claim import Claim, OnShare, Step
 
 
 def _proposition(on_share: OnShare) -> list[Claim]:

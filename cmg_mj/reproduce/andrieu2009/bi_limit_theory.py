@@ -14,7 +14,7 @@ from cmg_mj.elementwise import signed_power
 from cmg_mj.observers.bi_limit import BiLimitCorrection, largest_b, violated_conditions, weights
 from cmg_mj.observers.updated_high_gain import UpdatedHighGain, updated_gain
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.reproduce.bioreactor_study import B, P
+from cmg_mj.reproduce.andrieu2009.bioreactor_study import B, P
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
 
 START_ERRORS = (-1e3, -1e2, -10.0, -1.0, 1.0, 10.0, 1e2, 1e3)

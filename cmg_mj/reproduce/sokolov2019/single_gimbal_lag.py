@@ -10,8 +10,8 @@ import numpy as np
 from cmg_mj.observers import make_observer
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
-from cmg_mj.reproduce.single_gimbal import (
+from cmg_mj.reproduce.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
+from cmg_mj.reproduce.sokolov2019.single_gimbal import (
     WINDOW_S,
     Threshold,
     experiment,

@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from cmg_mj.intervals import Interval, ratio_interval
 from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.reproduce.aranovskiy2020.rig_loop import errors
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.rig_loop import errors
 from cmg_mj.scenario import load_scenario, prepare
 from cmg_mj.schema import Scenario
-from cmg_mj.tuning import Interval, Level, Recorded, Study, best_noise, ratio_interval, record, tune
+from cmg_mj.tuning import Level, Recorded, Study, best_noise, record, tune
 
 SEED = 74_000
 WORLDS = 20

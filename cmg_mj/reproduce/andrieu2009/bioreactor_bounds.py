@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.reproduce.bioreactor import U_MAX, Bioreactor
-from cmg_mj.reproduce.bioreactor_study import HBAR, HBAR_OF_OBSERVERS, NOISE, P
+from cmg_mj.reproduce.andrieu2009.bioreactor import U_MAX, Bioreactor
+from cmg_mj.reproduce.andrieu2009.bioreactor_study import HBAR, HBAR_OF_OBSERVERS, NOISE, P
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
 
 ROUNDING = 1e-9

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import solve_continuous_are
 
 from cmg_mj.controller import TABLE_2_GAINS
+from cmg_mj.reproduce.aranovskiy2020.linearisation import printed_model
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.linearisation import printed_model
 
 
 class Inverse(NamedTuple):

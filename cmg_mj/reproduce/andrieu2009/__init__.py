@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmg_mj.reproduce import bi_limit_theory, bioreactor_bounds, bioreactor_figures, high_gain_rig
+from cmg_mj.reproduce.andrieu2009 import bi_limit_theory, bioreactor_bounds, bioreactor_figures, high_gain_rig
 from cmg_mj.reproduce.claim import Step
 
 STEPS: list[Step] = [

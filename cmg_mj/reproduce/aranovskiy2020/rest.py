@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.controller import TABLE_2_GAINS
+from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.observers import make_observer
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
+from cmg_mj.reproduce.aranovskiy2020.linearisation import printed_model
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.linearisation import printed_model
 from cmg_mj.scenario import load_scenario, prepare
 from cmg_mj.trajectory import Trajectory
-from cmg_mj.tuning import Interval, mean_interval
 
 SEED = 73_000
 WORLDS = 6

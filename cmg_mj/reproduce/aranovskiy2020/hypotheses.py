@@ -7,10 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.intervals import Interval, ratio_interval
 from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.reproduce.aranovskiy2020.mismatch import (
+    MISMATCHES,
+    Mismatch,
+    Ran,
+    balanced_yaw_rate,
+    foreseen_yaw_rate,
+    run_all,
+)
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.mismatch import MISMATCHES, Mismatch, Ran, balanced_yaw_rate, foreseen_yaw_rate, run_all
-from cmg_mj.tuning import Interval, ratio_interval
 
 SEED = 75_000
 WORLDS = 4

@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import lsim, lti
 
+from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.replay import replay
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.single_gimbal import experiment, pushed
+from cmg_mj.reproduce.sokolov2019.single_gimbal import experiment, pushed
 from cmg_mj.scenario import Experiment
 from cmg_mj.trajectory import Trajectory
-from cmg_mj.tuning import Interval, mean_interval
 
 SEED, WORLDS = 82_000, 20
 AFTER_S = 0.5

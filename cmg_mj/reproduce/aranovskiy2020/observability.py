@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from cmg_mj.reproduce.aranovskiy2020.linearisation import printed_model, rank_margin
+from cmg_mj.reproduce.aranovskiy2020.riccati import DT, SEED, C, closed_loop
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.linearisation import printed_model, rank_margin
-from cmg_mj.reproduce.riccati import DT, SEED, C, closed_loop
 
 
 def observability_margin(a: float, outputs: np.ndarray = C) -> float:

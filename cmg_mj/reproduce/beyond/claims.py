@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.reproduce.beyond.league import league, markdown
 from cmg_mj.reproduce.claim import Claim, OnShare, Step, verdict
-from cmg_mj.reproduce.league import league, markdown
 from cmg_mj.scenario import load_scenario, prepare
-from cmg_mj.tuning.intervals import Interval, mean_interval
 
 SEED, WORLDS = 90_000, 100
 FRICTION_N_M = 0.05

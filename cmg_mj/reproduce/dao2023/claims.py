@@ -10,9 +10,9 @@ from scipy.stats import t as student
 
 from cmg_mj.observers.friedland_tacker import FriedlandTacker
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.reproduce import adaptive_rig as rig
-from cmg_mj.reproduce import pendulum_robot as robot
 from cmg_mj.reproduce.claim import Claim, OnShare, Step, verdict
+from cmg_mj.reproduce.dao2023 import adaptive_rig as rig
+from cmg_mj.reproduce.dao2023 import pendulum_robot as robot
 
 SIGMAS = (10.0, 1000.0, 0.1, 10_000.0)
 """The paper's three weights, in the order of Fig. 3, and one beyond."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.plant import Plant, PlantSettings, load_plant
-from cmg_mj.reproduce.sampled_loop import Servo
+from cmg_mj.reproduce.sokolov2019.sampled_loop import Servo
 from cmg_mj.scenario import Experiment, load_scenario, prepare
 from cmg_mj.schema import ControllerSettings
 from cmg_mj.simulate import Result

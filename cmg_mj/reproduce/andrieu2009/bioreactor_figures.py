@@ -9,8 +9,8 @@ from scipy.stats import spearmanr
 
 from cmg_mj.observers.bi_limit import largest_b
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.reproduce.bioreactor import Bioreactor
-from cmg_mj.reproduce.bioreactor_study import (
+from cmg_mj.reproduce.andrieu2009.bioreactor import Bioreactor
+from cmg_mj.reproduce.andrieu2009.bioreactor_study import (
     CONSTANT,
     HBAR,
     HBAR_OF_OBSERVERS,

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from cmg_mj.reproduce import (
+from cmg_mj.reproduce.aranovskiy2020 import (
     gains,
     hypotheses,
     linearisation,
     observability,
     optimality,
+    plvcc,
     rest,
     riccati,
     rig_loop,
     time_invariant,
     update_cost,
 )
-from cmg_mj.reproduce.claim import Step
+from cmg_mj.reproduce.claim import Claim, OnShare, Step
+
+
+def _appendix(on_share: OnShare) -> list[Claim]:
+    return [plvcc.claim("aranovskiy2020")]
+
 
 STEPS: list[Step] = [
     Step("constants and linearisation", 0.3, linearisation.run),
@@ -27,4 +33,5 @@ STEPS: list[Step] = [
     Step("Figs 4 to 7", 21.0, rig_loop.run),
     Step("the time-invariant observer", 10.0, time_invariant.run),
     Step("Table 2 tuned again", 28.0, gains.run),
+    Step("the appendix", 3.0, _appendix),
 ]

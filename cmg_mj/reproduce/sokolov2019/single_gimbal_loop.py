@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
-from cmg_mj.reproduce.single_gimbal import LATE_S, Runs, limited_share, main_frequency, pushed, runs
-from cmg_mj.reproduce.single_gimbal_lag import LAGS_S, PAPERS, Lags
+from cmg_mj.reproduce.sokolov2019.single_gimbal import LATE_S, Runs, limited_share, main_frequency, pushed, runs
+from cmg_mj.reproduce.sokolov2019.single_gimbal_lag import LAGS_S, PAPERS, Lags
 from cmg_mj.trajectory import Trajectory
-from cmg_mj.tuning import Interval, mean_interval
 
 SEED, WORLDS = 83_000, 20
 DURATION_S = 7.0
