@@ -117,8 +117,13 @@ def observer_list() -> str:
         cls = observer_class(name)
         parameters = [p for p in inspect.signature(cls).parameters.values() if p.name not in ("dt", "model")]
         title = (sys.modules[cls.__module__].__doc__ or "").partition("\n")[0]
-        lines.append(f"  {name:{width}}  {_assignments({p.name: p.default for p in parameters}) or 'no parameters'}")
-        lines += textwrap.wrap(title, 98, initial_indent=" " * (width + 4), subsequent_indent=" " * (width + 4))
+        defaults = _assignments({p.name: p.default for p in parameters}) or "no parameters"
+        indent = " " * (width + 4)
+        # A default is kept in one piece: its spaces are not those to break at.
+        wrapped = textwrap.wrap(defaults.replace(", ", ",\0"), 98, initial_indent=indent, subsequent_indent=indent)
+        lines.append(f"  {name:{width}}  {wrapped[0].strip()}".replace("\0", " "))
+        lines += [line.replace("\0", " ") for line in wrapped[1:]]
+        lines += textwrap.wrap(title, 98, initial_indent=indent, subsequent_indent=indent)
     return "\n".join(lines)
 
 
@@ -155,4 +160,6 @@ def _assignments(values: Mapping[str, Any]) -> str:
 def _number(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(_number(item) for item in value)}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -110,7 +110,8 @@ class Loop:
 def assert_same_run(rows: list[tuple], trajectory: Trajectory) -> None:
     kind = trajectory.observers[0]
     signals = ("y1_rad", "y2_rad", "fog_rad_s", "u_rad_s", "x_e_rad_s")
-    estimates = tuple(f"estimate/{kind}/{name}" for name in ("x1_rad", "x2_rad_s", "x3_rad"))
+    names = ("x1_rad", "x2_rad_s", "x3_rad", *trajectory.extra_signals(kind))
+    estimates = tuple(f"estimate/{kind}/{name}" for name in names)
     expected = np.hstack([trajectory.qpos(), *(trajectory[name][:, None] for name in (*signals, *estimates))])
     assert np.abs(expected).max() > 0.1
     np.testing.assert_allclose(np.array(rows), expected, rtol=0.0, atol=1e-9)

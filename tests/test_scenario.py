@@ -226,7 +226,8 @@ def test_the_resolved_scenario_has_everything_written_out() -> None:
     once = prepare(load_scenario("push_recovery")).resolved()
     assert once["plant"]["model"] == "scissored_pair.xml"  # a bundled one by name, wherever it is installed
     assert once["controller"]["gains"] == list(TABLE_2_GAINS)
-    assert once["observer"] == {"kind": "homogeneous", "k1": 20.0, "k2": 150.0, "alpha": 0.85}
+    friction = {"friction_n_m": 0.0, "damping_n_m_s": 0.0, "friction_width_rad_s": 0.05}
+    assert once["observer"] == {"kind": "homogeneous", "k1": 20.0, "k2": 150.0, "alpha": 0.85, **friction}
     assert once["sensors"]["fog"]["range_deg_s"] == 490.0
     assert set(once["versions"]) == {"cmg_mj", "mujoco", "numpy", "scipy", "python"}
     assert once["versions"]["python"] == ".".join(map(str, sys.version_info[:3]))
