@@ -111,7 +111,9 @@ def test_list() -> None:
         assert re.search(rf"^  {name}  +[A-Z]", said.out, re.MULTILINE)
     for name in OBSERVERS:
         assert re.search(rf"^  {name}  +\S", said.out, re.MULTILINE)
-    assert re.search(r"  homogeneous +k1=20  k2=150  alpha=0\.85 .*\n(?: .*\n)* +The homogeneous finite-time diff", said.out)
+    assert re.search(
+        r"  homogeneous +k1=20  k2=150  alpha=0\.85 .*\n(?: .*\n)* +The homogeneous finite-time diff", said.out
+    )
     assert re.search(r"  luenberger +L=\[\[20, 0\], \[150, 0\], \[0, 20\]\]\n", said.out)
     assert re.search(r"  finite_difference +no parameters\n", said.out)
     assert max(map(len, said.out.splitlines())) <= 100

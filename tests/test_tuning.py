@@ -403,7 +403,7 @@ def test_json_has_every_figure(quick: str) -> None:
         difference = level["held_out_given_rms_error_rad_s"] - level["held_out_rms_error_rad_s"]
         assert mean == pytest.approx(difference)
         assert level["verdict"] in ("better", "tie", "worse")
-    assert not Path("runs").exists()  # without --out nothing is written
+    assert json.loads(Path("runs/tune-linear-0/tuned.json").read_text()) == figures
 
 
 def test_several_noises_make_a_scenario_each(quick: str) -> None:
@@ -412,6 +412,22 @@ def test_several_noises_make_a_scenario_each(quick: str) -> None:
     for noise in (200.0, 400.0):
         scenario = load_scenario(f"t/scenario-{noise:g}.toml")
         assert scenario.sensors.accelerometer.noise_density_ug_rthz == noise
+
+
+def test_an_interruption_keeps_the_noises_that_are_done(quick: str) -> None:
+    def until_the_second(share: float) -> None:
+        if share > 0.6:
+            raise KeyboardInterrupt
+
+    scenario = load_scenario(quick, ["observer.kind=linear"])
+    study = tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=until_the_second)
+    assert [level.noise_ug_rthz for level in study.levels] == [200.0]
+
+    def at_once(share: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=at_once)
 
 
 def test_without_a_push_it_says_what_the_window_is(quick: str) -> None:

@@ -103,9 +103,9 @@ def tune(
     fitted, beside the observer's parameters as given (by default, the paper's). With several noise densities it says at
     which the given parameters are the best ones.
 
-    With --out it writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
+    Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """
-    from cmg_mj.runs import output_folder
+    from cmg_mj.runs import file_name, output_folder
     from cmg_mj.tuning import figures_of, save_study, tuning_table
     from cmg_mj.tuning import tune as fit
 
@@ -114,21 +114,26 @@ def tune(
     if out == "":
         raise InputError("--out '': name a folder, . for the current one")
     chosen = scenario_of(scenario, settings, seed, observer)
-    folder = None if out is None else output_folder(Path(out))
-    with progress(f"{chosen.title or scenario}: {chosen.observer.kind}", 1.0) as on_progress:
-        study = fit(
-            chosen,
-            worlds=worlds,
-            parameters=[name.strip() for name in parameters.split(",") if name.strip()],
-            ranges=dict(_range(text) for text in ranges),
-            noise_ug_rthz=[_density(text) for text in noise.split(",") if text.strip()],
-            on_share=on_progress,
-        )
-    show(figures_of(study), tuning_table(study), as_json)
-    if folder is not None:
+    default = Path("runs") / f"tune-{file_name(chosen.observer.kind)}-{chosen.seed}"
+    folder = output_folder(default if out is None else Path(out))
+    densities = [_density(text) for text in noise.split(",") if text.strip()]
+    with CtrlC() as ctrl_c:
+        with progress(f"{chosen.title or scenario}: {chosen.observer.kind}", 1.0, ctrl_c) as on_progress:
+            study = fit(
+                chosen,
+                worlds=worlds,
+                parameters=[name.strip() for name in parameters.split(",") if name.strip()],
+                ranges=dict(_range(text) for text in ranges),
+                noise_ug_rthz=densities,
+                on_share=on_progress,
+            )
+        show(figures_of(study), tuning_table(study), as_json)
         files = save_study(folder, study)
-        if not as_json:
-            click.echo(f"Written to {folder}. Run with the tuned observer: cmg-mj run {files[1]}", err=True)
+    if not as_json:
+        click.echo(f"Written to {folder}. Run with the tuned observer: cmg-mj run {files[1]}", err=True)
+    if ctrl_c.noted:
+        say(f"interrupted; {len(study.levels)} of {len(densities) or 1} noise densities are in {folder}")
+        sys.exit(INTERRUPTED)
 
 
 def _range(text: str) -> tuple[str, tuple[float, float]]:

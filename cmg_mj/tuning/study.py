@@ -126,11 +126,11 @@ def tune(
         on_share: Called now and then with the share done.
 
     Returns:
-        The study.
+        The study. If the user interrupted, with the noise densities that were done until then.
 
     Raises:
         InputError: A name or a range does not fit, nothing can be tuned, or too many worlds fell.
-        KeyboardInterrupt: The user interrupted.
+        KeyboardInterrupt: The user interrupted before the first was done.
     """
     if worlds < 2:
         raise InputError(f"--worlds {worlds}: at least 2, for an interval")
@@ -168,8 +168,13 @@ def tune(
         from_here = (
             [replace(n, given=math.copysign(levels[-1].sizes[n.name], n.given)) for n in numbers] if levels else numbers
         )
-        levels.append(_level(density, fitter, from_here, held_out, starts))
-        share(1.0)
+        try:
+            levels.append(_level(density, fitter, from_here, held_out, starts))
+            share(1.0)
+        except KeyboardInterrupt:
+            if not levels:
+                raise
+            break
     return Study(scenario, kind, given, numbers, [number.name for number in still], worlds, window, levels)
 
 
