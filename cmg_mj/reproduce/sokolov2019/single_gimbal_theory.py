@@ -15,6 +15,7 @@ from cmg_mj.observers.luenberger import Luenberger
 from cmg_mj.plant import Plant
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.reproduce.aranovskiy2020.linearisation import (
+    TABLE_1,
     controllability_margin,
     equilibrium,
     finite_difference_error,
@@ -23,18 +24,8 @@ from cmg_mj.reproduce.aranovskiy2020.linearisation import (
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
 from cmg_mj.reproduce.sokolov2019.single_gimbal import NO_NOISE, experiment, servo_of
 
-TABLE_I = {
-    "m": 2.62,
-    "l": 0.13,
-    "J_b": 13e-3,
-    "J_c": 2.6e-4,
-    "K_c": 9.9e-4,
-    "I_d": 5.6e-4,
-    "J_d": 11e-4,
-    "omega_d": 314.0,
-    "g": 9.81,
-}
-"""sokolov2019 Table I as printed [kg, m, kg m^2, rad/s], and the standard gravity that it does not give [m/s^2]."""
+TABLE_I = TABLE_1 | {"l": 0.13}
+"""sokolov2019 Table I as printed: that of aranovskiy2020 but for l, from the pivot to the centre of mass [m]."""
 
 K_E = np.array(TABLE_2_GAINS)
 """sokolov2019 Table II has the gains of aranovskiy2020 Table 2."""
