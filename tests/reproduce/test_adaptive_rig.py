@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from cmg_mj.reproduce.dao2023 import adaptive_rig as rig
-from cmg_mj.reproduce.dao2023 import claims as dao2023
+from cmg_mj.reproduce.dao2023 import on_the_rig
 
 
 def test_bias_is_found_in_95_of_100_seeds() -> None:
     """0.3 to 1.5 degrees of either sign, default noise, no push: RMS over seconds 5 to 10 at most 0.15 degrees."""
     errors = rig.bias_errors(60_000, rig.signed_biases(60_000, 100))
     print(f"bias RMS error: mean {errors.mean():.3f}, largest {errors.max():.3f} deg")
-    assert dao2023.share_within(errors, 0.15) >= 0.95
+    assert on_the_rig.share_within(errors, 0.15) >= 0.95
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_velocity_error_is_the_smallest_from_half_a_degree_up(sign: float) -> None:
     biases = [sign * size for size in (0.5, 1.0, 1.5)]
-    errors = rig.velocity_errors(61_000, 3, ("adaptive", *dao2023.OTHERS), biases)
-    for name in dao2023.OTHERS:
-        mean, half = dao2023.mean_and_interval(errors[name] - errors["adaptive"])
+    errors = rig.velocity_errors(61_000, 3, ("adaptive", *on_the_rig.OTHERS), biases)
+    for name in on_the_rig.OTHERS:
+        mean, half = on_the_rig.mean_and_interval(errors[name] - errors["adaptive"])
         print(f"{name} less adaptive: {mean} +- {half} rad/s at e = {biases} deg")
         assert np.all(mean - half > 0.0)
 

@@ -6,19 +6,19 @@ from functools import cache
 
 import numpy as np
 
-from cmg_mj.reproduce.dao2023 import claims as dao2023
+from cmg_mj.reproduce.dao2023 import figures
 from cmg_mj.reproduce.dao2023 import pendulum_robot as robot
 
 
 @cache
-def study() -> dao2023.Study:
+def study() -> figures.Study:
     """Ten other motions than the report's."""
-    return dao2023.study(seed=7)
+    return figures.study(seed=7)
 
 
 def test_conventional_state_error_keeps_oscillating_and_the_proposed_does_not() -> None:
     """Fig. 2."""
-    plain, ours = dao2023.tail_rms(study().conventional)[0], dao2023.tail_rms(study().proposed)[0]
+    plain, ours = figures.tail_rms(study().conventional)[0], figures.tail_rms(study().proposed)[0]
     print(f"state error RMS over 160-200 s: conventional {np.round(plain, 3)}, proposed {np.round(ours, 3)}")
     assert plain.min() > 0.2
     assert ours.max() < 0.1
@@ -27,10 +27,10 @@ def test_conventional_state_error_keeps_oscillating_and_the_proposed_does_not() 
 
 def test_settling_order() -> None:
     """Fig. 3: 1000 before 10 before 0.1; and not before 10 on the way there, nor ever faster with Sigma."""
-    ten, thousand, tenth, ten_thousand = dao2023.settle_times(study().proposed)
-    print(f"settle below {dao2023.SETTLED}: Sigma 10 {ten}, 1000 {thousand}, 0.1 {tenth}, 10000 {ten_thousand}")
+    ten, thousand, tenth, ten_thousand = figures.settle_times(study().proposed)
+    print(f"settle below {figures.SETTLED}: Sigma 10 {ten}, 1000 {thousand}, 0.1 {tenth}, 10000 {ten_thousand}")
     assert np.sum((thousand < ten) & (ten <= tenth) & np.isfinite(thousand)) >= 9
-    early = dao2023.settle_times(study().proposed, 1.0)
+    early = figures.settle_times(study().proposed, 1.0)
     assert np.sum(early[1] < early[0]) < 9
     assert np.median(ten_thousand) > 2.0 * np.median(thousand)
 
