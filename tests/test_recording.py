@@ -165,6 +165,21 @@ def test_an_observer_keeps_its_colour(path: Path) -> None:
     assert static(path, "/homogeneous/rate_estimate/linear", "SeriesLines:names") == ["linear"]
 
 
+def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
+    """In degrees, in the loop and riding along; the summary has its figures."""
+    of = prepare(scenario("observer.kind=adaptive", "companions=['homogeneous_adaptive']", "metrics.bias_from_s=0.1"))
+    ran = recorded(of)
+    where = write(tmp_path / "bias.rrd", of, [ran])
+    assert {"/adaptive/bias/adaptive", "/adaptive/bias/homogeneous_adaptive", "/adaptive/bias/true"} <= entities(where)
+    for name in ("adaptive", "homogeneous_adaptive"):
+        _, shown = scalars(where, f"/adaptive/bias/{name}")
+        np.testing.assert_allclose(shown, np.degrees(ran.trajectory[f"estimate/{name}/bias_rad"]), rtol=1e-12)
+    _, true = scalars(where, "/adaptive/bias/true")
+    np.testing.assert_allclose(true, of.scenario.plant.equilibrium_bias_deg, rtol=1e-12)
+    (summary,) = static(where, "/summary", "TextDocument:text")
+    assert "Estimated bias, mean [deg]" in summary
+
+
 def test_summary_scenario_name_and_layout(path: Path, run: Recorded) -> None:
     (summary,) = static(path, "/summary", "TextDocument:text")
     assert METRICS.keys() - set(OPTIONAL_METRICS) <= run.summary.keys()

@@ -7,6 +7,7 @@ import pytest
 
 from cmg_mj.reproduce.dao2023 import adaptive_rig as rig
 from cmg_mj.reproduce.dao2023 import on_the_rig
+from cmg_mj.scenario import load_scenario, prepare
 
 
 def test_bias_is_found_in_95_of_100_seeds() -> None:
@@ -44,3 +45,16 @@ def test_a_gait_and_a_torque_are_found() -> None:
     assert gait["disturbance_n_m"].max() < 0.06
     assert gait["bias_deg"].max() < 0.15
     assert rig.learnt_torque(64_000, 3, torque_n_m=-0.15, bias_deg=-0.6).max() < 0.02
+
+
+def test_trimming_spares_the_gimbals_and_the_time_to_settle() -> None:
+    """With the integrator held where the estimated bias asks for it, the gimbals need not turn to get it there."""
+    found = {}
+    for trim_s in (0.0, 1.0):
+        settings = ["plant.equilibrium_bias_deg=1.0", f"controller.trim_s={trim_s}", "seed=63000"]
+        summaries = prepare(load_scenario("bias_estimation", settings)).run_many(6, keep_trajectory=False).summaries
+        found[trim_s] = np.array([[s["gimbal_peak_deg"], s["tilt_rms_deg"], s["settle_time_s"]] for s in summaries])
+    print(f"gimbal peak [deg], tilt RMS [deg], settle time [s]: { ({k: v.mean(axis=0) for k, v in found.items()}) }")
+    assert np.all(found[1.0][:, 0] < 0.75 * found[0.0][:, 0])
+    assert np.all(found[1.0][:, 1] < found[0.0][:, 1])
+    assert found[1.0][:, 2].mean() < found[0.0][:, 2].mean()
