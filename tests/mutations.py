@@ -3,7 +3,8 @@
 Each parameter of the law, the observers and the reduced model is multiplied by 0.8 and by 1.2 in a copy of the sources,
 and the tests are run until the first failure.
 
-    python tests/mutations.py              # about ten minutes on two cores
+    python tests/mutations.py              # about twenty minutes on two cores
+    python tests/mutations.py adaptive     # only the parameters with this in their names, printed and not written
 """
 
 from __future__ import annotations
@@ -73,6 +74,20 @@ MUTATIONS = [
     Mutation("linear_high_gain: epsilon", OBSERVERS + "linear_high_gain.py", r"epsilon: Positive = " + NUMBER),
     Mutation("linear_high_gain: a1", OBSERVERS + "linear_high_gain.py", r"a1: Positive = " + NUMBER),
     Mutation("linear_high_gain: a2", OBSERVERS + "linear_high_gain.py", r"a2: Positive = " + NUMBER),
+    Mutation(
+        "homogeneous: friction_width", OBSERVERS + "homogeneous.py", r"friction_width_rad_s: Positive = " + NUMBER
+    ),
+    *(element(f"adaptive: L[{i}]", OBSERVERS + "adaptive.py", "L: tuple[float, float] = (", i) for i in range(2)),
+    *(
+        element(f"adaptive: Gamma[{i}]", OBSERVERS + "adaptive.py", "Gamma: tuple[Positive, Positive, Positive] = (", i)
+        for i in range(3)
+    ),
+    Mutation("adaptive: Sigma", OBSERVERS + "adaptive.py", r"Sigma: Positive = " + NUMBER),
+    *(
+        Mutation(f"high_gain: {name}", OBSERVERS + "high_gain.py", rf"\n    {name}: Positive = " + NUMBER)
+        for name in ("l1", "l2", "b", "phi1", "phi2", "phi3")
+    ),
+    Mutation("high_gain: d_inf", OBSERVERS + "high_gain.py", r"d_inf: Annotated\[.*?\] = " + NUMBER),
     Mutation("super_twisting: L", OBSERVERS + "super_twisting.py", r"    L: Positive = " + NUMBER),
     Mutation("super_twisting: l0", OBSERVERS + "super_twisting.py", r"l0: Positive = " + NUMBER),
     Mutation("super_twisting: l1", OBSERVERS + "super_twisting.py", r"l1: Positive = " + NUMBER),
@@ -129,6 +144,8 @@ def main() -> None:
     if (failed := caught_by(MUTATIONS[0].parameter, 1.0)) != "-":
         sys.exit(f"{failed} fails without any mutation: mend that first")
     parameters = [m.parameter for m in MUTATIONS] + [f"reduced: {name}" for name in REDUCED]
+    wanted = sys.argv[1] if len(sys.argv) > 1 else ""
+    parameters = [name for name in parameters if wanted in name]
     with ThreadPoolExecutor(2) as pool:
         found = {(p, f): pool.submit(caught_by, p, f) for p in parameters for f in FACTORS}
         rows = [f"| {p} | " + " | ".join(found[p, f].result() for f in FACTORS) + " |" for p in parameters]
@@ -144,7 +161,8 @@ def main() -> None:
         *rows,
         "",
     ]
-    (ROOT / "docs" / "mutations.md").write_text("\n".join(lines))
+    if not wanted:
+        (ROOT / "docs" / "mutations.md").write_text("\n".join(lines))
     print("\n".join(lines))
 
 

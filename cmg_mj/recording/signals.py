@@ -33,11 +33,11 @@ OBSERVERS: dict[str, Color] = {
     "linear_high_gain": (130, 185, 60),
     "adaptive": (220, 60, 80),
     "high_gain": (0, 190, 200),
-    "homogeneous_adaptive": (240, 160, 130),
+    "homogeneous_adaptive": (240, 228, 66),
 }
 """An observer has the same colour in every recording. Mostly Okabe and Ito's, which the colour-blind can tell apart."""
 
-OTHERS: tuple[Color, ...] = ((240, 228, 66), (170, 170, 255), (255, 120, 200), (120, 220, 160))
+OTHERS: tuple[Color, ...] = ((240, 160, 130), (170, 170, 255), (255, 120, 200), (120, 220, 160))
 """Colours of observers that are not bundled, in order of appearance."""
 
 PHASES: dict[str, Color] = {

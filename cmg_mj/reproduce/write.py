@@ -55,7 +55,10 @@ def verdict_table(entries: Sequence[Reproduced]) -> str:
 
 def report(entries: Sequence[Reproduced]) -> str:
     """The whole report in Markdown."""
-    parts = ["# Four papers, reproduced", _count(entries), verdict_table(entries)]
+    title = "Four papers, reproduced" if len(entries) > 1 else f"{entries[0].paper}, reproduced"
+    if entries[0].paper in BEYOND:
+        title = BEYOND[entries[0].paper]
+    parts = [f"# {title}", _count(entries), verdict_table(entries)]
     for entry in entries:
         parts.append(f"## {entry.paper}: {(PAPERS | BEYOND)[entry.paper]}")
         if not entry.complete:

@@ -179,7 +179,8 @@ def league_claim(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> C
         says="aranovskiy2020 section V: homogeneous before ltv before linear; here over a grid, with every observer",
         found=(
             f"{worlds} seeds a cell. The smallest velocity error: {winners} of {len(cells)} cells. The paper's order "
-            f"holds at {where or 'none of them'}.\n\n{markdown(rows)}"
+            f"holds at {where or 'none of them'}. The floor is the error of the filter that knows the model, e, the push, the "
+            f"gimbals' motion and the noise exactly: none of the observers knows e or the push.\n\n{markdown(rows)}"
         ),
         verdict=verdict(bool(holds), "" if everywhere else "conditions"),
         why="" if everywhere else "the order turns round where noise is low or the bias large",
