@@ -103,6 +103,14 @@ def _estimate(parts: Sequence[Scalar]) -> Sequence[Scalar]:
     return Estimate(*parts) if len(parts) == 3 else tuple(parts)
 
 
+def _extra_signals(observer: Observer) -> tuple[str, ...]:
+    """What an observer estimates beyond x; what is wrong with its names is the user's affair."""
+    try:
+        return extra_signals(observer)
+    except ValueError as error:
+        raise InputError(f"observer {type(observer).__name__}: {error}") from error
+
+
 class _Lost:
     """A companion that raised: nothing is known any more."""
 
@@ -176,7 +184,7 @@ class Controller:
         self._single = isinstance(worlds, int)
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         self._observers: list[Observer] = []
-        self.extra_signals = [extra_signals(o) for o in (observer, *self.companions.values())]
+        self.extra_signals = [_extra_signals(o) for o in (observer, *self.companions.values())]
         self._widths = [3 + len(names) for names in self.extra_signals]
         self.trim_s = trim_s
         self._prepare_trim()
@@ -188,6 +196,8 @@ class Controller:
     def _prepare_trim(self) -> None:
         """Until which step the integrator is trimmed, with what gain on which part of the estimate."""
         self._trimmed_until = 0
+        if not (isinstance(self.trim_s, (int, float)) and self.trim_s >= 0.0):
+            raise InputError(f"controller.trim_s = {self.trim_s!r}: must be a number greater than or equal to 0")
         if not self.trim_s:
             return
         self._trimmed_until = whole_steps(self.trim_s, self.timestep, "controller.trim_s", f"{self.trim_s:g} s")
@@ -195,7 +205,7 @@ class Controller:
         if BIAS not in self.extra_signals[0]:
             raise InputError(
                 f"controller.trim_s = {self.trim_s:g}: needs an observer in the loop that estimates the bias, "
-                "such as adaptive"
+                "such as adaptive; or set controller.trim_s=0"
             )
         if k4 == 0.0:
             raise InputError(f"controller.trim_s = {self.trim_s:g}: the gain on the integrator is zero")

@@ -16,6 +16,8 @@ import tomli_w
 
 from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError
+from cmg_mj.observers.protocol import BIAS, extra_signals
+from cmg_mj.plant import load_plant
 from cmg_mj.plots import plot_run
 from cmg_mj.scenario import Experiment, prepare
 from cmg_mj.schema import Scenario
@@ -94,15 +96,26 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
         observers: Their names.
 
     Returns:
-        One experiment an observer.
+        One experiment an observer; `controller.trim_s` counts for those that estimate the bias.
 
     Raises:
         InputError: An observer does not exist, or something does not fit.
     """
-    experiments = [prepare(scenario.with_observer(kind)) for kind in observers]
+    experiments = [prepare(_untrimmed(scenario.with_observer(kind))) for kind in observers]
     for experiment in experiments:
         experiment.rehearse(worlds=2)
     return experiments
+
+
+def _untrimmed(scenario: Scenario) -> Scenario:
+    """The same without trimming the integrator, if the observer does not estimate the bias that takes."""
+    controller = scenario.controller
+    if not controller.trim_s:
+        return scenario
+    observer = scenario.observer.make(1.0 / controller.rate_hz, load_plant(scenario.plant).reduced)
+    if BIAS in extra_signals(observer):
+        return scenario
+    return scenario.model_copy(update={"controller": controller.model_copy(update={"trim_s": 0.0})})
 
 
 def compare(

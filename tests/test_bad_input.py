@@ -193,6 +193,37 @@ def test_controller(given: str, fragments: list[str]) -> None:
     assert_in_order(["my.toml: ", *fragments], check(f"[controller]\n{given}").complaint)
 
 
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        (
+            "kind = 'adaptive'\ntorque = true",
+            "bias, torque: both are true, but a constant torque and an equilibrium bias",
+        ),
+        ("kind = 'adaptive'\nbias = false", "bias, torque, sinusoid_hz: nothing to estimate"),
+        ("kind = 'adaptive'\nL = [1.0, -3.0]", "L: A + L C must be Hurwitz"),
+        ("kind = 'adaptive'\nL = [1.0]", "L = [1.0]: must be a list of 2 numbers"),
+        ("kind = 'adaptive'\nGamma = 3", "Gamma = 3: must be a list of 3 numbers greater than 0"),
+        ("kind = 'adaptive'\nsinusoid_hz = 500", "sinusoid_hz = 500: must be below half the sample rate, 100 Hz"),
+        ("kind = 'homogeneous_adaptive'\nL = [20.0, 0.0]", "L: A + L C must be Hurwitz"),
+        ("kind = 'high_gain'\nd_inf = 1.0", "d_inf = 1.0: must be a number greater than or equal to 0 and less than 1"),
+        ("kind = 'high_gain'\nb = 2.0", "b = 2: must be below (1 - d_inf)/d_inf = 0.6667, andrieu2009 (21)"),
+        ("kind = 'homogeneous'\nalpha = 0.5", "alpha = 0.5: must be a number greater than 0.5 and at most 1"),
+        ("kind = 'homogeneous'\nfriction_n_m = 8.0", "friction_n_m, damping_n_m_s: too much for the sample period"),
+    ],
+)
+def test_conditions_of_the_theorems(given: str, complaint: str) -> None:
+    kind = given.split("'")[1]
+    said = check(f"[observer]\n{given}").complaint
+    assert said.startswith(f"my.toml: observer.{complaint}"), said
+    assert said.endswith(f"(observer {kind})"), said
+
+
+def test_trimming_without_a_bias_estimate() -> None:
+    said = check("[controller]\ntrim_s = 1.0").complaint
+    assert said.startswith("my.toml: controller.trim_s = 1: needs an observer in the loop that estimates the bias")
+
+
 @table(
     (
         "typo in a name",
@@ -300,7 +331,7 @@ def test_what_is_no_toml(given: str | bytes, fragments: list[str]) -> None:
         "push_recovry.toml",
         "no such file",
         "did you mean 'push_recovery'?",
-        "bundled: luenberger_",
+        "bundled: bias_estimation, luenberger_",
     ),
     ("nothing like it", "nosuch/file.toml", "scenario 'nosuch/file.toml': no such file, nor a bundled one; bundled: "),
     ("no name", "", "scenario '': no such file"),
@@ -615,6 +646,14 @@ class GivesInfinity(Mine):
         return Estimate(y.y1, rate * 0.0 + (math.inf if k >= 30 else 0.0), y.y2)
 
 
+class NamesNoSignals(Mine):
+    extra_signals = "bias_rad"
+
+
+class OwesASignal(Mine):
+    extra_signals = ("bias_rad",)
+
+
 RETURN = "step(state, y, u) must return"
 
 
@@ -628,6 +667,8 @@ RETURN = "step(state, y, u) must return"
     ("two numbers", ReturnsTwo, f"{RETURN} (state, (x1, x2, x3)), not (state, [0.011, "),
     ("text", ReturnsText, f"{RETURN} a number for x3, not '0.0'"),
     ("lists", ReturnsLists, f"{RETURN} a number for x1, not [0.011]"),
+    ("signals", NamesNoSignals, "extra_signals must be a tuple of names like ('bias_rad',), each once, not 'bias_rad'"),
+    ("a signal too few", OwesASignal, f"{RETURN} (state, (x1, x2, x3, bias_rad)), not (state, "),
 )
 @pytest.mark.parametrize("place", ["in the loop", "riding along", "compared"])
 def test_an_observer_that_cannot_work(given: type, fragments: list[str], place: str) -> None:
@@ -639,7 +680,7 @@ def test_an_observer_that_cannot_work(given: type, fragments: list[str], place: 
         said = cmg_mj("run", "push_recovery", "--observer", kind)
     else:
         said = cmg_mj("run", "push_recovery", "--set", f"companions=['{kind}']")
-        assert "FailsWhenMade" in kind or "TakesNo" in kind or "companions: 'tests.test_bad_input:" in said.complaint
+        assert "FailsWhenMade" in kind or "TakesNo" in kind or "NamesNo" in kind or "companions: 'tests.test_bad_input:" in said.complaint
     assert_in_order(["push_recovery", *fragments], said.complaint)
     assert list(Path().iterdir()) == []
 

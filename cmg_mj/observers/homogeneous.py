@@ -12,6 +12,8 @@ from cmg_mj.elementwise import Scalar, signed_powers, sqrt
 from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, NonNegative, Positive
 from cmg_mj.reduced import ReducedModel
 
+LARGEST_RESISTANCE = 2.5  # of a step; the classical Runge-Kutta step is stable up to 2.78
+
 
 class State(NamedTuple):
     """The estimate, the last measurement, and the model's terms there."""
@@ -53,6 +55,14 @@ class Homogeneous:
     friction_n_m: NonNegative = 0.0
     damping_n_m_s: NonNegative = 0.0
     friction_width_rad_s: Positive = 0.05
+
+    def __post_init__(self) -> None:
+        resistance = self._resistance(0.0, 0.0)
+        if resistance * self.dt > LARGEST_RESISTANCE:
+            raise ValueError(
+                f"friction_n_m, damping_n_m_s: too much for the sample period: friction_n_m/friction_width_rad_s + "
+                f"damping_n_m_s must be below {LARGEST_RESISTANCE / self.dt / resistance:.3g} times what it is"
+            )
 
     @cached_property
     def _resists(self) -> bool:

@@ -61,7 +61,7 @@ class HomogeneousAdaptive:
     extra_signals = (BIAS,)
 
     def __post_init__(self) -> None:
-        assert self._adaptive.extra_signals == self.extra_signals  # made here, so that its complaints are heard at once
+        _ = self._adaptive  # made now, so that what it refuses is refused at construction
 
     @cached_property
     def _homogeneous(self) -> Homogeneous:

@@ -26,6 +26,7 @@ class Claim:
         why: The conditions, or why it was not reproduced; needed unless it was reproduced outright.
         figures: The numbers behind `found`, by names that end in their unit, as JSON can hold them.
         pictures: Plots.
+        ours: Whether the claim is not the paper's but ours, such as its observer on the rig; `says` is what was asked.
     """
 
     place: str
@@ -35,6 +36,7 @@ class Claim:
     why: str = ""
     figures: Mapping[str, Any] = field(default_factory=dict)
     pictures: Sequence[Picture] = ()
+    ours: bool = False
 
     def __post_init__(self) -> None:
         if self.verdict != "reproduced" and not self.why:

@@ -39,6 +39,7 @@ def _plain(claim: Claim) -> dict[str, Any]:
         "found": claim.found,
         "verdict": claim.verdict,
         "why": claim.why,
+        "ours": claim.ours,
         "figures": dict(claim.figures),
         "pictures": [f"{picture.name}.png" for picture in claim.pictures],
     }
@@ -46,11 +47,24 @@ def _plain(claim: Claim) -> dict[str, Any]:
 
 def verdict_table(entries: Sequence[Reproduced]) -> str:
     """Every claim and its verdict, as a Markdown table."""
-    lines = ["| paper | place | the paper says | verdict |", "|---|---|---|---|"]
+    lines = ["| paper | place | the paper says, or was asked | verdict |", "|---|---|---|---|"]
     for entry in entries:
         for claim in entry.claims:
-            lines.append(f"| {entry.paper} | {claim.place} | {_cell(claim.says)} | {claim.verdict} |")
+            place = f"{claim.place} (not the paper's)" if claim.ours else claim.place
+            lines.append(f"| {entry.paper} | {place} | {_cell(claim.says)} | {_verdict(claim)} |")
     return "\n".join(lines)
+
+
+OURS = {
+    "reproduced": "holds",
+    "reproduced within stated conditions": "holds within stated conditions",
+    "not reproduced": "does not hold",
+}
+"""The verdicts' words where there is no paper to reproduce."""
+
+
+def _verdict(claim: Claim) -> str:
+    return OURS[claim.verdict] if claim.ours else claim.verdict
 
 
 def report(entries: Sequence[Reproduced]) -> str:
@@ -58,13 +72,16 @@ def report(entries: Sequence[Reproduced]) -> str:
     title = "Four papers, reproduced" if len(entries) > 1 else f"{entries[0].paper}, reproduced"
     if entries[0].paper in BEYOND:
         title = BEYOND[entries[0].paper]
+    if not all(entry.complete for entry in entries):
+        title += " (interrupted: not all of it)"
     parts = [f"# {title}", _count(entries), verdict_table(entries)]
     for entry in entries:
         parts.append(f"## {entry.paper}: {(PAPERS | BEYOND)[entry.paper]}")
         if not entry.complete:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
         for claim in entry.claims:
-            parts += [f"### {claim.place}: {claim.verdict}", f"**The paper:** {claim.says}", f"**Here:** {claim.found}"]
+            who = "Asked" if claim.ours else "The paper"
+            parts += [f"### {claim.place}: {_verdict(claim)}", f"**{who}:** {claim.says}", f"**Here:** {claim.found}"]
             if claim.why:
                 parts.append(f"**{'Why not' if claim.verdict == 'not reproduced' else 'Conditions'}:** {claim.why}")
             parts += [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]
@@ -72,10 +89,14 @@ def report(entries: Sequence[Reproduced]) -> str:
 
 
 def _count(entries: Sequence[Reproduced]) -> str:
-    counts = Counter(claim.verdict for entry in entries for claim in entry.claims)
-    total = sum(counts.values())
-    seconds = sum(entry.seconds for entry in entries)
-    return f"{total} claims: " + ", ".join(f"{n} {v}" for v, n in counts.most_common()) + f". Took {seconds:.0f} s."
+    claims = [claim for entry in entries for claim in entry.claims]
+    sentences = []
+    for ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
+        counts = Counter(_verdict(claim) for claim in claims if claim.ours is ours)
+        if counts:
+            listed = ", ".join(f"{n} {v}" for v, n in counts.most_common())
+            sentences.append(f"{sum(counts.values())} {words}: {listed}.")
+    return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
 
 
 def save(folder: Path, entries: Sequence[Reproduced]) -> None:

@@ -235,3 +235,11 @@ def test_a_known_bias_is_where_gravity_pulls() -> None:
         untold, without = of.step(untold, y, 0.0)
     assert abs(with_bias.x2) < 1e-8
     assert abs(without.x2) > 0.05
+
+
+def test_friction_beyond_what_the_step_bears_is_refused() -> None:
+    """c h = (friction/width + damping) h/(gimbals D) at most 2.5: up to 1.546 N m on one gimbal."""
+    observer("homogeneous", friction_n_m=1.54)
+    for given in ({"friction_n_m": 1.56}, {"damping_n_m_s": 31.5}, {"friction_n_m": 1e6}):
+        with pytest.raises(InputError, match="friction_n_m, damping_n_m_s: too much for the sample period"):
+            observer("homogeneous", **given)

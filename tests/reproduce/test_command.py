@@ -9,12 +9,14 @@ import pytest
 
 from cmg_mj import reproduce
 from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.reproduce import write
 from cmg_mj.reproduce.claim import Claim, OnShare, Step, verdict
 from tests.command import cmg_mj
 
 PICTURE = Picture("a-fig-1", "a Fig. 1", [Panel("tilt [deg]", [Line([0.0, 1.0], [0.0, 2.0], "true")])])
 GOOD = Claim("Fig. 1", "it falls | or not", "it fell at 3 s", "reproduced", figures={"time_s": 3.0}, pictures=[PICTURE])
 PARTLY = Claim("Remark 1", "always", "above 100 Hz", verdict(True, "100 Hz"), why="above 100 Hz")
+OURS = Claim("On the rig", "it stands", "it falls", "not reproduced", why="too light", ours=True)
 NOT = Claim("Section V", "best", "worst", verdict(False), why="the noise is another")
 
 
@@ -25,7 +27,12 @@ def steps(*claims: Claim) -> list[Step]:
 @pytest.fixture(autouse=True)
 def _quick(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    quick = {"aranovskiy2020": steps(GOOD), "sokolov2019": steps(NOT), "dao2023": steps(PARTLY), "andrieu2009": []}
+    quick = {
+        "aranovskiy2020": steps(GOOD),
+        "sokolov2019": steps(NOT),
+        "dao2023": steps(PARTLY),
+        "andrieu2009": steps(OURS),
+    }
     monkeypatch.setattr(reproduce, "steps_of", quick.__getitem__)
 
 
@@ -34,13 +41,16 @@ def test_all_papers_make_one_report() -> None:
     assert said.status == 0, said
     folder = Path("runs/reproduce-all")
     report = (folder / "report.md").read_text()
-    assert "3 claims: 1 reproduced, 1 not reproduced, 1 reproduced within stated conditions." in report
+    assert "3 claims of the papers: 1 reproduced, 1 not reproduced, 1 reproduced within stated conditions." in report
     assert "| aranovskiy2020 | Fig. 1 | it falls \\| or not | reproduced |" in report
     assert "| aranovskiy2020 | Fig. 1 | it falls \\| or not | reproduced |" in said.out
     assert "### Section V: not reproduced" in report
     assert "**Why not:** the noise is another" in report
     assert "**Conditions:** above 100 Hz" in report
     assert "![a Fig. 1](a-fig-1.png)" in report
+    assert "1 beside them, not the papers': 1 does not hold." in report
+    assert "### On the rig: does not hold" in report
+    assert "**Asked:** it stands" in report
     assert (folder / "a-fig-1.png").read_bytes().startswith(b"\x89PNG")
     assert f"Read {folder / 'report.md'}" in said.err
 
@@ -68,6 +78,7 @@ def test_ctrl_c_keeps_what_was_obtained(monkeypatch: pytest.MonkeyPatch) -> None
     (entry,) = reproduce.reproduce(["dao2023"], lambda now, share: None)
     assert entry.claims == [GOOD]
     assert not entry.complete
+    assert write.report([entry]).startswith("# dao2023, reproduced (interrupted: not all of it)")
 
 
 def test_progress_is_the_share_of_all_steps(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -143,7 +143,8 @@ def fed_bias_claim(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED + 2
     everywhere = len(helped) == len(rows)
     return Claim(
         place="homogeneous with the bias fed in from adaptive",
-        says="(not in the papers) the rate error of (11) that e causes goes when e is estimated beside it",
+        ours=True,
+        says="the rate error of (11) that e causes goes when e is estimated beside it",
         found="Velocity RMS error in `push_recovery`, 95 % intervals:\n\n" + "\n".join(lines),
         verdict=verdict(bool(helped), "" if everywhere else "conditions"),
         why="" if everywhere else f"it helps at e = {', '.join(f'{e:g}' for e in helped) or 'no'} deg of those tried",
@@ -179,8 +180,9 @@ def league_claim(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> C
         says="aranovskiy2020 section V: homogeneous before ltv before linear; here over a grid, with every observer",
         found=(
             f"{worlds} seeds a cell. The smallest velocity error: {winners} of {len(cells)} cells. The paper's order "
-            f"holds at {where or 'none of them'}. The floor is the error of the filter that knows the model, e, the push, the "
-            f"gimbals' motion and the noise exactly: none of the observers knows e or the push.\n\n{markdown(rows)}"
+            f"holds at {where or 'none of them'}. The floor is the error of the filter that knows the model, e, the "
+            f"push, the gimbals' motion and the noise exactly: none of the observers knows e or the push.\n\n"
+            f"{markdown(rows)}"
         ),
         verdict=verdict(bool(holds), "" if everywhere else "conditions"),
         why="" if everywhere else "the order turns round where noise is low or the bias large",
