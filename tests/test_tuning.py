@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections.abc import Callable, Mapping
@@ -23,7 +24,7 @@ from cmg_mj.replay import replay
 from cmg_mj.scenario import load_scenario, prepare
 from cmg_mj.schema import Scenario
 from cmg_mj.trajectory import Trajectory
-from cmg_mj.tuning import Recorded, best_noise, record, tune
+from cmg_mj.tuning import Recorded, best_noise, record, tune, tuning_table
 from cmg_mj.tuning.parameters import Number, numbers_of, parameters_of, replaced
 from cmg_mj.tuning.recorded import tuning_scenario, window_of
 from cmg_mj.tuning.search import crossing, search
@@ -251,13 +252,13 @@ def test_planted_parameters_are_found(kind: str, chosen: list[str], truth: dict)
 
 def test_the_verdict_is_of_the_worlds_that_were_not_fitted() -> None:
     """Fitted worlds want 0.05, the others Table 2's: the fit is perfect and the verdict is worse."""
-    truth = recorder("linear", lambda _, held_out: {"tau": 0.02 if held_out else 0.05})
+    truth = recorder("linear", lambda _, held_out: {"tau": 0.02 if held_out else 0.05}, gyro_noise=1e-4)
     study = tune(load_scenario("observer_tuning", observer="linear"), worlds=4, recorded=truth)
     (level,) = study.levels
     assert level.sizes["tau"] == pytest.approx(0.05, rel=0.01)
     assert level.fit_rms < 0.01 * level.fit_given_rms
     assert level.verdict == "worse"
-    assert level.gain.high < 0.0
+    assert level.ratio.high < 1.0
 
 
 def test_where_the_given_parameters_are_the_best_the_verdict_is_a_tie() -> None:
@@ -265,6 +266,29 @@ def test_where_the_given_parameters_are_the_best_the_verdict_is_a_tie() -> None:
     study = tune(load_scenario("observer_tuning", observer="linear"), worlds=4, recorded=recorded)
     assert study.levels[0].sizes == {"tau": 0.02}
     assert study.levels[0].verdict == "tie"
+
+
+def test_the_verdict_is_that_of_the_ratio_in_the_table() -> None:
+    """Differences of 1 in large errors, ratios either side of 1: the difference alone would say better."""
+    tuned = np.array([0.100, 0.101, 0.102, 10.0])
+    recorded = recorder("linear", lambda *_: {"tau": 0.02})
+    level = tune(load_scenario("observer_tuning", observer="linear"), worlds=4, recorded=recorded).levels[0]
+    for factor, verdict in (([1.2, 1.3, 1.25, 1.22], "better"), ([0.9, 1.1, 1.0, 1.3], "tie"), ([0.8] * 4, "worse")):
+        changed = dataclasses.replace(level, rms=tuned, given_rms=tuned * factor)
+        assert changed.verdict == verdict
+        assert (changed.ratio.low > 1.0) == (verdict == "better")
+        assert (changed.ratio.high < 1.0) == (verdict == "worse")
+
+
+@pytest.mark.parametrize(
+    ("zeros", "said"), [((0.104, 0.10402), "0.1040 rad/s"), ((0.1, 0.2), "0.1000 to 0.2000 rad/s")]
+)
+def test_an_estimate_of_zero_is_one_number_where_it_is_the_same(zeros: tuple[float, float], said: str) -> None:
+    recorded = recorder("linear", lambda *_: {"tau": 0.03})
+    study = tune(load_scenario("observer_tuning", observer="linear"), worlds=2, recorded=recorded)
+    levels = [dataclasses.replace(study.levels[0], zero_rms=zero) for zero in zeros]
+    caption = str(tuning_table(dataclasses.replace(study, levels=levels)).caption)
+    assert f"An estimate of zero: {said}." in caption
 
 
 def test_numbers_that_do_not_matter_are_left_alone() -> None:
@@ -282,9 +306,14 @@ def test_the_noise_at_which_the_given_parameters_are_best() -> None:
     scenario = load_scenario("observer_tuning", observer="linear")
     study = tune(scenario, worlds=4, recorded=recorded, noise_ug_rthz=[800.0, 100.0, 400.0])
     assert [level.noise_ug_rthz for level in study.levels] == [100.0, 400.0, 800.0]
-    assert best_noise(study) == pytest.approx(300.0, rel=0.02)
-    beyond = tune(scenario, worlds=4, recorded=recorded, noise_ug_rthz=[400.0, 800.0])
-    assert best_noise(beyond) is None
+    best = best_noise(study)
+    assert best.where == "found"
+    assert best.noise_ug_rthz == pytest.approx(300.0, rel=0.02)
+    for noises, side in (([400.0, 800.0], "below"), ([100.0, 200.0], "above")):
+        beyond = tune(scenario, worlds=4, recorded=recorded, noise_ug_rthz=noises)
+        assert best_noise(beyond) == (side, None)
+        assert f"best at a noise {side} these, if at any" in str(tuning_table(beyond).caption)
+    assert best_noise(dataclasses.replace(study, levels=study.levels[:1])) == ("not bracketed", None)
 
 
 def test_of_several_numbers_the_level_with_the_least_loss_counts() -> None:
@@ -293,8 +322,14 @@ def test_of_several_numbers_the_level_with_the_least_loss_counts() -> None:
     recorded = recorder("linear_high_gain", lambda noise, _: {"epsilon": truths[noise], "a1": 1.5}, gyro_noise=0.05)
     scenario = load_scenario("observer_tuning", observer="linear_high_gain")
     options: dict[str, Any] = {"worlds": 4, "recorded": recorded, "parameters": ["epsilon", "a1"], "starts": 1}
-    assert best_noise(tune(scenario, noise_ug_rthz=list(truths), **options)) == 200.0
-    assert best_noise(tune(scenario, noise_ug_rthz=[200.0, 400.0], **options)) is None  # at an end of the list
+    study = tune(scenario, noise_ug_rthz=list(truths), **options)
+    assert best_noise(study) == ("found", 200.0)
+    assert "the given parameters lose least at 200 ug/rtHz." in str(tuning_table(study).caption)
+    thousands = [dataclasses.replace(level, noise_ug_rthz=16.0 * level.noise_ug_rthz) for level in study.levels]
+    caption = str(tuning_table(dataclasses.replace(study, levels=thousands)).caption)
+    assert "lose least at 3200 ug/rtHz." in caption  # not 3.2e+03
+    # Two noises have nothing between them: 200 may be the best, and what is below it was not tried.
+    assert best_noise(tune(scenario, noise_ug_rthz=[200.0, 400.0], **options)) == ("below", None)
 
 
 def test_parameters_at_which_an_observer_fails_are_no_candidates() -> None:
@@ -398,11 +433,12 @@ def test_json_has_every_figure(quick: str) -> None:
     assert [level["noise_density_ug_rthz"] for level in figures["levels"]] == [200.0, 400.0]
     assert "given_best_at_noise_density_ug_rthz" in figures
     for level in figures["levels"]:
-        mean, low, high = level["held_out_gain_rad_s"]
+        mean, low, high = level["held_out_ratio"]
         assert low <= mean <= high
-        difference = level["held_out_given_rms_error_rad_s"] - level["held_out_rms_error_rad_s"]
-        assert mean == pytest.approx(difference)
-        assert level["verdict"] in ("better", "tie", "worse")
+        ratio = level["held_out_given_rms_error_rad_s"] / level["held_out_rms_error_rad_s"]
+        assert mean == pytest.approx(ratio, rel=0.05)
+        assert level["verdict"] == ("better" if low > 1.0 else "worse" if high < 1.0 else "tie")
+    assert figures["given_best_noise_is"] in ("found", "below", "above", "not bracketed")
     assert json.loads(Path("runs/tune-linear-0/tuned.json").read_text()) == figures
 
 
@@ -452,6 +488,7 @@ def test_help_names_the_experiment() -> None:
         (["--observer", "finite_difference"], "observer finite_difference has no number to tune"),
         (["--observer", "ltv", "--parameters", "H0[2],Q[2]"], "the rate that ltv estimates does not depend on"),
         (["--observer", "linear", "--noise", "100,loud"], "--noise 'loud': must be numbers not below 0"),
+        (["--observer", "linear", "--noise", ","], "--noise ',': give numbers with commas between"),
         (["--observer", "linear", "--noise=-1"], "--noise '-1': must be numbers not below 0"),
         (["--observer", "linear", "--range", "tau"], "--range 'tau': write NAME=LOW:HIGH"),
         (["--observer", "linear", "--range", "tau=3:1"], "--range tau=3:1: must be two positive numbers"),

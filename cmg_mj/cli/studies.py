@@ -117,6 +117,8 @@ def tune(
     default = Path("runs") / f"tune-{file_name(chosen.observer.kind)}-{chosen.seed}"
     folder = output_folder(default if out is None else Path(out))
     densities = [_density(text) for text in noise.split(",") if text.strip()]
+    if noise and not densities:
+        raise InputError(f"--noise {noise!r}: give numbers with commas between")
     with CtrlC() as ctrl_c:
         with progress(f"{chosen.title or scenario}: {chosen.observer.kind}", 1.0, ctrl_c) as on_progress:
             study = fit(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections import namedtuple
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, cos
@@ -15,6 +16,9 @@ from cmg_mj.observers.protocol import BIAS, CONFIG, Measurement, NonNegative, Po
 from cmg_mj.reduced import ReducedModel
 
 TORQUE, SINUSOID = "torque_n_m", "disturbance_n_m"
+
+FASTEST = 2.0
+"""What the rates of the observer times the sample period must stay below."""
 
 
 class Column(NamedTuple):
@@ -52,7 +56,10 @@ class Adaptive:
 
     A constant torque and a bias act alike, so that only one of the two can be asked for. A sinusoidal torque has the
     exosystem [[0, -w], [w, 0]]. Each step is that of `friedland_tacker.FriedlandTacker`, written out: the implicit
-    midpoint rule for x and T, the exosystem exactly, and the correction implicit in the new sample.
+    midpoint rule for x and T, the exosystem exactly, and the correction implicit in the new sample. That step
+    is stable for any gains, but poles beyond 2/dt would be followed by a factor (1 + p dt/2)/(1 - p dt/2) whose real
+    part is negative: an error that changes its sign from sample to sample. Such poles are refused, and likewise a
+    faster learning.
 
     Attributes:
         dt: Sample period [s].
@@ -73,7 +80,7 @@ class Adaptive:
     bias: bool = True
     torque: bool = False
     sinusoid_hz: NonNegative = 0.0
-    known_bias_deg: float = 0.0
+    known_bias_deg: Annotated[float, Field(gt=-90.0, lt=90.0)] = 0.0
     L: tuple[float, float] = (-35.0, -625.0)
     Gamma: tuple[Positive, Positive, Positive] = (1.0, 48.0, 48.0)
     Sigma: Positive = 125.0
@@ -96,6 +103,32 @@ class Adaptive:
         if poles.real.max() >= 0.0:
             listed = ", ".join(f"{p:.3g}" for p in poles)
             raise ValueError(f"L: A + L C must be Hurwitz (both negative), its eigenvalues are {listed}")
+        fastest, limit = float(np.abs(poles).max()), FASTEST / self.dt
+        if fastest >= limit:
+            raise ValueError(
+                f"L: too fast for the sample period: an eigenvalue of A + L C has the size {fastest:.3g} 1/s, "
+                f"which must be below {FASTEST:g}/dt = {limit:g} 1/s"
+            )
+        if self.learning_rate >= limit:
+            raise ValueError(
+                f"Sigma, Gamma: too large for the sample period: the unknown would be learnt at "
+                f"{self.learning_rate:.3g} 1/s, which must be below {FASTEST:g}/dt = {limit:g} 1/s"
+            )
+
+    @property
+    def learning_rate(self) -> float:
+        """Sigma times the sum of Gamma_i |T1_i|^2 over the columns, for T at rest at y1 = 0 and y2 = 0 [1/s].
+
+        T1 is what the tilt's error makes of an unknown: its share of the acceleration through s^2 - l1 s - l2, at s = 0
+        for a constant and at s = j w for a sinusoid, whose two columns are a quarter period apart.
+        """
+        (l1, l2), w = self.L, 2.0 * math.pi * self.sinusoid_hz
+        per_torque = 1.0 / (self.model.gimbals * self.model.J1)
+        bias, torque, sinusoid = self.Gamma
+        constant = bias * (self.model.gravity_torque / self.model.J1) ** 2 if self.bias else 0.0
+        constant += torque * per_torque**2 if self.torque else 0.0
+        swinging = sinusoid * per_torque**2 / ((w * w + l2) ** 2 + (l1 * w) ** 2) if w else 0.0
+        return self.Sigma * (constant / l2**2 + swinging)
 
     @property
     def error_matrix(self) -> np.ndarray:

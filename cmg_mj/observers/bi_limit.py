@@ -9,20 +9,30 @@ example.
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from cmg_mj.elementwise import Scalar, signed_power
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, shown
 
 
-def require_positive(name: str, value: float) -> None:
+def require_number(name: str, value: Any) -> float:
+    """Refuse a parameter that is not a real number; NaN and infinity pass."""
+    if not isinstance(value, numbers.Real):
+        raise InputError(f"{name} = {shown(value)}: must be a number")
+    return float(value)
+
+
+def require_positive(name: str, value: Any) -> float:
     """Refuse a parameter that is not a positive, finite number."""
-    if not (isinstance(value, int | float) and math.isfinite(value) and value > 0.0):
-        raise InputError(f"{name} = {value}: must be a number greater than 0")
+    if not (isinstance(value, numbers.Real) and 0.0 < float(value) < math.inf):
+        raise InputError(f"{name} = {shown(value)}: must be a number greater than 0")
+    return float(value)
 
 
 def weights(n: int, d_inf: float) -> list[float]:
@@ -56,11 +66,11 @@ class BiLimitCorrection:
     d_inf: float = 0.0
 
     def __post_init__(self) -> None:
-        n = len(self.l)
-        if n == 0:
+        if not isinstance(self.l, Sequence | np.ndarray) or len(self.l) == 0:
             raise InputError("l: must have one number a dimension, at least one")
-        for i, value in enumerate(self.l, start=1):
-            require_positive(f"l_{i}", value)
+        n = len(self.l)
+        object.__setattr__(self, "l", tuple(require_positive(f"l_{i}", v) for i, v in enumerate(self.l, start=1)))
+        object.__setattr__(self, "d_inf", require_number("d_inf", self.d_inf))
         limit = 1.0 / (n - 1) if n > 1 else math.inf
         if not 0.0 <= self.d_inf < limit:
             raise InputError(
@@ -68,10 +78,10 @@ class BiLimitCorrection:
             )
         roots = np.roots([1.0, *self.linear_gains])
         if roots.real.max() > -1e-12 * np.abs(roots).max():  # the roots of a marginal case come with rounding errors
-            shown = ", ".join(f"{root:.3g}" for root in roots)
+            listed = ", ".join(f"{root:.3g}" for root in roots)
             raise InputError(
                 "l: s^n + l_1 s^(n-1) + l_1 l_2 s^(n-2) + ... + l_1...l_n, the linear part of K, must be Hurwitz; "
-                f"its roots are {shown}"
+                f"its roots are {listed}"
             )
 
     @property

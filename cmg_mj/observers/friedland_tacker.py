@@ -4,17 +4,21 @@ The plant is (1), (2): x' = A x + B0 r + B2 u, y = C2 x + D20 r, all matrices kn
 measured). The unknown r comes out of an exosystem (3), (4): xm' = Am xm, r = Cm xm. Both x and xm are estimated.
 
 dao2023 prints L as a row, and (7) without hats and without B2 u; here L is a matrix with a column an output, the
-correction is L (C2 x + D20 r - y), and A + L C2 must be stable.
+correction is L (C2 x + D20 r - y), and A + L C2 must be stable. A is only known at each step, so that the construction
+cannot see whether it is; `FriedlandTacker.require_hurwitz` checks one system.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
+
+from cmg_mj.errors import InputError, shown
+from cmg_mj.observers.bi_limit import require_positive
 
 SYMMETRIC = 1e-10  # relative asymmetry of a matrix that is symmetric but for rounding
 
@@ -36,6 +40,10 @@ class System:
     B2: np.ndarray
     C2: np.ndarray
     D20: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name in ("A", "B0", "B2", "C2", "D20"):
+            object.__setattr__(self, name, _real(name, getattr(self, name)))
 
 
 class State(NamedTuple):
@@ -91,17 +99,13 @@ class FriedlandTacker:
     Sigma: np.ndarray
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.dt < np.inf:
-            raise ValueError(f"dt = {self.dt}: must be a finite number greater than 0")
+        object.__setattr__(self, "dt", require_positive("dt", self.dt))
         for name in ("Am", "Cm", "L", "Gamma", "Sigma"):
-            value = np.asarray(getattr(self, name), dtype=float)
-            object.__setattr__(self, name, value)
-            if value.ndim < 2 or not np.isfinite(value).all():
-                raise ValueError(f"{name}: must be a matrix of finite numbers, not of shape {value.shape}")
+            object.__setattr__(self, name, _matrix(name, getattr(self, name)))
         nm, p = self.Am.shape[-1], self.L.shape[-1]
         _fit("Am", self.Am, (nm, nm), "square")
         if self.Am.ndim > 2 or self.Cm.ndim > 2:
-            raise ValueError("Am, Cm: all observers must share one exosystem, two matrices without leading dimensions")
+            raise InputError("Am, Cm: all observers must share one exosystem, two matrices without leading dimensions")
         _fit("Cm", self.Cm, (self.Cm.shape[0], nm), "(r, nm), a column an exosystem state of Am")
         _fit("Gamma", self.Gamma, (nm, nm), "(nm, nm), as Am")
         _fit("Sigma", self.Sigma, (p, p), "(p, p), p the columns of L")
@@ -121,7 +125,7 @@ class FriedlandTacker:
         Returns:
             The observer; its T is the papers' Upsilon.
         """
-        r = np.asarray(Gamma).shape[-1]
+        r = _matrix("Gamma", Gamma).shape[-1]
         return cls(dt, np.zeros((r, r)), np.eye(r), L, Gamma, Sigma)
 
     @property
@@ -157,10 +161,10 @@ class FriedlandTacker:
             ValueError: A vector or matrix does not fit.
         """
         n, p, _, nm = self.sizes.values()
-        y = np.asarray(y, dtype=float)
-        x = np.zeros(n) if x is None else np.asarray(x, dtype=float)
-        xm = np.zeros(nm) if xm is None else np.asarray(xm, dtype=float)
-        T = np.zeros((n, nm)) if T is None else np.asarray(T, dtype=float)
+        y = _real("y", y)
+        x = np.zeros(n) if x is None else _real("x", x)
+        xm = np.zeros(nm) if xm is None else _real("xm", xm)
+        T = np.zeros((n, nm)) if T is None else _real("T", T)
         _fit("y", y, (p,), "(p,), p the columns of L")
         _fit("x", x, (n,), "(n,), n the rows of L")
         _fit("xm", xm, (nm,), "(nm,), as Am")
@@ -195,10 +199,11 @@ class FriedlandTacker:
         Raises:
             ValueError: A matrix or vector does not fit.
         """
+        u, y = _real("u", u), _real("y", y)
+        L = self.L if L is None else _real("L", L)
+        C2 = system.C2 if C2 is None else _real("C2", C2)
+        D20 = system.D20 if D20 is None else _real("D20", D20)
         self._check(system, u, y, L, C2, D20)
-        L = self.L if L is None else L
-        C2 = system.C2 if C2 is None else C2
-        D20 = system.D20 if D20 is None else D20
         h = self.dt
         F, F_back, F_middle = self._turn
         x, xm, T, P, y_before = state
@@ -219,6 +224,26 @@ class FriedlandTacker:
         nu = _solve(np.eye(y.shape[-1]) + h * (G @ gain), _times(C2, x) + _times(D20 @ self.Cm, xm) - y)
         step = -h * _times(gain, nu)
         return State(x + _times(T, step), xm + step, T, P, y)
+
+    def require_hurwitz(self, system: System) -> None:
+        """Refuse a gain with which A + L C2 is not Hurwitz.
+
+        For a constant system this is what the observer needs. For one that varies with time it is neither necessary
+        nor enough, but a gain that fails it at all times is a slip, such as a wrong sign.
+
+        Args:
+            system: The plant's matrices, at one time.
+
+        Raises:
+            ValueError: A or C2 does not fit, or an eigenvalue of A + L C2 is not in the open left half plane.
+        """
+        n, p, _, _ = self.sizes.values()
+        _fit("A", system.A, (n, n), "(n, n), n the rows of L")
+        _fit("C2", system.C2, (p, n), "(p, n), the shape of L transposed")
+        poles = np.linalg.eigvals(system.A + self.L @ system.C2)
+        worst = poles.ravel()[np.argmax(poles.real)]
+        if worst.real >= 0.0:
+            raise InputError(f"L: A + L C2 must be Hurwitz; it has the eigenvalue {worst:.3g}")
 
     def slope(
         self, t: float, x: np.ndarray, xm: np.ndarray, T: np.ndarray, system: System, u: np.ndarray, y: np.ndarray
@@ -254,9 +279,9 @@ class FriedlandTacker:
         system: System,
         u: np.ndarray,
         y: np.ndarray,
-        L: np.ndarray | None,
-        C2: np.ndarray | None,
-        D20: np.ndarray | None,
+        L: np.ndarray,
+        C2: np.ndarray,
+        D20: np.ndarray,
     ) -> None:
         n, p, r, _ = self.sizes.values()
         _fit("A", system.A, (n, n), "(n, n), n the rows of L")
@@ -266,28 +291,45 @@ class FriedlandTacker:
         _fit("u", u, (m,), "(m,), m the columns of B2")
         _fit("y", y, (p,), "(p,), p the columns of L")
         for matrix in (system.C2, C2):
-            if matrix is not None:
-                _fit("C2", matrix, (p, n), "(p, n), the shape of L transposed")
+            _fit("C2", matrix, (p, n), "(p, n), the shape of L transposed")
         for matrix in (system.D20, D20):
-            if matrix is not None:
-                _fit("D20", matrix, (p, r), "(p, r), p the columns of L, r the rows of Cm")
-        if L is not None:
-            _fit("L", L, (n, p), "(n, p), as the L of the construction")
+            _fit("D20", matrix, (p, r), "(p, r), p the columns of L, r the rows of Cm")
+        _fit("L", L, (n, p), "(n, p), as the L of the construction")
 
 
 def _fit(name: str, value: np.ndarray, shape: tuple[int, ...], words: str) -> None:
     """Refuse what does not end in this shape."""
     if np.shape(value)[-len(shape) :] != shape:
-        raise ValueError(f"{name}: must have the shape {shape}, {words}; it has {np.shape(value)}")
+        raise InputError(f"{name}: must have the shape {shape}, {words}; it has {np.shape(value)}")
+
+
+def _real(name: str, value: Any) -> np.ndarray:
+    """As an array of floats; refuse what is not real numbers."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:  # rows of different lengths
+        raise InputError(f"{name}: must be an array of real numbers, with rows of one length") from error
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"{name} = {shown(value)}: must be real numbers, not {array.dtype}".replace("\n", ""))
+    return array.astype(float, copy=False)
+
+
+def _matrix(name: str, value: Any) -> np.ndarray:
+    """The same with at least two dimensions, and finite."""
+    matrix = _real(name, value)
+    if matrix.ndim < 2 or not np.isfinite(matrix).all():
+        what = f"not of shape {matrix.shape}" if matrix.ndim else f"not a scalar; for one number write [[{matrix:g}]]"
+        raise InputError(f"{name}: must be a matrix of finite numbers, {what}")
+    return matrix
 
 
 def _positive_definite(name: str, matrix: np.ndarray) -> None:
     mirrored = np.swapaxes(matrix, -1, -2)
     if np.abs(matrix - mirrored).max() > SYMMETRIC * np.abs(matrix).max():
-        raise ValueError(f"{name}: must be symmetric and positive definite; it is not symmetric")
+        raise InputError(f"{name}: must be symmetric and positive definite; it is not symmetric")
     least = float(np.linalg.eigvalsh((matrix + mirrored) / 2.0).min())
     if least <= 0.0:
-        raise ValueError(f"{name}: must be symmetric and positive definite; its least eigenvalue is {least:.3g}")
+        raise InputError(f"{name}: must be symmetric and positive definite; its least eigenvalue is {least:.3g}")
 
 
 def _times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:

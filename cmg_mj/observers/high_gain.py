@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
@@ -12,8 +13,12 @@ from pydantic.dataclasses import dataclass
 from cmg_mj.elementwise import Scalar, signed_power
 from cmg_mj.observers.bi_limit import BiLimitCorrection, largest_b
 from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
-from cmg_mj.observers.updated_high_gain import updated_gain
+from cmg_mj.observers.updated_high_gain import require_stable_step, updated_gain
 from cmg_mj.reduced import ReducedModel
+
+GIMBAL_RATE = 0.4
+"""Gimbal rate at which L must still be small enough for the sample period [rad/s]. A slow one: at a faster one a
+phi3/phi1 that is taken may still be too large."""
 
 
 class State(NamedTuple):
@@ -64,14 +69,21 @@ class HighGain:
         bound = largest_b(2, self.d_inf)
         if not self.b < bound:
             raise ValueError(f"b = {self.b:g}: must be below (1 - d_inf)/d_inf = {bound:.4g}, andrieu2009 (21)")
-        poles = self.phi2 * np.roots([1.0, self.l1, self.l1 * self.l2])
-        z = self.dt * poles
-        if np.abs(1.0 + z + z**2 / 2.0 + z**3 / 6.0 + z**4 / 24.0).max() >= 1.0:
-            shown = ", ".join(f"{pole:.3g}" for pole in poles)
-            raise ValueError(
-                f"l1, l2, phi2: too fast for the sample period: the poles {shown} 1/s of the linear part are outside "
-                f"the stability region of a Runge-Kutta step of {self.dt:g} s"
-            )
+        poles = np.roots([1.0, self.l1, self.l1 * self.l2])
+        require_stable_step("l1, l2, phi2", self.phi2 * poles, self.dt)
+        L = self.phi2 + self.phi3 / self.phi1 * GIMBAL_RATE * self.largest_damping
+        require_stable_step(
+            f"phi3/phi1 = {self.phi3 / self.phi1:.3g}, with which L rises to {L:.3g} at a gimbal rate of "
+            f"{GIMBAL_RATE:g} rad/s",
+            L * poles,
+            self.dt,
+        )
+
+    @property
+    def largest_damping(self) -> float:
+        """The largest |J2 sin(2 x3)/D| over all gimbal angles."""
+        J1, J2 = self.model.J1, self.model.J2
+        return abs(J2) / math.sqrt(J1 * (J1 + J2))
 
     @cached_property
     def correction(self) -> BiLimitCorrection:

@@ -10,9 +10,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from cmg_mj.elementwise import Scalar, clip, exp, signed_power
-from cmg_mj.errors import InputError
-from cmg_mj.observers.bi_limit import BiLimitCorrection, largest_b, require_positive, violated_conditions
+from cmg_mj.errors import InputError, shown
+from cmg_mj.observers.bi_limit import (
+    BiLimitCorrection,
+    largest_b,
+    require_number,
+    require_positive,
+    violated_conditions,
+)
 
 Signals = tuple[Scalar, ...]
 """Some signals: floats for one world, arrays (n_worlds,) for many."""
@@ -54,6 +62,26 @@ def updated_gain(L: Scalar, Omega: Scalar, span: float, phi1: float, phi2: float
     return clip(L + L * (growth - rest) * (1.0 - decay) / (rest * (1.0 - decay) + growth * decay), phi2, math.inf)
 
 
+def require_stable_step(names: str, poles: np.ndarray, dt: float) -> None:
+    """Refuse poles that one classical Runge-Kutta step a sample does not follow stably.
+
+    Args:
+        names: The parameters that make the poles.
+        poles: Of the linear part of the error system [1/s].
+        dt: Sample period [s].
+
+    Raises:
+        InputError: A pole is outside.
+    """
+    z = dt * poles
+    if np.abs(1.0 + z + z**2 / 2.0 + z**3 / 6.0 + z**4 / 24.0).max() >= 1.0:
+        listed = ", ".join(f"{pole:.3g}" for pole in poles)
+        raise InputError(
+            f"{names}: too fast for the sample period: the poles {listed} 1/s of the linear part are outside "
+            f"the stability region of a Runge-Kutta step of {dt:g} s"
+        )
+
+
 def _unlimited(y: Signals, x: Signals) -> tuple[Signals, Signals]:
     return y, x
 
@@ -66,7 +94,9 @@ class UpdatedHighGain:
     L takes its exact solution over each half of the step for the Omega at its beginning.
 
     Theorem 1 asks for phi1 small and phi2, phi3 large enough: how far depends on constants that only its proof
-    bounds, so they are the user's to choose. What can be checked is `violated_conditions`.
+    bounds, so they are the user's to choose. What can be checked is `violated_conditions`; the paper's own example
+    violates them, so that they are refused only on demand. Where all a_i are 1, gains are refused with which the
+    linear part is unstable in a Runge-Kutta step at the gain at the start; how large L gets depends on Omega.
 
     Attributes:
         dt: Sample period [s].
@@ -81,6 +111,7 @@ class UpdatedHighGain:
         v: Exponents v_2..v_n with which Omega grows in the estimate, for (22); empty if its arguments are limited.
         saturate: Limits the arguments of f_2..f_n and of Omega. f_1, which takes no estimate, gets y as it is measured.
         L0: Gain at the start, at least phi2; phi2 if left out.
+        strict: Whether to refuse a b for which (21) or (22) does not hold.
     """
 
     dt: float
@@ -95,19 +126,43 @@ class UpdatedHighGain:
     v: tuple[float, ...] = ()
     saturate: Saturate = _unlimited
     L0: float | None = None
+    strict: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.correction, BiLimitCorrection):
+            raise InputError(f"correction = {shown(self.correction)}: must be a BiLimitCorrection")
         n = self.correction.n
         for name in ("dt", "b", "phi1", "phi2", "phi3"):
-            require_positive(name, getattr(self, name))
-        for name, given, allowed in (("f", self.f, (n,)), ("a", self.a, (0, n)), ("v", self.v, (0, n - 1))):
+            object.__setattr__(self, name, require_positive(name, getattr(self, name)))
+        for name, allowed in (("f", (n,)), ("a", (0, n)), ("v", (0, n - 1))):
+            given = getattr(self, name)
+            if not isinstance(given, Sequence | np.ndarray):
+                what = "numbers" if name == "v" else "functions"
+                raise InputError(f"{name} = {shown(given)}: must be a tuple of {allowed[-1]} {what}")
             if len(given) not in allowed:
                 raise InputError(f"{name}: has {len(given)} elements, but l says n = {n}: must have {allowed[-1]}")
+            object.__setattr__(self, name, tuple(given))
+        self._check_functions()
         for j, v_j in enumerate(self.v, start=2):
-            if not 0.0 <= v_j < 1.0 / (j - 1):
+            if not 0.0 <= require_number(f"v_{j}", v_j) < 1.0 / (j - 1):
                 raise InputError(f"v_{j} = {v_j:g}: must be in [0, 1/(j - 1)) = [0, {1.0 / (j - 1):g}) (Theorem 1)")
-        if self.L0 is not None and not self.phi2 <= self.L0 < math.inf:
-            raise InputError(f"L0 = {self.L0:g}: must be at least phi2 = {self.phi2:g} (Theorem 1)")
+        if self.L0 is not None:
+            object.__setattr__(self, "L0", require_number("L0", self.L0))
+            if not self.phi2 <= self.L0 < math.inf:
+                raise InputError(f"L0 = {self.L0:g}: must be at least phi2 = {self.phi2:g} (Theorem 1)")
+        if not self.a:
+            names = "l, phi2" if self.L0 is None else "l, L0"
+            poles = np.roots([1.0, *self.correction.linear_gains])
+            require_stable_step(names, (self.L0 or self.phi2) * poles, self.dt)
+        if self.strict and (violated := self.violated_conditions()):
+            raise InputError(f"b = {self.b:g}: {'; '.join(violated)} (Theorem 1)")
+
+    def _check_functions(self) -> None:
+        """Refuse what cannot be called."""
+        indexed = [(f"{name}_{i}", g) for name in "fa" for i, g in enumerate(getattr(self, name), start=1)]
+        for name, function in (*indexed, ("Omega", self.Omega), ("saturate", self.saturate)):
+            if not callable(function):
+                raise InputError(f"{name} = {shown(function)}: must be a function")
 
     @classmethod
     def plain(cls, *, dt: float, f: Sequence[Function], l: Sequence[float], L: float, **others: Any) -> UpdatedHighGain:  # noqa: E741
@@ -172,7 +227,15 @@ class UpdatedHighGain:
 
         Returns:
             The state, with L = L0.
+
+        Raises:
+            InputError: y or x is no tuple, or x has not n elements.
         """
+        for name, signals in (("y", y), ("x", (0.0,) if x is None else x)):
+            if np.ndim(signals) == 0 or len(signals) == 0:
+                raise InputError(f"{name} = {shown(signals)}: must be a tuple of signals, such as (0.1,)")
+        if x is not None and len(x) != self.correction.n:
+            raise InputError(f"x: has {len(x)} elements, but l says n = {self.correction.n}")
         zero = 0.0 * y[0]
         start = (y[0], *[zero] * (self.correction.n - 1)) if x is None else tuple(x_i + zero for x_i in x)
         return State(start, (self.phi2 if self.L0 is None else self.L0) + zero, tuple(y))

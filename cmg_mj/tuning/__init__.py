@@ -5,10 +5,11 @@ are fitted on one set of worlds and scored on another.
 """
 
 from cmg_mj.tuning.recorded import Recorded, record
-from cmg_mj.tuning.study import Level, Study, best_noise, tune, tuned_scenario
+from cmg_mj.tuning.study import BestNoise, Level, Study, best_noise, tune, tuned_scenario
 from cmg_mj.tuning.written import figures_of, save_study, tuning_table
 
 __all__ = [
+    "BestNoise",
     "Level",
     "Recorded",
     "Study",

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.intervals import Interval, PairedVerdict, mean_interval, paired_verdict, ratio_interval
+from cmg_mj.intervals import Interval, PairedVerdict, paired_verdict, ratio_interval
 from cmg_mj.observers import make_observer
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.scenario import prepare
@@ -58,19 +58,19 @@ class Level:
     fell: int
 
     @property
-    def gain(self) -> Interval:
-        """Held-out error with the given parameters less that with the tuned ones, world by world [rad/s]."""
-        return mean_interval(self.given_rms - self.rms)
-
-    @property
     def ratio(self) -> Interval:
-        """Held-out error with the given parameters by that with the tuned ones."""
+        """Held-out error with the given parameters by that with the tuned ones, world by world."""
         return ratio_interval(self.given_rms, self.rms)
 
     @property
     def verdict(self) -> PairedVerdict:
-        """The tuned parameters beside the given ones. Given ones that lose the observer are worse than any."""
-        return paired_verdict(self.gain) if np.isfinite(self.given_rms).all() else "better"
+        """The tuned parameters beside the given ones: is 1 below, inside or above the interval of the ratio?
+
+        Given ones that lose the observer are worse than any.
+        """
+        if not np.isfinite(self.given_rms).all():
+            return "better"
+        return paired_verdict(Interval(*(value - 1.0 for value in self.ratio)))
 
 
 @dataclass(frozen=True)
@@ -254,32 +254,48 @@ def _get(value: Any, place: tuple[int, ...]) -> float:
     return float(value)
 
 
-def best_noise(study: Study) -> float | None:
-    """The sensor noise at which the given parameters are the best ones.
+class BestNoise(NamedTuple):
+    """The sensor noise at which the given parameters are the best ones."""
+
+    where: Literal["found", "below", "above", "not bracketed"]
+    """Whether the noises tried have it between them; below or above them; or none of the three can be said."""
+    noise_ug_rthz: float | None
+    """If it was found [ug/sqrt(Hz)]."""
+
+
+def best_noise(study: Study) -> BestNoise:
+    """At which sensor noise the given parameters are the best ones.
 
     With one tuned number, where its best value crosses the given one, on straight lines between the levels, both in the
-    logarithm. With more, the level at which the given parameters lose least, if that is no end of the list.
+    logarithm. With more, the level at which the given parameters lose least; at an end of the list it may lie beyond.
 
     Args:
         study: With several levels.
 
     Returns:
-        The noise density [ug/sqrt(Hz)]; None if it lies outside the levels, or there is one level only.
+        The noise density, or on which side of the levels it lies, if there is one.
     """
-    levels = study.levels
+    levels = [level for level in study.levels if level.noise_ug_rthz > 0.0 or len(study.numbers) > 1]
     if len(levels) < 2:
-        return None
+        return BestNoise("not bracketed", None)
     if len(study.numbers) == 1:
         (number,) = study.numbers
-        noisy = [level for level in levels if level.noise_ug_rthz > 0.0]
-        sizes = [math.log(level.sizes[number.name] / abs(number.given)) for level in noisy]
-        crossed = crossing([math.log(level.noise_ug_rthz) for level in noisy], sizes) if noisy else None
-        return None if crossed is None else math.exp(crossed)
-    ratios = [level.ratio.mean for level in levels]
-    if not np.isfinite(ratios).all():
-        return None
-    least = int(np.argmin(ratios))
-    return levels[least].noise_ug_rthz if 0 < least < len(levels) - 1 else None
+        off = [math.log(level.sizes[number.name] / abs(number.given)) for level in levels]
+        crossed = crossing([math.log(level.noise_ug_rthz) for level in levels], off)
+        if crossed is not None:
+            return BestNoise("found", math.exp(crossed))
+        lost = [abs(value) for value in off]
+    else:
+        lost = [level.ratio.mean for level in levels]
+    if not np.isfinite(lost).all():
+        return BestNoise("not bracketed", None)
+    least = int(np.argmin(lost))
+    if least == 0:
+        return BestNoise("below", None)
+    if least == len(levels) - 1:
+        return BestNoise("above", None)
+    found = len(study.numbers) > 1
+    return BestNoise("found", levels[least].noise_ug_rthz) if found else BestNoise("not bracketed", None)
 
 
 def tuned_scenario(study: Study, level: Level) -> Scenario:

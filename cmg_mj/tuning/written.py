@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from cmg_mj.tuning.study import Level, Study, best_noise, tuned_scenario
 
 def figures_of(study: Study) -> dict[str, Any]:
     """What `cmg-mj tune --json` prints."""
+    best = best_noise(study)
     return {
         "scenario": study.scenario.title,
         "observer": study.kind,
@@ -30,7 +31,8 @@ def figures_of(study: Study) -> dict[str, Any]:
         "tuned": [number.name for number in study.numbers],
         "idle": list(study.idle),
         "levels": [_level(level) for level in study.levels],
-        "given_best_at_noise_density_ug_rthz": best_noise(study),
+        "given_best_at_noise_density_ug_rthz": best.noise_ug_rthz,
+        **({"given_best_noise_is": best.where} if len(study.levels) > 1 else {}),
     }
 
 
@@ -44,7 +46,6 @@ def _level(level: Level) -> dict[str, Any]:
         "held_out_worlds": len(level.rms),
         "held_out_rms_error_rad_s": _number(float(level.rms.mean())),
         "held_out_given_rms_error_rad_s": _number(float(level.given_rms.mean())),
-        "held_out_gain_rad_s": _interval(level.gain),
         "held_out_ratio": _interval(level.ratio),
         "verdict": level.verdict,
         "zero_estimate_rms_error_rad_s": level.zero_rms,
@@ -84,7 +85,6 @@ def tuning_table(study: Study) -> Table:
     for heading in (
         "held out:\ntuned\n[rad/s]",
         "\ngiven\n[rad/s]",
-        "\ngiven less tuned, 95 %\n[1e-3 rad/s]",
         "\ngiven / tuned, 95 %",
         "tuned is",
     ):
@@ -97,15 +97,18 @@ def tuning_table(study: Study) -> Table:
             *sizes,
             f"{level.rms.mean():.4f}",
             f"{level.given_rms.mean():.4f}",
-            _spread([1e3 * value for value in level.gain], 2),
-            _spread(level.ratio, 3),
+            _spread(level.ratio),
             level.verdict,
         )
     return table
 
 
-def _spread(values: Sequence[float], digits: int) -> str:
-    mean, low, high = (f"{value:.{digits}f}" for value in values)
+def _spread(ratio: Interval) -> str:
+    """To three decimals, or as many as show on which side of 1 an end lies."""
+    digits = 3
+    while digits < 6 and any(value != 1.0 and round(value, digits) == 1.0 for value in ratio[1:]):
+        digits += 1
+    mean, low, high = (f"{value:.{digits}f}" for value in ratio)
     return f"{mean} ({low} to {high})"
 
 
@@ -115,8 +118,8 @@ def _caption(study: Study) -> str:
     lines = [f"RMS of the estimated rate less the gyro's, {start:g} s to {end:g} s, on worlds that were not fitted."]
     if not study.scenario.push:
         lines.append("There is no push: the window is the whole run, where an estimate of zero may do best.")
-    zero = [level.zero_rms for level in study.levels]
-    lines.append(f"An estimate of zero: {min(zero):.4f} to {max(zero):.4f} rad/s.")
+    zero = [f"{level.zero_rms:.4f}" for level in study.levels]
+    lines.append(f"An estimate of zero: {' to '.join(dict.fromkeys([min(zero), max(zero)]))} rad/s.")
     if study.idle:
         lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.idle)}.")
     if any(level.edges for level in study.levels):
@@ -131,13 +134,14 @@ def _caption(study: Study) -> str:
 
 def _best(study: Study) -> str:
     """At which noise the given parameters are the best ones, in words."""
-    best, levels = best_noise(study), study.levels
-    if best is not None:
-        about = "about " if len(study.numbers) == 1 else "among these "
-        return f"The given parameters are best at {about}{best:.3g} ug/rtHz."
-    least = min(levels, key=lambda level: level.ratio.mean)
-    side = "below" if least is levels[0] else "above" if least is levels[-1] else "outside"
-    return f"The given parameters are best at a noise {side} these, if at any."
+    best = best_noise(study)
+    if best.noise_ug_rthz is None:
+        if best.where == "not bracketed":
+            return "The noises tried do not show at which one the given parameters are best."
+        return f"The given parameters are best at a noise {best.where} these, if at any."
+    if len(study.numbers) == 1:
+        return f"The given parameters are best at about {best.noise_ug_rthz:.0f} ug/rtHz."
+    return f"Of these noises the given parameters lose least at {best.noise_ug_rthz:g} ug/rtHz."
 
 
 def save_study(folder: Path, study: Study) -> list[Path]:

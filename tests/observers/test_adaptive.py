@@ -219,6 +219,25 @@ def test_noise_moves_the_bias_by_what_the_linear_filter_says() -> None:
     assert abs(np.degrees(np.mean(errors))) < 0.02
 
 
+@pytest.mark.parametrize("hertz", [0.0, 3.0])
+def test_learning_rate_is_the_stiffness_that_a_quiet_rig_comes_to(hertz: float) -> None:
+    """Sigma times the sum of Gamma_i T1_i^2, with the T that the observer itself has after 3 s at rest."""
+    of = adaptive(bias=not hertz, sinusoid_hz=hertz)
+    state = of.init(Measurement(0.0, 0.0))
+    for _ in range(600):
+        state, _ = of.step(state, Measurement(0.0, 0.0), 0.0)
+    weights = (of.Gamma[2],) * 2 if hertz else of.Gamma[:1]
+    found = of.Sigma * sum(weight * c.T1**2 for weight, c in zip(weights, state.columns, strict=True))
+    print(f"learning rate {of.learning_rate:.4f} 1/s, found {found:.4f}")
+    assert of.learning_rate == pytest.approx(found, rel=0.02)
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 200.0, 1000.0])
+@pytest.mark.parametrize("mode", MODES)
+def test_defaults_are_taken_at_every_sample_rate(mode: str, rate_hz: float) -> None:
+    adaptive(dt=1.0 / rate_hz, **MODES[mode])
+
+
 # --- what is refused -----------------------------------------------------------------------------------
 
 
@@ -232,6 +251,10 @@ def test_noise_moves_the_bias_by_what_the_linear_filter_says() -> None:
         ({"L": (1.0, -100.0)}, r"L: A \+ L C must be Hurwitz"),
         ({"L": (-1.0, 100.0)}, r"L: A \+ L C must be Hurwitz"),
         ({"Gamma": (1.0, 0.0, 1.0)}, r"Gamma = \[1\.0, 0\.0, 1\.0\]: must be a list of 3 numbers greater than 0"),
+        ({"L": (-35e9, -6e9)}, r"L: too fast for the sample period: .* size 3\.5e\+10 1/s, .* below 2/dt = 400 1/s"),
+        ({"Sigma": 1e300}, r"Sigma, Gamma: too large for the sample period: .* at .* 1/s, .* below 2/dt = 400 1/s"),
+        ({"bias": False, "sinusoid_hz": 1.0, "Sigma": 1e9}, r"Sigma, Gamma: too large"),
+        ({"bias": False, "known_bias_deg": 90.0}, r"known_bias_deg = 90\.0: must be a number .*less than 90"),
         ({"sinusoid_hz": -1.0}, r"sinusoid_hz = -1\.0: must be a number greater than or equal to 0"),
         ({"sinusoid_hz": 100.0}, r"sinusoid_hz = 100: must be below half the sample rate, 100 Hz"),
         ({"sigma": 1.0}, r"adaptive has no such parameter; did you mean 'Sigma'"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -188,14 +189,23 @@ def test_the_papers_own_parameters_violate_21_and_22() -> None:
         ((1.0, 1.0), -0.1, r"^d_inf = -0\.1"),
         ((1.0, 1.0), math.nan, r"^d_inf = nan"),
         ((1.0,), math.inf, r"^d_inf = inf"),
+        ((1.0, 1.0), "x", r"^d_inf = 'x': must be a number$"),
+        (5, 0.0, r"^l: must have one number a dimension"),
+        ("ab", 0.0, r"^l_1 = 'a': must be a number greater than 0"),
+        ((1.0, 1j), 0.0, r"^l_2 = 1j: must be a number greater than 0"),
         ((1.0, 2.0, 3.0), 0.0, r"^l: .* must be Hurwitz; its roots are"),
         ((1.0, 1.0, 1.0), 0.3, r"^l: .* must be Hurwitz"),
     ],
 )
-def test_what_the_theorem_does_not_allow_is_refused(l: tuple[float, ...], d_inf: float, message: str) -> None:  # noqa: E741
+def test_what_the_theorem_does_not_allow_is_refused(l: Any, d_inf: Any, message: str) -> None:  # noqa: E741
     with pytest.raises(InputError, match=message) as caught:
         BiLimitCorrection(l, d_inf)
     assert "\n" not in str(caught.value)
+
+
+def test_numpys_numbers_are_taken() -> None:
+    zero: Any = np.int64(0)
+    assert BiLimitCorrection(tuple(np.array([4.0, 2.0])), zero) == BiLimitCorrection((4.0, 2.0))
 
 
 def test_the_edges_are_taken() -> None:

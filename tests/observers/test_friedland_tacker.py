@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from cmg_mj.errors import InputError
 from cmg_mj.observers.friedland_tacker import FriedlandTacker, State, System
 from cmg_mj.reproduce.dao2023 import pendulum_robot as robot
 
@@ -250,8 +251,13 @@ RIGHT: dict[str, Any] = {
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("dt", 0.0, r"^dt = 0\.0: must be a finite number greater than 0$"),
+        ("dt", 0.0, r"^dt = 0\.0: must be a number greater than 0$"),
         ("dt", float("nan"), r"^dt = nan"),
+        ("dt", "a", r"^dt = 'a': must be a number greater than 0$"),
+        ("Am", 1j * np.eye(4), r"^Am = .*: must be real numbers, not complex128$"),
+        ("Am", [[1.0, 2.0], [3.0]], r"^Am: must be an array of real numbers, with rows of one length$"),
+        ("Cm", "C", r"^Cm = 'C': must be real numbers"),
+        ("Gamma", 2.0, r"^Gamma: must be a matrix of finite numbers, not a scalar; for one number write \[\[2\]\]$"),
         ("Am", np.zeros((4, 3)), r"^Am: must have the shape \(3, 3\), square; it has \(4, 3\)$"),
         ("Am", np.zeros((2, 4, 4)), r"^Am, Cm: .*without leading dimensions$"),
         ("Cm", np.ones((2, 3)), r"^Cm: must have the shape \(2, 4\).*it has \(2, 3\)$"),
@@ -267,8 +273,41 @@ RIGHT: dict[str, Any] = {
 )
 def test_what_does_not_fit_is_refused_at_construction(name: str, value: Any, message: str) -> None:
     FriedlandTacker(**RIGHT)
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(InputError, match=message) as caught:
         FriedlandTacker(**(RIGHT | {name: value}))
+    assert "\n" not in str(caught.value)
+
+
+def test_conventional_refuses_a_scalar_weight() -> None:
+    with pytest.raises(InputError, match=r"^Gamma: must be a matrix of finite numbers, not a scalar"):
+        FriedlandTacker.conventional(0.01, -np.ones((2, 1)), 2.0, np.eye(1))  # type: ignore[arg-type]
+
+
+def test_lists_are_taken() -> None:
+    """At the construction, in the plant's matrices and at a step alike."""
+    lists = FriedlandTacker(**{name: np.asarray(value).tolist() for name, value in RIGHT.items()})
+    given = {name: value.tolist() for name, value in (STEP | {"y": np.array([0.3, -1.0]), "A": -np.eye(3)}).items()}
+    system = System(*(given[name] for name in ("A", "B0", "B2", "C2", "D20")))
+    found = lists.step(lists.init([0.1, 0.2]), system, given["u"], given["y"])  # type: ignore[arg-type]
+    arrays = FriedlandTacker(**RIGHT)
+    expected = arrays.step(arrays.init(np.array([0.1, 0.2])), system, np.zeros(1), np.array([0.3, -1.0]))
+    assert all(np.array_equal(a, b) for a, b in zip(found, expected, strict=True))
+    with pytest.raises(InputError, match=r"^A = 'no': must be real numbers"):
+        System("no", *(given[name] for name in ("B0", "B2", "C2", "D20")))  # type: ignore[arg-type]
+
+
+def test_a_gain_that_is_not_hurwitz_is_refused_on_demand() -> None:
+    """The pendulum robot's A + L C2 has s^2 + s + 1; with the sign of L turned, s^2 - s - 1."""
+    here = robot.system(0.0, 0.0)
+    robot.proposed(0.005).require_hurwitz(here)
+    wrong = FriedlandTacker(0.005, robot.A_M, robot.C_M, -robot.L, robot.GAMMA, np.eye(1))
+    with pytest.raises(InputError, match=r"^L: A \+ L C2 must be Hurwitz; it has the eigenvalue 1\.62"):
+        wrong.require_hurwitz(here)
+    undamped = FriedlandTacker(0.005, robot.A_M, robot.C_M, [[0.0], [-1.0]], robot.GAMMA, np.eye(1))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^L: A \+ L C2 must be Hurwitz"):
+        undamped.require_hurwitz(here)
+    with pytest.raises(InputError, match=r"^A: must have the shape \(3, 3\)"):
+        FriedlandTacker(**RIGHT).require_hurwitz(here)
 
 
 STEP: dict[str, np.ndarray] = {

@@ -122,6 +122,12 @@ def test_omega_bounds_the_increments_exactly() -> None:
         assert abs(increment) == pytest.approx(abs(u * HEAVY.terms(y1, y2)[2]) * abs(a - b), rel=1e-9, abs=1e-12)
 
 
+def test_largest_damping_is_the_largest() -> None:
+    for model in (PAPER, HEAVY):
+        over_angles = np.abs(model.terms(0.0, np.linspace(0.0, np.pi, 100_001))[2]).max()
+        assert high_gain(model=model).largest_damping == pytest.approx(over_angles, rel=1e-6)
+
+
 def test_without_noise_and_bias_it_finds_the_rate() -> None:
     """Along a free motion of the reduced model, the true x1, x3 measured."""
     u, dt = 0.5, 5e-4
@@ -175,6 +181,8 @@ def test_a_larger_error_is_corrected_more_than_in_proportion() -> None:
         ({"d_inf": 0.9, "b": 0.41}, r"b = 0\.41: must be below \(1 - d_inf\)/d_inf = 0\.1111"),
         ({"l1": 1000.0}, r"l1, l2, phi2: too fast for the sample period: the poles .* Runge-Kutta step of 0\.005 s"),
         ({"phi2": 60.0}, r"too fast for the sample period"),
+        ({"phi3": 1e12}, r"phi3/phi1 = 3\.33e\+13, with which L rises to .* at a gimbal rate of 0\.4 rad/s: too fast"),
+        ({"phi1": 1e-9}, r"phi3/phi1 = 3e\+09, with which L rises"),
         ({"phi2": 0.0}, r"^observer\.phi2 = 0\.0"),
         ({"l3": 1.0}, r"^observer\.l3: high_gain has no such parameter"),
     ],

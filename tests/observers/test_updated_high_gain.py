@@ -301,6 +301,19 @@ def test_starts_where_it_is_told() -> None:
         ({"f": (lambda u, y, x: 0.0,)}, r"^f: has 1 elements, but l says n = 3"),
         ({"a": (lambda y: 1.0,)}, r"^a: has 1 elements"),
         ({"v": (0.1,)}, r"^v: has 1 elements, but l says n = 3: must have 2"),
+        ({"dt": "a"}, r"^dt = 'a': must be a number greater than 0$"),
+        ({"L0": "a"}, r"^L0 = 'a': must be a number$"),
+        ({"correction": (4.0, 2.0, 1.0)}, r"^correction = \[4\.0, 2\.0, 1\.0\]: must be a BiLimitCorrection$"),
+        ({"f": abs}, r"^f = .*: must be a tuple of 3 functions$"),
+        ({"f": (abs, abs, 1.0)}, r"^f_3 = 1\.0: must be a function$"),
+        ({"a": (abs, "a", abs)}, r"^a_2 = 'a': must be a function$"),
+        ({"Omega": 2.0}, r"^Omega = 2\.0: must be a function$"),
+        ({"saturate": None}, r"^saturate = None: must be a function$"),
+        ({"v": 0.1}, r"^v = 0\.1: must be a tuple of 2 numbers$"),
+        ({"v": (0.1, "x")}, r"^v_3 = 'x': must be a number$"),
+        ({"a": (), "dt": 1.0}, r"^l, phi2: too fast for the sample period: .* Runge-Kutta step of 1 s$"),
+        ({"a": (), "L0": 900.0}, r"^l, L0: too fast for the sample period"),
+        ({"b": 40.0, "strict": True}, r"^b = 40: \(21\) for i = 1, j = 1: .*\(Theorem 1\)$"),
         ({"v": (0.1, 0.5)}, r"^v_3 = 0\.5: must be in \[0, 1/\(j - 1\)\) = \[0, 0\.5\) \(Theorem 1\)"),
     ],
 )
@@ -308,6 +321,54 @@ def test_what_the_theorem_does_not_allow_is_refused(changes: dict, message: str)
     with pytest.raises(InputError, match=message) as caught:
         example(3, **changes)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("y", "x", "message"),
+    [
+        (0.1, None, r"^y = 0\.1: must be a tuple of signals, such as \(0\.1,\)$"),
+        ((), None, r"^y = \[\]: must be a tuple of signals"),
+        ((0.1,), 0.1, r"^x = 0\.1: must be a tuple of signals"),
+        ((0.1,), (1.0, 2.0, 3.0), r"^x: has 3 elements, but l says n = 2$"),
+    ],
+)
+def test_what_does_not_fit_is_refused_at_the_start(y: Any, x: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        example(2).init(y, x)
+
+
+def test_numpys_numbers_are_taken() -> None:
+    period: Any = np.float32(0.01)
+    of = example(2, period, b=np.int64(1), correction=BiLimitCorrection((2.0, 1.0)), L0=np.float64(3.0))
+    assert [type(number) for number in (of.dt, of.b, of.L0)] == [float] * 3
+    assert of.b == 1.0
+
+
+def test_the_step_is_stable_up_to_where_it_is_refused() -> None:
+    """A linear observer by its own steps, on either side of the largest L that is taken."""
+
+    def made(L: float) -> UpdatedHighGain:
+        return UpdatedHighGain.plain(dt=0.01, f=[lambda u, y, x: 0.0 * y[0]] * 2, l=(2.0, 1.0), L=L)
+
+    low, high = 1.0, 1e4
+    while high - low > 1e-6 * low:
+        middle = 0.5 * (low + high)
+        try:
+            made(middle)
+            low = middle
+        except InputError:
+            high = middle
+
+    def after(L: float) -> float:
+        of = made(0.9 * low)
+        object.__setattr__(of, "phi2", L)  # past the check
+        state = of.init((0.0,), (1e-3, 0.0))
+        for _ in range(2000):
+            state, _ = of.step(state, (0.0,), None)
+        return abs(state.x[0])
+
+    assert after(0.99 * low) < 1e-6
+    assert after(1.01 * low) > 1.0
 
 
 def test_violated_conditions_are_reported_not_refused() -> None:

@@ -9,9 +9,17 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 
 from cmg_mj.picture import Picture
-from cmg_mj.reproduce.andrieu2009 import STEPS, bi_limit_theory, bioreactor_bounds, bioreactor_figures, high_gain_rig
+from cmg_mj.reproduce.andrieu2009 import (
+    STEPS,
+    bi_limit_theory,
+    bioreactor_bounds,
+    bioreactor_figures,
+    finite_escape,
+    high_gain_rig,
+)
 from cmg_mj.reproduce.andrieu2009.bioreactor import Bioreactor, dilution
 from cmg_mj.reproduce.andrieu2009.bioreactor_figures import Study, study
 from cmg_mj.reproduce.andrieu2009.bioreactor_study import (
@@ -251,7 +259,7 @@ def test_claims_of_the_theory() -> None:
     within = "reproduced within stated conditions"
     expected = {
         bi_limit_theory.increments: "reproduced",
-        bi_limit_theory.no_observer_beyond_1: "not reproduced",
+        finite_escape.no_observer_beyond_1: within,
         bi_limit_theory.scaling_conditions: "not reproduced",
         bi_limit_theory.gain_tracking: "reproduced",
         bi_limit_theory.chain_of_integrators: within,
@@ -264,6 +272,25 @@ def test_claims_of_the_theory() -> None:
 def test_a_poor_correction_is_seen() -> None:
     poor = bi_limit_theory.BiLimitCorrection((1.0, 2.0, 0.9), 0.2)
     assert bi_limit_theory.chain_errors(poor, (1.0,), 2, 20.0) > 3.0
+
+
+@pytest.mark.parametrize("p", [0.5, 1.5, 2.0])
+def test_escaping_solution_solves_1(p: float) -> None:
+    """x1' = x2 and x2' = x2^(1+p) by scipy, up to nine tenths of its time."""
+    end = 3.0**-p / p
+    assert finite_escape.escape(p, 3.0).end_time == pytest.approx(end)
+    x = solve_ivp(lambda t, x: [x[1], x[1] ** (1.0 + p)], (0.0, 0.9 * end), [0.0, 3.0], rtol=1e-10, atol=1e-12).y[:, -1]
+    assert [float(v) for v in finite_escape.solution(p, 3.0, 0.1)] == pytest.approx(x.tolist(), rel=1e-7)
+
+
+def test_escape_is_found_below_1_and_missed_beyond() -> None:
+    """Other starts, powers and tolerances than the report's; the solution whose start is known is not missed."""
+    for start in (3.0, 300.0):
+        assert finite_escape.escape(0.4, start, tolerance=1e-8).error[-1] < finite_escape.FOUND
+        assert finite_escape.escape(2.0, 10.0 * start, tolerance=1e-8).error[-1] > finite_escape.MISSED
+    assert finite_escape.escape(1.5, 30.0, 30.0, 1e-9).error.max() < 1e-4
+    assert finite_escape.escape(1.5, 3000.0).moved == pytest.approx(3000.0**-0.5 / 0.5)
+    assert math.isinf(finite_escape.escape(0.5, 3.0).moved)
 
 
 # --- the rig ------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from functools import cache
 
@@ -16,11 +17,13 @@ from cmg_mj.reproduce.aranovskiy2020 import (
     STEPS,
     gains,
     hypotheses,
+    lag,
     linearisation,
     mismatch,
     observability,
     rest,
     riccati,
+    vicinity,
 )
 from cmg_mj.reproduce.aranovskiy2020 import rig_loop as loop
 from cmg_mj.reproduce.aranovskiy2020 import time_invariant as invariant
@@ -216,6 +219,40 @@ def test_euler_makes_the_estimate_worse() -> None:
     assert found.euler_error > 1.1 * found.exact_error
 
 
+def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matters() -> None:
+    """Where it settles, by a root of the nine equations."""
+    A, first = riccati.DOUBLE_INTEGRATOR, linearisation.printed_model().A
+    found = riccati.misprint(SEED)
+    for H, matrix in ((found.corrected, A), (found.printed, first)):
+        slope = H @ matrix.T + A @ H - H @ riccati.C.T @ riccati.C @ H + riccati.Q
+        assert np.abs(slope).max() < 1e-6 * np.abs(H @ riccati.C.T @ riccati.C @ H).max()
+    assert abs(found.corrected[0, 1] / found.corrected[1, 0] - 1.0) < 1e-9
+    assert abs(found.printed[0, 1] / found.printed[1, 0] - 1.0) > 0.02
+    assert 0.0 < found.difference < 0.02 * found.error
+
+
+@pytest.mark.parametrize("tau", [0.01, 0.02, 0.05])
+def test_lag_and_noise_of_the_linear_differentiator(tau: float) -> None:
+    found, expected = lag.trade(tau, SEED), lag.foreseen(tau)
+    assert found.lag_s == pytest.approx(2.0 * tau, rel=1e-3)
+    assert found.noise_gain_1_s == pytest.approx(expected.noise_gain_1_s, rel=0.04)
+    assert lag.foreseen(1.0).noise_gain_1_s == pytest.approx(math.sqrt(lag.DT / 4.0), rel=0.01)
+
+
+def test_vicinity_of_the_homogeneous_differentiator() -> None:
+    claim = vicinity.vicinity_claim(SEED)
+    assert claim.verdict == "reproduced within stated conditions"
+    # By homogeneity the chatter of the sampled observer falls as dt^(alpha/(1 - alpha)).
+    coarse, fine = (vicinity.left_of_an_error(0.55, dt) for dt in (0.005, 0.0005))
+    assert math.log10(coarse / fine) == pytest.approx(0.55 / 0.45, abs=0.3)
+
+
+def test_the_cause_of_the_second_place_follows_the_numbers() -> None:
+    runs = [riccati.Numerics(0.05, 0.10 + 0.001 * i, 0.07) for i in range(3)]
+    assert loop.cause_claim(loop.Interval(0.02, 0.01, 0.03), runs).verdict == "not reproduced"
+    assert loop.cause_claim(loop.Interval(-0.02, -0.03, -0.01), runs).verdict == "reproduced"
+
+
 # --- the experiments ------------------------------------------------------------------------------------------
 
 
@@ -249,6 +286,19 @@ def test_ten_with_a_frozen_gain_is_as_good_as_ten() -> None:
     assert frozen[1] == pytest.approx(whole[1], rel=0.02)
 
 
+def test_time_invariant_verdicts_follow_the_falls() -> None:
+    stands, falls = (0.0, 0.05), (1.0, math.nan)
+    rigs = {e: (falls if e >= 0.5 else stands) for e in invariant.BIASES_DEG}
+    calm = dict.fromkeys(invariant.BIASES_DEG, stands)
+    fallen = dict.fromkeys(invariant.BIASES_DEG, falls)
+    found = {"luenberger": rigs, "(10), frozen gain": calm, "(10)": calm}
+    assert invariant.luenberger_claim(found, 5, 11.9, 1.7).verdict == "reproduced within stated conditions"
+    assert invariant.frozen_claim(found, 5).verdict == "not reproduced"
+    turned = {"luenberger": calm, "(10), frozen gain": fallen, "(10)": calm}
+    assert invariant.luenberger_claim(turned, 5, 11.9, 1.7).verdict == "not reproduced"
+    assert invariant.frozen_claim(turned, 5).verdict == "reproduced"
+
+
 def test_frozen_gains_solve_the_algebraic_riccati_equation() -> None:
     A = riccati.DOUBLE_INTEGRATOR
     H = solve_continuous_are(A.T, riccati.C.T, riccati.Q, np.eye(2))
@@ -267,16 +317,39 @@ def test_tuned_gains_are_not_worse_on_held_out_seeds(case: gains.Tuned) -> None:
     assert level.verdict in ("better", "tie")
     assert level.ratio.high > 1.0
     if case.observer == "ltv":
-        assert level.ratio.mean < gains.NEAR
+        assert level.ratio.mean < 1.02
     if case.observer == "homogeneous":
         assert level.ratio.low > 1.2
 
 
 def test_noise_at_which_table_2s_tau_is_the_best() -> None:
     (case,) = (case for case in gains.CASES if case.observer == "linear")
-    best = gains.best_noise(gains.study_of(case, SEED + 1, 10))
+    best = gains.best_noise(gains.study_of(case, SEED + 1, 10)).noise_ug_rthz
     assert best is not None
     assert 200.0 < best < 330.0
+
+
+def test_noise_at_which_table_2s_homogeneous_gains_lose_least() -> None:
+    (case,) = (case for case in gains.CASES if case.observer == "homogeneous")
+    study = gains.study_of(case, SEED + 1, 5, [400.0, 3200.0, 6400.0])
+    claim = gains.table_2_claim(case, study)
+    assert gains.best_noise(study) == ("found", 3200.0)
+    assert claim.verdict == "reproduced within stated conditions"
+    assert "There an estimate of zero is closer to the gyro than either." in claim.why
+    # Two noises have nothing between them: the claim may not say that there is no such noise.
+    two = dataclasses.replace(study, levels=study.levels[:2])
+    assert gains.best_noise(two) == ("above", None)
+    claim = gains.table_2_claim(case, two)
+    assert claim.verdict == "not reproduced"
+    assert "do not bracket" in claim.why
+
+
+def test_a_fit_that_does_not_carry_over_is_not_reproduced() -> None:
+    studies = dict.fromkeys(loop.OBSERVERS, gains.study_of(gains.CASES[0], SEED, 4, [400.0]))
+    assert gains.procedure_claim(studies).verdict.startswith("reproduced")
+    (level,) = studies["ltv"].levels
+    studies["ltv"] = dataclasses.replace(studies["ltv"], levels=[dataclasses.replace(level, rms=1.2 * level.rms)])
+    assert gains.procedure_claim(studies).verdict == "not reproduced"
 
 
 # --- the hypotheses -------------------------------------------------------------------------------------------

@@ -35,6 +35,16 @@ def test_settling_order() -> None:
     assert np.median(ten_thousand) > 2.0 * np.median(thousand)
 
 
+def test_state_error_does_not_settle_quickly() -> None:
+    """Fig. 2(b): with all known, L alone needs some time constants of 2 s, the real part of s^2 + s + 1 = 0."""
+    settled, known = figures.state_settle_times(study().proposed)
+    print(f"state error below {figures.SETTLED}: {settled} s; with all known {known} s")
+    size = np.linalg.norm(study().proposed.state[0, 0], axis=-1)
+    expected = 2.0 * np.log(size / figures.SETTLED)
+    assert np.all(np.abs(known - expected) < 3.0)
+    assert np.median(settled) > figures.QUICK * np.median(known)
+
+
 def test_parameters_at_sigma_1000() -> None:
     errors = np.abs(study().proposed.exogenous[-1, 1, :, :2])
     print(f"largest errors of theta1 and theta2: {errors.max(axis=0)}")

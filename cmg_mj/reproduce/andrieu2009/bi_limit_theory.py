@@ -15,6 +15,7 @@ from cmg_mj.observers.bi_limit import BiLimitCorrection, largest_b, violated_con
 from cmg_mj.observers.updated_high_gain import UpdatedHighGain, updated_gain
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.reproduce.andrieu2009.bioreactor_study import B, P
+from cmg_mj.reproduce.andrieu2009.finite_escape import no_observer_beyond_1
 from cmg_mj.reproduce.claim import Claim, OnShare, verdict
 
 START_ERRORS = (-1e3, -1e2, -10.0, -1.0, 1.0, 10.0, 1e2, 1e3)
@@ -60,19 +61,6 @@ def increments() -> Claim:
         f"{worst[2.0]:.3f}.",
         verdict=verdict(inside <= 1.0 + 1e-9),
         figures={"worst_quotient_by_p": {str(p): quotient for p, quotient in worst.items()}},
-    )
-
-
-def no_observer_beyond_1() -> Claim:
-    """The remark on p > 1."""
-    return Claim(
-        place="Section 2.1",
-        says="For p > 1 and u = 0 no observer can guarantee convergence while the solution of (1) exists.",
-        found=f"Inequality (3), on which this observer rests, fails there: by a factor {largest_increment(1.5):.3f} "
-        "for p = 1.5.",
-        verdict="not reproduced",
-        why="It is a statement about all observers, proved elsewhere (Astolfi and Praly 2006); no simulation shows it.",
-        figures={"worst_quotient_p_1_5": largest_increment(1.5)},
     )
 
 

@@ -212,7 +212,7 @@ def noise_level() -> Claim:
     holds = abs(tenth - NOISE) < 0.005
     return Claim(
         place="Section 3.1, the noise",
-        says=f"The measurement noise has a standard deviation of 10 % of the domain of eta1, i.e. {NOISE}.",
+        says=f"The noise on eta1 has the standard deviation {NOISE}, said to be a tenth of the range of eta1.",
         found=f"With eps1, eps2 from the paper's own formulas 10 % of [eps1, 1 - eps2] is {tenth:.4f}; {NOISE} is "
         f"{100.0 * 0.1 * NOISE / tenth:.1f} % of it.",
         verdict=verdict(holds),

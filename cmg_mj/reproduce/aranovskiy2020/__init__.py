@@ -5,6 +5,7 @@ from __future__ import annotations
 from cmg_mj.reproduce.aranovskiy2020 import (
     gains,
     hypotheses,
+    lag,
     linearisation,
     observability,
     optimality,
@@ -14,6 +15,7 @@ from cmg_mj.reproduce.aranovskiy2020 import (
     rig_loop,
     time_invariant,
     update_cost,
+    vicinity,
 )
 from cmg_mj.reproduce.claim import Claim, OnShare, Step
 
@@ -28,10 +30,12 @@ STEPS: list[Step] = [
     Step("the law's gains", 0.2, optimality.run),
     Step("where the loop rests", 13.0, rest.run),
     Step("observability", 1.0, observability.run),
+    Step("(9), lag and noise", 0.3, lag.run),
+    Step("(11), the vicinity", 2.0, vicinity.run),
     Step("Remark 1, the cost of an update", 1.0, update_cost.run),
     Step("Remark 1, the Riccati equation", 2.0, riccati.run),
     Step("Figs 4 to 7", 21.0, rig_loop.run),
     Step("the time-invariant observer", 10.0, time_invariant.run),
-    Step("Table 2 tuned again", 28.0, gains.run),
+    Step("Table 2 tuned again", 31.0, gains.run),
     Step("the appendix", 3.0, _appendix),
 ]

@@ -38,10 +38,15 @@ def closed_loop(seed: int = SEED) -> Trajectory:
     return trajectory
 
 
-def slope_of(H: np.ndarray, A: np.ndarray) -> np.ndarray:
-    """H' of (10), corrected: H A'^T + A' H - H C^T C H + Q."""
+def slope_of(H: np.ndarray, A: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
+    """H' of (10), corrected: H A'^T + A' H - H C^T C H + Q; with another matrix transposed in its first term."""
     kind = H.dtype
-    return H @ A.T.astype(kind) + A.astype(kind) @ H - H @ (C.T @ C).astype(kind) @ H + Q.astype(kind)
+    return (
+        H @ (A if first is None else first).T.astype(kind)
+        + A.astype(kind) @ H
+        - H @ (C.T @ C).astype(kind) @ H
+        + Q.astype(kind)
+    )
 
 
 def euler(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
@@ -49,13 +54,18 @@ def euler(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
     return H + H.dtype.type(h) * slope_of(H, A)
 
 
-def rk4(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
+def rk4(H: np.ndarray, A: np.ndarray, h: float, first: np.ndarray | None = None) -> np.ndarray:
     """One classical Runge-Kutta step."""
     t = H.dtype.type(h)
-    k1 = slope_of(H, A)
-    k2 = slope_of(H + t / 2 * k1, A)
-    k3 = slope_of(H + t / 2 * k2, A)
-    return H + t / 6 * (k1 + 2 * k2 + 2 * k3 + slope_of(H + t * k3, A))
+    k1 = slope_of(H, A, first)
+    k2 = slope_of(H + t / 2 * k1, A, first)
+    k3 = slope_of(H + t / 2 * k2, A, first)
+    return H + t / 6 * (k1 + 2 * k2 + 2 * k3 + slope_of(H + t * k3, A, first))
+
+
+def rk4_as_printed(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
+    """The same with the printed first term, H A^T with A of (6)."""
+    return rk4(H, A, h, printed_model().A)
 
 
 def exact_step(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
@@ -185,6 +195,70 @@ def numerics(seed: int) -> Numerics:
     return Numerics(*rms)
 
 
+class Misprint(NamedTuple):
+    """What the printed Riccati equation, H A^T with A of (6), changes."""
+
+    corrected: np.ndarray
+    """H where the corrected equation settles at rest, (3, 3)."""
+    printed: np.ndarray
+    """H where the printed one does, (3, 3)."""
+    difference: float
+    """RMS of the rate estimated with the one less that with the other along a closed-loop run [rad/s]."""
+    error: float
+    """RMS error of the rate, corrected [rad/s]."""
+    printed_error: float
+    """RMS error of the rate, as printed [rad/s]."""
+
+
+def misprint(seed: int = SEED) -> Misprint:
+    """Integrate both equations, at rest and along a run, with Runge-Kutta 4."""
+    settled = []
+    for method in (rk4, rk4_as_printed):
+        H = np.eye(3)
+        for _ in range(8000):  # 8 s; the slowest entry, H33, takes 1 s to fall by e^2
+            H = method(H, DOUBLE_INTEGRATOR, 1e-3)
+        settled.append(H)
+    run = closed_loop(seed)
+    later = run["time_s"] > 0.2
+    corrected, printed = (replay(Plain(method), run).x2[later] for method in (rk4, rk4_as_printed))
+    truth = run["x2_rad_s"][later]
+    rms = [float(np.sqrt(np.mean(d**2))) for d in (printed - corrected, corrected - truth, printed - truth)]
+    return Misprint(settled[0], settled[1], *rms)
+
+
+def misprint_claim(seed: int = SEED) -> Claim:
+    """The Riccati equation as printed."""
+    found = misprint(seed)
+    H, printed = found.corrected, found.printed
+    asymmetry = float(abs(printed[0, 1] - printed[1, 0]) / printed[1, 0])
+    symmetric = float(np.abs(H - H.T).max()) < 1e-6 * float(np.abs(H).max())
+    why = "With A'^T for the printed A^T, which is that of (6): a misprint."
+    gain = float(np.abs(printed[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
+    return Claim(
+        place="After (10), the Riccati equation",
+        says="H' = H A^T + A' H - H C^T C H + Q keeps the gain matrix symmetric.",
+        found=(
+            f"With A of (6) as printed, H settles at rest with H12 = {printed[0, 1]:.1f} and H21 = "
+            f"{printed[1, 0]:.1f}: not symmetric, by {asymmetry:.1%}. With A'^T in A^T's place both are "
+            f"{H[1, 0]:.1f}. The observer uses H C^T alone, of which the largest change is {gain:.2%} of its largest "
+            f"entry (H11 {H[0, 0]:.2f}, printed {printed[0, 0]:.2f}). Along a closed-loop run the rate changes by "
+            f"{found.difference:.4f} rad/s RMS (H by Runge-Kutta 4, the estimate by "
+            f"Euler), its error from {found.error:.4f} to {found.printed_error:.4f} rad/s."
+        ),
+        verdict=verdict(symmetric, why),
+        why=why if symmetric else "Not even with A'^T.",
+        figures={
+            "H12_printed": float(printed[0, 1]),
+            "H21_printed": float(printed[1, 0]),
+            "H12": float(H[0, 1]),
+            "largest_change_of_gain_share": gain,
+            "rate_changed_rad_s": found.difference,
+            "rate_error_rad_s": found.error,
+            "rate_error_printed_rad_s": found.printed_error,
+        },
+    )
+
+
 def delicacy() -> Claim:
     """Condition and definiteness of H over step size and method."""
     definite = {name: lowest_rate(name, lambda t: t.least > 0.0) for name in METHODS}
@@ -280,4 +354,4 @@ def _delicacy_picture() -> Picture:
 
 def run(on_share: OnShare) -> list[Claim]:
     """All claims of this module."""
-    return [delicacy()]
+    return [delicacy(), misprint_claim()]

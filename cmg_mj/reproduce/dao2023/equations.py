@@ -33,7 +33,7 @@ def _identity(on_share: OnShare) -> Claim:
     worst = max(errors.values())
     return Claim(
         "Equations (7) to (9)",
-        "T of the Friedland-Tacker equation separates the state's error from that of the exosystem.",
+        "With T from (8), the error of the state parts from that of the exosystem.",
         "z = (x^ - x) - T (xm^ - xm) obeys z' = (A + L C2) z whatever Gamma and Sigma, along a motion that is "
         f"chaotic: to {worst:.0e} at worst, in continuous time (6 s; 1.5 s at Sigma = 1000) and, sampled at 200 Hz, "
         "for 40 s.",
