@@ -680,7 +680,12 @@ def test_an_observer_that_cannot_work(given: type, fragments: list[str], place: 
         said = cmg_mj("run", "push_recovery", "--observer", kind)
     else:
         said = cmg_mj("run", "push_recovery", "--set", f"companions=['{kind}']")
-        assert "FailsWhenMade" in kind or "TakesNo" in kind or "NamesNo" in kind or "companions: 'tests.test_bad_input:" in said.complaint
+        assert (
+            "FailsWhenMade" in kind
+            or "TakesNo" in kind
+            or "NamesNo" in kind
+            or "companions: 'tests.test_bad_input:" in said.complaint
+        )
     assert_in_order(["push_recovery", *fragments], said.complaint)
     assert list(Path().iterdir()) == []
 
