@@ -240,6 +240,7 @@ def test_a_known_bias_is_where_gravity_pulls() -> None:
 def test_friction_beyond_what_the_step_bears_is_refused() -> None:
     """c h = (friction/width + damping) h/(gimbals D) at most 2.5: up to 1.546 N m on one gimbal."""
     observer("homogeneous", friction_n_m=1.54)
-    for given in ({"friction_n_m": 1.56}, {"damping_n_m_s": 31.5}, {"friction_n_m": 1e6}):
+    refused: list[dict[str, Any]] = [{"friction_n_m": 1.56}, {"damping_n_m_s": 31.5}, {"friction_n_m": 1e6}]
+    for given in refused:
         with pytest.raises(InputError, match="friction_n_m, damping_n_m_s: too much for the sample period"):
             observer("homogeneous", **given)
