@@ -263,3 +263,12 @@ def test_defaults_are_taken_at_every_sample_rate(mode: str, rate_hz: float) -> N
 def test_refused(parameters: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=rf"^observer.*{message}"):
         adaptive(**parameters)
+
+
+def test_default_weights_learn_a_bias_and_a_torque_at_1_per_second() -> None:
+    """Sigma Gamma T1^2, T1 the steady solution of (8): (M/J1)/w^2 a radian and 1/(gimbals J1)/w^2 a N m, w^2 = -L2."""
+    of = Adaptive(DT, PAIR)
+    w2, (bias, torque, sinusoid) = -of.L[1], of.Gamma
+    assert of.Sigma * bias * (PAPER.gravity_torque / PAPER.J1 / w2) ** 2 == pytest.approx(1.0, rel=0.02)
+    assert of.Sigma * torque * (1.0 / (2.0 * PAPER.J1) / w2) ** 2 == pytest.approx(1.0, rel=0.02)
+    assert sinusoid == torque  # per unit of torque the same, whatever its frequency
