@@ -38,15 +38,3 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
 def _rows(values: np.ndarray) -> Any:
     """Ticks as floats (one world) or as arrays (n_worlds,): what the observers take."""
     return values.tolist() if values.ndim == 1 else np.ascontiguousarray(values)
-
-
-def cropped(trajectory: Trajectory, start_s: float, end_s: float) -> Trajectory:
-    """The rows from one time to another, both included."""
-    kept = (trajectory["time_s"] >= start_s - 1e-9) & (trajectory["time_s"] <= end_s + 1e-9)
-    return Trajectory({name: values[kept] for name, values in trajectory.columns.items()}, trajectory.metadata)
-
-
-def of_worlds(trajectory: Trajectory, worlds: np.ndarray) -> Trajectory:
-    """Some of many worlds, by their indices or a mask (n_worlds,)."""
-    columns = {name: values if name == "time_s" else values[:, worlds] for name, values in trajectory.columns.items()}
-    return Trajectory(columns, trajectory.metadata)

@@ -76,12 +76,20 @@ class Experiment:
         """Run one world. Options are those of `simulate`."""
         return self._simulate(self.plant, self.controller(int(world)), driver=driver, **options)
 
-    def run_many(self, worlds: int | Sequence[int], plants: Sequence[Plant] | None = None, **options: Any) -> Result:
+    def run_many(
+        self,
+        worlds: int | Sequence[int],
+        plants: Sequence[Plant] | None = None,
+        vary: Mapping[str, Sequence[Any]] | None = None,
+        **options: Any,
+    ) -> Result:
         """Run many worlds at once.
 
         Args:
-            worlds: How many, or their numbers.
+            worlds: How many, or their numbers: world i has the same noise wherever it stands.
             plants: A plant a world, if they differ.
+            vary: The same by settings: a field of [plant] -> its value in each world, such as
+                {"equilibrium_bias_deg": [0.0, 0.5]}.
             **options: Those of `simulate`.
 
         Returns:
@@ -91,6 +99,8 @@ class Experiment:
             InputError: There is no world, or the plants do not fit the worlds or each other.
         """
         numbers = [int(number) for number in (range(worlds) if isinstance(worlds, int) else worlds)]
+        if vary is not None:
+            plants = self.rigs(vary)
         rigs = [self.plant] * len(numbers) if plants is None else list(plants)
         if not numbers or len(rigs) != len(numbers):
             raise InputError(
@@ -100,6 +110,31 @@ class Experiment:
         if len(alike) > 1:
             raise InputError("run_many: the plants must have the same joints, timestep_s and integrator")
         return self._simulate(rigs, self.controller(numbers), **options)
+
+    def rigs(self, vary: Mapping[str, Sequence[Any]]) -> list[Plant]:
+        """The scenario's rig with other settings in each world; equal settings share one rig.
+
+        Args:
+            vary: Field of [plant] -> its value in each world.
+
+        Returns:
+            A rig a world.
+
+        Raises:
+            InputError: There is no such field, a value is not allowed, or the lists differ in length.
+        """
+        given = dataclasses.asdict(self.scenario.plant)
+        made: dict[tuple, Plant] = {}
+        rigs = []
+        try:
+            rows = list(zip(*vary.values(), strict=True))
+        except ValueError as error:
+            raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world") from error
+        for row in rows:
+            if row not in made:
+                made[row] = load_plant(**given | dict(zip(vary, row, strict=True)))
+            rigs.append(made[row])
+        return rigs
 
     def _simulate(self, plant: Plant | Sequence[Plant], controller: Controller, **options: Any) -> Result:
         scenario = self.scenario

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import math
+import statistics
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -60,6 +62,52 @@ class Result:
     summaries: list[dict[str, Any]]
     trajectory: Trajectory | None = None
     seconds: float = 0.0
+
+    @property
+    def stood(self) -> np.ndarray:
+        """Which worlds stood to the end, (n_worlds,)."""
+        return np.array([outcome.kind == "done" for outcome in self.outcomes])
+
+    @property
+    def fell(self) -> np.ndarray:
+        """Which worlds fell, (n_worlds,)."""
+        return np.array([outcome.fell for outcome in self.outcomes])
+
+    def values(self, key: str, companion: str | None = None) -> np.ndarray:
+        """One number of every world's summary.
+
+        Args:
+            key: The summary's key, such as `velocity_rms_error_rad_s`.
+            companion: Whose, of the observers that rode along; None for the one in the loop.
+
+        Returns:
+            (n_worlds,); NaN for a world that did not stand to the end, or has no such number.
+        """
+        of = [s if companion is None else s["companions"][companion] for s in self.summaries]
+        numbers = np.array([math.nan if s[key] is None else s[key] for s in of], dtype=float)
+        return np.where(self.stood, numbers, math.nan)
+
+    def mean(self, key: str, companion: str | None = None) -> float | None:
+        """Mean of `values` over the worlds that have one; None if no world has."""
+        values = self.values(key, companion)
+        known = values[np.isfinite(values)]
+        return statistics.fmean(known) if len(known) else None
+
+    def groups(self, count: int) -> list[Result]:
+        """The worlds in so many groups of equal size, in their order, as `run_many` was given them."""
+        size, left = divmod(len(self.outcomes), count)
+        if left:
+            raise InputError(f"groups({count}): {len(self.outcomes)} worlds cannot be parted so")
+        parts = [slice(i * size, (i + 1) * size) for i in range(count)]
+        return [
+            Result(
+                self.outcomes[part],
+                self.summaries[part],
+                None if self.trajectory is None else self.trajectory.of_worlds(part),
+                max(outcome.time_s for outcome in self.outcomes[part]),
+            )
+            for part in parts
+        ]
 
 
 def _stops(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, float]]:

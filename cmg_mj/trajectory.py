@@ -22,7 +22,7 @@ SIGNALS = (
     "y2_rad",
     "fog_rad_s",
     "u_rad_s",
-    "x_e_rad_s",
+    "x_e_rad_times_s",
     "push_n_m",
 )
 """Columns of every trajectory after `time_s`: true state, measurements, gyro, command, integrator [rad s], push."""
@@ -90,6 +90,16 @@ class Trajectory:
         columns = {name: values if name == "time_s" else values[:, index] for name, values in self.columns.items()}
         kept = np.isfinite(columns["x1_rad"])
         return Trajectory({name: values[kept] for name, values in columns.items()}, self.metadata)
+
+    def of_worlds(self, worlds: np.ndarray | slice) -> Trajectory:
+        """Some of many worlds: their indices, a mask (n_worlds,) or a slice."""
+        columns = {name: values if name == "time_s" else values[:, worlds] for name, values in self.columns.items()}
+        return Trajectory(columns, self.metadata)
+
+    def between(self, start_s: float, end_s: float) -> Trajectory:
+        """The rows from one time to another, both included."""
+        kept = (self["time_s"] >= start_s - 1e-9) & (self["time_s"] <= end_s + 1e-9)
+        return Trajectory({name: values[kept] for name, values in self.columns.items()}, self.metadata)
 
     def save(self, path: Path) -> None:
         """Write one world's trajectory as Parquet, whole or not at all."""

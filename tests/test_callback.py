@@ -109,7 +109,7 @@ class Loop:
 
 def assert_same_run(rows: list[tuple], trajectory: Trajectory) -> None:
     kind = trajectory.observers[0]
-    signals = ("y1_rad", "y2_rad", "fog_rad_s", "u_rad_s", "x_e_rad_s")
+    signals = ("y1_rad", "y2_rad", "fog_rad_s", "u_rad_s", "x_e_rad_times_s")
     names = ("x1_rad", "x2_rad_s", "x3_rad", *trajectory.extra_signals(kind))
     estimates = tuple(f"estimate/{kind}/{name}" for name in names)
     expected = np.hstack([trajectory.qpos(), *(trajectory[name][:, None] for name in (*signals, *estimates))])

@@ -489,7 +489,7 @@ def test_a_control_rate_that_does_not_fit_is_refused(rate_hz: float) -> None:
 def test_recorded_commands_are_the_papers_law(kind: str) -> None:
     """(8) on the record of a run on the full model, through start, push and saturation."""
     trajectory = run("duration_s=1", f"observer.kind={kind}", "push.0.start_s=0.3", "push.0.torque_n_m=4.0")
-    y1, y2, u, x_e = (trajectory[name] for name in ("y1_rad", "y2_rad", "u_rad_s", "x_e_rad_s"))
+    y1, y2, u, x_e = (trajectory[name] for name in ("y1_rad", "y2_rad", "u_rad_s", "x_e_rad_times_s"))
     x2 = trajectory[f"estimate/{kind}/x2_rad_s"]
     demanded = -(35.0 * y1 + 4.0 * x2 - 1.0 * y2 + 0.3 * x_e)
     np.testing.assert_allclose(u, np.clip(demanded, -4.7, 4.7), rtol=0.0, atol=1e-12)
@@ -504,7 +504,7 @@ def test_a_scenario_may_feed_back_the_estimated_angles() -> None:
     """As the text after (10) has it: the whole estimate, the integrator too."""
     trajectory = run("duration_s=0.5", "push=[]", "observer.kind=ltv", "controller.angles=estimated")
     x1, x2, x3 = (trajectory[f"estimate/ltv/{name}"] for name in ("x1_rad", "x2_rad_s", "x3_rad"))
-    u, x_e = trajectory["u_rad_s"], trajectory["x_e_rad_s"]
+    u, x_e = trajectory["u_rad_s"], trajectory["x_e_rad_times_s"]
     np.testing.assert_allclose(u, -(35.0 * x1 + 4.0 * x2 - 1.0 * x3 + 0.3 * x_e), rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(np.diff(x_e), -0.005 * x3[:-1], rtol=0.0, atol=1e-12)
     assert np.abs(x1 - trajectory["y1_rad"]).max() > 1e-3

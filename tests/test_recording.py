@@ -139,7 +139,7 @@ def test_values_equal_the_trajectory(path: Path, run: Recorded, experiment: Expe
         "rate_estimate/linear": t["estimate/linear/x2_rad_s"],
         "rate_error/linear": t["estimate/linear/x2_rad_s"] - t["x2_rad_s"],
         "command/u": t["u_rad_s"],
-        "integrator/x_e": t["x_e_rad_s"],
+        "integrator/x_e": t["x_e_rad_times_s"],
         "gimbal/cube1": np.degrees(t["angle/cube1/gimbal_rad"]) - 90.0,
         "gimbal/cube2": np.degrees(t["angle/cube2/gimbal_rad"]) - 90.0,
         "flywheel/cube1": t["rate/cube1/flywheel_rad_s"],

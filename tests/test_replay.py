@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.replay import cropped, of_worlds, replay
+from cmg_mj.replay import replay
 from cmg_mj.scenario import Experiment, load_scenario, prepare
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
@@ -48,7 +48,7 @@ def test_replay_knows_what_it_is_fed_with() -> None:
 
 
 def test_it_starts_at_the_first_row_it_is_given() -> None:
-    part = cropped(recorded(3), 0.2, 0.6)
+    part = recorded(3).between(0.2, 0.6)
     assert part["time_s"][0] == pytest.approx(0.2)
     assert part["time_s"][-1] == pytest.approx(0.6)
     assert len(part) == 81
@@ -59,7 +59,7 @@ def test_it_starts_at_the_first_row_it_is_given() -> None:
 
 
 def test_some_worlds_of_many() -> None:
-    chosen = of_worlds(recorded(3), np.array([True, False, True]))
+    chosen = recorded(3).of_worlds(np.array([True, False, True]))
     np.testing.assert_array_equal(chosen["y1_rad"], recorded(3)["y1_rad"][:, [0, 2]])
     np.testing.assert_array_equal(chosen["time_s"], recorded(3)["time_s"])
 

@@ -123,7 +123,7 @@ def test_accelerometer_bias_and_equilibrium_bias_move_the_loop_alike() -> None:
         other = [] if "equilibrium" in setting else ["plant.equilibrium_bias_deg=0.0"]
         trajectory = prepare(load_scenario("push_recovery", [setting, *other, *quiet])).run().trajectory
         assert trajectory is not None
-        ends.append([np.mean(trajectory[name][-400:]) for name in ("x1_rad", "y1_rad", "x_e_rad_s")])
+        ends.append([np.mean(trajectory[name][-400:]) for name in ("x1_rad", "y1_rad", "x_e_rad_times_s")])
     for x1, y1, x_e in ends:
         assert x1 == pytest.approx(0.0, abs=0.02 * e)
         assert y1 == pytest.approx(-e, rel=0.02)

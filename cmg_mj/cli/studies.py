@@ -41,9 +41,9 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     Writes a folder: report.md, its plots, and figures.json. Every claim of the paper stands beside what is obtained
     here, with a verdict: reproduced, reproduced within stated conditions, or not reproduced and why.
     """
-    from cmg_mj.reproduce import BEYOND, PAPERS
-    from cmg_mj.reproduce import reproduce as obtain
-    from cmg_mj.reproduce.write import figures_of, save, verdict_table
+    from cmg_mj.papers import BEYOND, PAPERS
+    from cmg_mj.papers import reproduce as obtain
+    from cmg_mj.papers.report import figures_of, save, verdict_table
     from cmg_mj.runs import output_folder
 
     names = (*PAPERS, *BEYOND, "all")

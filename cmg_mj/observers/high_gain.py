@@ -3,22 +3,42 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.elementwise import Scalar, signed_power
-from cmg_mj.observers.bi_limit import BiLimitCorrection, largest_b
+from cmg_mj.elementwise import Scalar, clip, exp, signed_power
+from cmg_mj.observers.model_copy import require_stable_step
 from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
-from cmg_mj.observers.updated_high_gain import require_stable_step, updated_gain
 from cmg_mj.reduced import ReducedModel
 
 GIMBAL_RATE = 0.4
 """Gimbal rate at which L must still be small enough for the sample period [rad/s]. A slow one: at a faster one a
 phi3/phi1 that is taken may still be too large."""
+
+
+def updated_gain(L: Scalar, Omega: Scalar, span: float, phi1: float, phi2: float, phi3: float) -> Scalar:
+    """Advance L' = L (phi1 (phi2 - L) + phi3 Omega), (8), exactly for an Omega >= 0 held over the span.
+
+    The solution of this logistic equation stays at or above phi2 whatever the span, and at phi2 if Omega is 0.
+
+    Args:
+        L: The gain, at least phi2.
+        Omega: Bound on the local incremental rate [1/s].
+        span: Time to advance [s].
+        phi1: Rate with which L returns, per unit of L [1/s].
+        phi2: Least gain.
+        phi3: Weight of Omega.
+
+    Returns:
+        The gain afterwards.
+    """
+    growth = phi1 * phi2 + phi3 * Omega
+    decay = exp(-growth * span)
+    rest = phi1 * L
+    return clip(L + L * (growth - rest) * (1.0 - decay) / (rest * (1.0 - decay) + growth * decay), phi2, math.inf)
 
 
 class State(NamedTuple):
@@ -35,7 +55,7 @@ class State(NamedTuple):
 class HighGain:
     """x1' = x2 - L^(1+b) q1(s), x2' = f2(y, x2, u) - L^(2+b) q2(l2 q1(s)), s = l1 (x1 - y1)/L^b, L' by (8).
 
-    q1(w) = w + [w]^(1/(1-d_inf)), q2(w) = w + [w]^(1+d_inf); both w alone if d_inf = 0. `UpdatedHighGain` written out
+    q1(w) = w + [w]^(1/(1-d_inf)), q2(w) = w + [w]^(1+d_inf); both w alone if d_inf = 0. Theorem 1's observer written out
     for n = 2 and f2 of the reduced model, one step a sample as there. L starts at phi2.
 
     f2 is affine in x2, so the bound (9) on its increments is Omega = |u damping|, exactly and with c_inf = 0. On this
@@ -66,7 +86,7 @@ class HighGain:
     phi3: Positive = 3.0
 
     def __post_init__(self) -> None:
-        bound = largest_b(2, self.d_inf)
+        bound = (1.0 - self.d_inf) / self.d_inf if self.d_inf else math.inf
         if not self.b < bound:
             raise ValueError(f"b = {self.b:g}: must be below (1 - d_inf)/d_inf = {bound:.4g}, andrieu2009 (21)")
         poles = np.roots([1.0, self.l1, self.l1 * self.l2])
@@ -84,11 +104,6 @@ class HighGain:
         """The largest |J2 sin(2 x3)/D| over all gimbal angles."""
         J1, J2 = self.model.J1, self.model.J2
         return abs(J2) / math.sqrt(J1 * (J1 + J2))
-
-    @cached_property
-    def correction(self) -> BiLimitCorrection:
-        """K, as the general form takes it."""
-        return BiLimitCorrection((self.l1, self.l2), self.d_inf)
 
     def init(self, y: Measurement) -> State:
         """Start at rest at the measured tilt."""

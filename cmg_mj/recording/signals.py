@@ -145,7 +145,7 @@ def series(run: Recorded, plant: Plant, settings: MetricsSettings, rate_limit: f
             Series(f"gimbal/{part}", cube.name, time, np.degrees(angle), color),
             Series(f"flywheel/{part}", cube.name + way, time, speed, color, width),
         ]
-    rows.append(Series("integrator/x_e", "x_e", time, t["x_e_rad_s"], CONTROLLER))
+    rows.append(Series("integrator/x_e", "x_e", time, t["x_e_rad_times_s"], CONTROLLER))
     return rows
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Observer
-from cmg_mj.replay import cropped, of_worlds, replay
+from cmg_mj.replay import replay
 from cmg_mj.scenario import Experiment, prepare
 from cmg_mj.schema import ObserverSettings, Scenario
 from cmg_mj.trajectory import Trajectory
@@ -149,5 +149,5 @@ def record(
         )
     window = window_of(scenario)
     assert result.trajectory is not None
-    kept = cropped(of_worlds(result.trajectory, stood), window[0] - warm_up_s, window[1])
+    kept = result.trajectory.of_worlds(stood).between(window[0] - warm_up_s, window[1])
     return Recorded(kept, window, int((~stood).sum()))

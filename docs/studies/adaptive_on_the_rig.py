@@ -6,7 +6,7 @@ python docs/studies/adaptive_on_the_rig.py
 import numpy as np
 
 from cmg_mj.intervals import mean_interval
-from cmg_mj.reproduce.dao2023.adaptive_rig import bias_errors, signed_biases, velocity_errors
+from cmg_mj.papers.dao2023.adaptive_rig import bias_errors, signed_biases, velocity_errors
 
 SEED, WORLDS = 70_000, 100
 BIASES_DEG = (0.5, 1.0, 1.5)

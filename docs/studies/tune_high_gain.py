@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from cmg_mj.observers import Measurement, make_observer
-from cmg_mj.observers.bi_limit import largest_b
+from cmg_mj.papers.andrieu2009.bi_limit import largest_b
 from cmg_mj.scenario import load_scenario, prepare
 
 SEED, LOOP_SEED, WORLDS = 30_000, 31_000, 20

@@ -15,8 +15,8 @@ from scipy.linalg import solve_continuous_lyapunov
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.observers.adaptive import Adaptive
-from cmg_mj.observers.friedland_tacker import FriedlandTacker, System
 from cmg_mj.observers.protocol import extra_signals
+from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, System
 from cmg_mj.reduced import ReducedModel
 from tests.observers.reference import DT, HEAVY, PAPER, Signal, rough_signals
 

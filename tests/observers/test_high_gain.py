@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Measurement
-from cmg_mj.observers.bi_limit import BiLimitCorrection, violated_conditions
 from cmg_mj.observers.high_gain import HighGain
-from cmg_mj.observers.updated_high_gain import UpdatedHighGain
+from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, violated_conditions
+from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
 from cmg_mj.reduced import ReducedModel
 from tests.observers.reference import DT, HEAVY, PAPER, Slope, integrate, observer, power, rough_signals, run
 

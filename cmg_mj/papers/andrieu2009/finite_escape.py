@@ -1,0 +1,156 @@
+"""System (1) of andrieu2009 beyond p = 1: solutions that end before an observer has found them."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from cmg_mj.elementwise import signed_power
+from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b
+from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
+from cmg_mj.papers.claim import Claim, verdict
+from cmg_mj.picture import Line, Panel, Picture
+
+INSIDE, BEYOND = 0.5, 1.5
+"""One p on each side of 1."""
+STARTS = (1.0, 10.0, 100.0, 1e3, 1e4)
+"""x2(0)."""
+D_INF = 0.5
+FOUND, MISSED = 1e-3, 0.5
+"""Relative errors of x2 at the end, below and above which a solution counts as found and as missed."""
+LAST = 14.0
+"""-ln of the share of the time of existence that is left at the end: about a millionth."""
+
+
+class Escape(NamedTuple):
+    """An observer beside a solution that escapes."""
+
+    left: np.ndarray
+    """Share of the solution's time of existence that is left, (n,)."""
+    error: np.ndarray
+    """|x2_hat - x2|/x2, (n,)."""
+    end_time: float
+    """When the solution ends."""
+    moved: float
+    """By how much y has moved until then; infinite if without bound."""
+
+
+def solution(p: float, x2: float, left: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """x2' = x2^(1+p), x1(0) = 0: x1 and x2, in closed form.
+
+    Args:
+        p: Power, not 1.
+        x2: x2(0) > 0.
+        left: Share left of the time of existence x2(0)^-p/p.
+    """
+    end = x2**-p / p
+    power = 1.0 - 1.0 / p
+    x1 = p ** (-1.0 / p) * end**power * (1.0 - np.asarray(left) ** power) / power
+    return x1, (p * end * np.asarray(left)) ** (-1.0 / p)
+
+
+def observer(p: float) -> UpdatedHighGain:
+    """(7), (8) for (1) with g = 0, u = 0, in continuous time; d_inf = 0.5 whatever p is, as Theorem 1 wants it."""
+    return UpdatedHighGain(
+        1e-3,
+        (lambda u, y, x: 0.0 * y[0], lambda u, y, x: signed_power(x[0], 1.0 + p)),
+        BiLimitCorrection((2.0, 1.0), D_INF),
+        lambda u, y, x: (1.0 + p) * (1.0 + abs(x[0]) ** p),
+        0.5 * largest_b(2, D_INF),
+        0.5,
+        2.0,
+        1.0,
+    )
+
+
+@functools.cache
+def escape(p: float, x2: float, x2_hat: float = 0.0, tolerance: float = 1e-6) -> Escape:
+    """Let the observer follow a solution to its end, over s = -ln of the share left.
+
+    Args:
+        p: Power.
+        x2: x2(0).
+        x2_hat: Its estimate at the start; x1 is known.
+        tolerance: Of the integrator.
+
+    Returns:
+        The errors.
+    """
+    of, end = observer(p), x2**-p / p
+
+    def slope(s: float, z: np.ndarray) -> list[float]:
+        left = math.exp(-s)
+        x1, _ = solution(p, x2, left)
+        L = math.exp(z[2])
+        first, second = of.slope((z[0], z[1]), L, (float(x1),), None)
+        growth = of.phi1 * (of.phi2 - L) + of.phi3 * of.Omega(None, (float(x1),), (z[1],))
+        return [end * left * first, end * left * second, end * left * growth]
+
+    found = solve_ivp(
+        slope, (0.0, LAST), [0.0, x2_hat, math.log(of.phi2)], "Radau", rtol=tolerance, atol=1e-3 * tolerance
+    )
+    assert found.success, found.message
+    left = np.exp(-found.t)
+    error = np.abs(found.y[1] / solution(p, x2, left)[1] - 1.0)
+    return Escape(left, error, end, x2 ** (1.0 - p) / (p - 1.0) if p > 1.0 else math.inf)
+
+
+def no_observer_beyond_1() -> Claim:
+    """The remark on p > 1."""
+    runs = {p: [escape(p, start) for start in STARTS] for p in (INSIDE, BEYOND)}
+    ends = {p: [float(run.error[-1]) for run in of] for p, of in runs.items()}
+    moved = [run.moved for run in runs[BEYOND]]
+    missed = [error > MISSED for error in ends[BEYOND]]
+    count = sum(missed)
+    holds = max(ends[INSIDE]) < FOUND and missed[-1]
+    why = (
+        "One observer, (7) and (8) with d_inf = 0.5, l = (2, 1), phi1 = 0.5, phi2 = 2, phi3 = 1, g = 0, without input, "
+        "started at the measured x1 and x2_hat = 0. The statement is one about all observers, proved elsewhere "
+        "(Astolfi and Praly 2006); this shows what stands in their way, it is no proof."
+    )
+    first = f" From x2(0) = {STARTS[missed.index(True)]:g} on it is missed." if count else ""
+    return Claim(
+        place="Section 2.1",
+        says="Once p exceeds 1, and with u = 0, no observer whatever can be sure to find x2 before the solution of (1) "
+        "ends.",
+        found=f"With p = {BEYOND} a solution from x2(0) = {STARTS[0]:g} to {STARTS[-1]:g} escapes at t = "
+        f"{runs[BEYOND][0].end_time:.2g} to {runs[BEYOND][-1].end_time:.2g}, by when y has moved by "
+        f"{moved[0]:.2g} to {moved[-1]:.2g} only. A millionth of that time before the end the relative error of x2 is "
+        f"above {MISSED} in {count} of {len(STARTS)}, {max(ends[BEYOND]):.2f} at worst.{first} With p = {INSIDE} "
+        "solutions escape as well, but y with them: the same observer then finds x2 from every start, to "
+        f"{max(ends[INSIDE]):.0e}.",
+        verdict=verdict(holds, why),
+        why=why,
+        figures={
+            "x2_at_start": list(STARTS),
+            "relative_error_of_x2_at_the_end_by_p": {str(p): values for p, values in ends.items()},
+            "escape_time_by_p": {str(p): [run.end_time for run in of] for p, of in runs.items()},
+            "output_moves_by_p_1_5": moved,
+            "missed_count": count,
+        },
+        pictures=[
+            Picture(
+                "andrieu2009-escape",
+                "andrieu2009, section 2.1: relative error of x2 along solutions of (1) that escape",
+                [
+                    Panel(
+                        "|error of x2|/x2 [-]",
+                        [
+                            Line(1.0 / run.left, run.error, f"x2(0) = {start:g}", color=i)
+                            for i, (start, run) in enumerate(zip(STARTS, runs[p], strict=True))
+                        ],
+                        f"({letter}) p = {p}",
+                        "time of existence over what is left of it [-]",
+                        x_scale="log",
+                        y_scale="log",
+                        y_range=(1e-9, 10.0),
+                    )
+                    for letter, p in zip("ab", (INSIDE, BEYOND), strict=True)
+                ],
+            )
+        ],
+    )

@@ -1,0 +1,251 @@
+"""The high-gain observer with updated gain and homogeneous correction, andrieu2009 (7)-(10), in its general form.
+
+For systems (4): x_i' = f_i(u, y, x_2..x_i) + a_i(y) x_i+1, y = x_1. The rig's own observer is `high_gain.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cmg_mj.elementwise import Scalar, signed_power
+from cmg_mj.errors import InputError, shown
+from cmg_mj.observers.high_gain import updated_gain
+from cmg_mj.observers.model_copy import require_stable_step
+from cmg_mj.papers.andrieu2009.bi_limit import (
+    BiLimitCorrection,
+    largest_b,
+    require_number,
+    require_positive,
+    violated_conditions,
+)
+
+Signals = tuple[Scalar, ...]
+"""Some signals: floats for one world, arrays (n_worlds,) for many."""
+
+Function = Callable[[Any, Signals, Signals], Scalar]
+"""(u, y, (x_2, ..., x_i)) -> a number: f_i. Omega takes (x_2, ..., x_n)."""
+
+Saturate = Callable[[Signals, Signals], tuple[Signals, Signals]]
+"""(y, (x_2, ..., x_n)) -> the same, limited to the set in which the system is known to stay."""
+
+
+class State(NamedTuple):
+    """The estimate x_1..x_n, the gain, and the measurement of the last sample."""
+
+    x: Signals
+    L: Scalar
+    y: Signals
+
+
+def _unlimited(y: Signals, x: Signals) -> tuple[Signals, Signals]:
+    return y, x
+
+
+@dataclass(frozen=True)
+class UpdatedHighGain:
+    """x' = A(y) S x + f(u, y, x) + L diag(L^b, ..., L^(n+b-1)) A(y) K((x_1 - y)/L^b), with L' of `updated_gain`.
+
+    One classical Runge-Kutta step a sample, the measurement running straight between samples and the input held;
+    L takes its exact solution over each half of the step for the Omega at its beginning.
+
+    Theorem 1 asks for phi1 small and phi2, phi3 large enough: how far depends on constants that only its proof
+    bounds, so they are the user's to choose. What can be checked is `violated_conditions`; the paper's own example
+    violates them, so that they are refused only on demand. Where all a_i are 1, gains are refused with which the
+    linear part is unstable in a Runge-Kutta step at the gain at the start; how large L gets depends on Omega.
+
+    Attributes:
+        dt: Sample period [s].
+        f: f_1..f_n of (4), each of (u, y, (x_2, ..., x_i)).
+        correction: K, with its l and d_inf.
+        Omega: Bound on the local incremental rate of f, (9), of (u, y, (x_2, ..., x_n)) [1/s].
+        b: Exponent of the scaling.
+        phi1: See `updated_gain`.
+        phi2: See `updated_gain`.
+        phi3: See `updated_gain`.
+        a: a_1..a_n of (4), (5), positive functions of y; all 1 if left out.
+        v: Exponents v_2..v_n with which Omega grows in the estimate, for (22); empty if its arguments are limited.
+        saturate: Limits the arguments of f_2..f_n and of Omega. f_1, which takes no estimate, gets y as it is measured.
+        L0: Gain at the start, at least phi2; phi2 if left out.
+        strict: Whether to refuse a b for which (21) or (22) does not hold.
+    """
+
+    dt: float
+    f: tuple[Function, ...]
+    correction: BiLimitCorrection
+    Omega: Function
+    b: float
+    phi1: float
+    phi2: float
+    phi3: float
+    a: tuple[Callable[[Signals], Scalar], ...] = ()
+    v: tuple[float, ...] = ()
+    saturate: Saturate = _unlimited
+    L0: float | None = None
+    strict: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.correction, BiLimitCorrection):
+            raise InputError(f"correction = {shown(self.correction)}: must be a BiLimitCorrection")
+        n = self.correction.n
+        for name in ("dt", "b", "phi1", "phi2", "phi3"):
+            object.__setattr__(self, name, require_positive(name, getattr(self, name)))
+        for name, allowed in (("f", (n,)), ("a", (0, n)), ("v", (0, n - 1))):
+            given = getattr(self, name)
+            if not isinstance(given, Sequence | np.ndarray):
+                what = "numbers" if name == "v" else "functions"
+                raise InputError(f"{name} = {shown(given)}: must be a tuple of {allowed[-1]} {what}")
+            if len(given) not in allowed:
+                raise InputError(f"{name}: has {len(given)} elements, but l says n = {n}: must have {allowed[-1]}")
+            object.__setattr__(self, name, tuple(given))
+        self._check_functions()
+        for j, v_j in enumerate(self.v, start=2):
+            if not 0.0 <= require_number(f"v_{j}", v_j) < 1.0 / (j - 1):
+                raise InputError(f"v_{j} = {v_j:g}: must be in [0, 1/(j - 1)) = [0, {1.0 / (j - 1):g}) (Theorem 1)")
+        if self.L0 is not None:
+            object.__setattr__(self, "L0", require_number("L0", self.L0))
+            if not self.phi2 <= self.L0 < math.inf:
+                raise InputError(f"L0 = {self.L0:g}: must be at least phi2 = {self.phi2:g} (Theorem 1)")
+        if not self.a:
+            names = "l, phi2" if self.L0 is None else "l, L0"
+            poles = np.roots([1.0, *self.correction.linear_gains])
+            require_stable_step(names, (self.L0 or self.phi2) * poles, self.dt)
+        if self.strict and (violated := self.violated_conditions()):
+            raise InputError(f"b = {self.b:g}: {'; '.join(violated)} (Theorem 1)")
+
+    def _check_functions(self) -> None:
+        """Refuse what cannot be called."""
+        indexed = [(f"{name}_{i}", g) for name in "fa" for i, g in enumerate(getattr(self, name), start=1)]
+        for name, function in (*indexed, ("Omega", self.Omega), ("saturate", self.saturate)):
+            if not callable(function):
+                raise InputError(f"{name} = {shown(function)}: must be a function")
+
+    @classmethod
+    def plain(cls, *, dt: float, f: Sequence[Function], l: Sequence[float], L: float, **others: Any) -> UpdatedHighGain:  # noqa: E741
+        """The classical high-gain observer: linear correction, constant gain.
+
+        Args:
+            dt: Sample period [s].
+            f: f_1..f_n.
+            l: l_1..l_n.
+            L: The gain.
+            **others: a, saturate.
+
+        Returns:
+            The observer with d_inf = 0 and Omega = 0. With a linear K, b is without effect.
+        """
+        correction = BiLimitCorrection(tuple(l))
+        return cls(dt, tuple(f), correction, lambda u, y, x: 0.0 * y[0], 1.0, 1.0, L, 1.0, **others)
+
+    @classmethod
+    def updated(
+        cls,
+        *,
+        dt: float,
+        f: Sequence[Function],
+        l: Sequence[float],  # noqa: E741
+        Omega: Function,
+        phi1: float,
+        phi2: float,
+        phi3: float,
+        v: Sequence[float] = (),
+        **others: Any,
+    ) -> UpdatedHighGain:
+        """The updated high-gain observer: linear correction, gain by (8).
+
+        Args:
+            dt: Sample period [s].
+            f: f_1..f_n.
+            l: l_1..l_n.
+            Omega: Bound on the local incremental rate [1/s].
+            phi1: See `updated_gain`.
+            phi2: See `updated_gain`.
+            phi3: See `updated_gain`.
+            v: Exponents with which Omega grows.
+            **others: a, saturate, L0.
+
+        Returns:
+            The observer with d_inf = 0. With a linear K, b is without effect; it is chosen to satisfy (22).
+        """
+        b = min(1.0, 0.5 * largest_b(len(l), 0.0, v))
+        return cls(dt, tuple(f), BiLimitCorrection(tuple(l)), Omega, b, phi1, phi2, phi3, v=tuple(v), **others)
+
+    def violated_conditions(self) -> list[str]:
+        """A line for each of the inequalities (21), (22) that does not hold."""
+        return violated_conditions(self.correction.n, self.correction.d_inf, self.b, self.v)
+
+    def init(self, y: Signals, x: Signals | None = None) -> State:
+        """The state at the first sample.
+
+        Args:
+            y: What is measured: the output, and after it whatever other measured signals f, a and Omega take.
+            x: Estimate to start from, x_1..x_n; (y, 0, ..., 0) if left out.
+
+        Returns:
+            The state, with L = L0.
+
+        Raises:
+            InputError: y or x is no tuple, or x has not n elements.
+        """
+        for name, signals in (("y", y), ("x", (0.0,) if x is None else x)):
+            if np.ndim(signals) == 0 or len(signals) == 0:
+                raise InputError(f"{name} = {shown(signals)}: must be a tuple of signals, such as (0.1,)")
+        if x is not None and len(x) != self.correction.n:
+            raise InputError(f"x: has {len(x)} elements, but l says n = {self.correction.n}")
+        zero = 0.0 * y[0]
+        start = (y[0], *[zero] * (self.correction.n - 1)) if x is None else tuple(x_i + zero for x_i in x)
+        return State(start, (self.phi2 if self.L0 is None else self.L0) + zero, tuple(y))
+
+    def step(self, state: State, y: Signals, u: Any) -> tuple[State, Signals]:
+        """Advance by one sample period.
+
+        Args:
+            state: The state at sample k-1.
+            y: What is measured at sample k; it ran straight since sample k-1.
+            u: Known inputs, held since sample k-1.
+
+        Returns:
+            The state and the estimate x_1..x_n at sample k.
+        """
+        h, (x, L, before) = self.dt, state
+        middle = tuple(0.5 * (p + q) for p, q in zip(before, y, strict=True))
+        Omega = self._rate(u, before, x)
+        L_middle = updated_gain(L, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
+        L_end = updated_gain(L_middle, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
+
+        p = self.slope(x, L, before, u)
+        q = self.slope(_moved(x, 0.5 * h, p), L_middle, middle, u)
+        r = self.slope(_moved(x, 0.5 * h, q), L_middle, middle, u)
+        s = self.slope(_moved(x, h, r), L_end, y, u)
+        x = tuple(
+            x_i + h / 6.0 * (p_i + 2.0 * (q_i + r_i) + s_i)
+            for x_i, p_i, q_i, r_i, s_i in zip(x, p, q, r, s, strict=True)
+        )
+        return State(x, L_end, tuple(y)), x
+
+    def slope(self, x: Signals, L: Scalar, y: Signals, u: Any) -> Signals:
+        """The right-hand side of (7)."""
+        n = self.correction.n
+        limited_y, limited_x = self.saturate(y, x[1:])
+        scale = signed_power(L, self.b)
+        K = self.correction((x[0] - y[0]) / scale)
+        slopes = []
+        for i in range(n):
+            scale = L * scale  # L^(i + 1 + b)
+            known = self.f[i](u, limited_y, limited_x[:i]) if i else self.f[0](u, y, ())
+            along = x[i + 1] + scale * K[i] if i + 1 < n else scale * K[i]
+            slopes.append(known + (self.a[i](y) * along if self.a else along))
+        return tuple(slopes)
+
+    def _rate(self, u: Any, y: Signals, x: Signals) -> Scalar:
+        limited_y, limited_x = self.saturate(y, x[1:])
+        return self.Omega(u, limited_y, limited_x)
+
+
+def _moved(x: Signals, span: float, slope: Signals) -> Signals:
+    """The point x + span slope."""
+    return tuple(x_i + span * slope_i for x_i, slope_i in zip(x, slope, strict=True))

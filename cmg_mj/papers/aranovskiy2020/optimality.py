@@ -1,0 +1,112 @@
+"""Are the gains K_e of aranovskiy2020's Table 2 those of an LQR? Inverse optimality by the return difference."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_continuous_are
+
+from cmg_mj.controller import TABLE_2_GAINS
+from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
+from cmg_mj.papers.claim import Claim, OnShare, verdict
+
+
+class Inverse(NamedTuple):
+    """What return difference says of a gain."""
+
+    least: float
+    """min over w of |1 + K (jw - A)^-1 B|."""
+    optimal: bool
+    """Whether some Q >= 0 makes K the LQR gain (Kalman 1964: the minimum is not below 1)."""
+    Q: np.ndarray | None
+    """Such a Q, (n, n), of rank 1."""
+    recovered: float
+    """How far the Riccati equation's gain for that Q is off, relative."""
+    diagonal: np.ndarray
+    """The one diagonal of Q that would give K: with a negative entry no diagonal Q >= 0 does."""
+
+
+def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
+    """Is K the LQR gain of x' = A x + B u for some cost x' Q x + u^2?
+
+    With d the open-loop and p the closed-loop polynomial and n_i/d the transfer function to x_i, a cost Q = diag(q)
+    gives |p(jw)|^2 - |d(jw)|^2 = sum of q_i |n_i(jw)|^2, and Q = c c' gives |sum of c_i n_i|^2.
+
+    Args:
+        A: State matrix, (n, n).
+        B: Input matrix, (n, 1).
+        K: Gain, (n,).
+
+    Returns:
+        The answer.
+    """
+    n = len(A)
+    d, p = np.poly(A), np.poly(A - B @ K[None, :])
+    unit = np.eye(n)
+    numerators = np.array([np.poly(A - B @ unit[i][None, :]) - d for i in range(n)])  # d + n_i is that of u = -x_i
+    gap = (_squared(p) - _squared(d))[1:]  # in w^2, degree n - 1
+    roots = np.roots(gap)
+    crossings = [w for w in roots if abs(w.imag) < 1e-9 * (1.0 + abs(w)) and w.real > 0.0]
+    grid = np.concatenate([np.logspace(-6, 8, 4001), [abs(w.real) for w in crossings]])
+    ratio = np.polyval(_squared(p), grid) / np.polyval(_squared(d), grid)
+    optimal = bool(np.polyval(gap, grid).min() >= 0.0 and gap[-1] >= 0.0)
+    basis = np.column_stack([_squared(row) for row in numerators])[1:]
+    diagonal = np.linalg.lstsq(basis, gap, rcond=None)[0]
+    if not optimal:
+        return Inverse(float(np.sqrt(ratio.min())), False, None, math.inf, diagonal)
+    # Spectral factor: the half of the roots of gap(-s^2) to the left.
+    left = [-np.sqrt(-w) if np.sqrt(-w).real > 0.0 else np.sqrt(-w) for w in roots.astype(complex)]
+    factor = math.sqrt(abs(gap[0])) * np.real(np.poly(left))
+    c = np.linalg.solve(numerators[:, 1:].T, factor)
+    Q = np.outer(c, c)
+    P = solve_continuous_are(A, B, Q, np.eye(1))
+    recovered = float(np.abs((B.T @ P)[0] / K - 1.0).max())
+    return Inverse(float(np.sqrt(ratio.min())), True, Q, recovered, diagonal)
+
+
+def _squared(polynomial: np.ndarray) -> np.ndarray:
+    """|p(jw)|^2 as a polynomial in w^2, highest power first."""
+    n = len(polynomial) - 1
+    mirrored = polynomial * (-1.0) ** (n - np.arange(n + 1))
+    even = np.convolve(polynomial, mirrored)[::2]  # p(s) p(-s) in s^2
+    return even * (-1.0) ** (n - np.arange(n + 1))  # s^2 = -w^2
+
+
+def lqr_gains() -> Claim:
+    """Whether Table 2's K_e is an LQR gain."""
+    model = printed_model()
+    found = inverse_optimality(model.A_e, model.B_e, np.array(TABLE_2_GAINS))
+    negative = [f"q{i + 1} = {q:.3g}" for i, q in enumerate(found.diagonal) if q < 0.0]
+    diagonal = (
+        f"No diagonal Q does it: the only candidate has {', '.join(negative)}."
+        if negative
+        else "A diagonal Q does it: " + ", ".join(f"{q:.3g}" for q in found.diagonal) + "."
+    )
+    some = (
+        f"and a Q >= 0 of rank 1 returns K_e from the Riccati equation to {found.recovered:.0e}"
+        if found.optimal
+        else "so no Q >= 0 has it"
+    )
+    return Claim(
+        place="Table 2, K_e",
+        says="K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
+        found=(
+            f"The return difference |1 + K_e (jw - A_e)^-1 B_e| is nowhere below {found.least:.6f}: K_e "
+            f"{'is' if found.optimal else 'is not'} optimal for some quadratic cost, {some}. {diagonal}"
+        ),
+        verdict=verdict(found.optimal and found.recovered < 1e-6, "weights"),
+        why="The cost is not a weighted sum of squares of the single states, so the paper's weights remain unknown.",
+        figures={
+            "least_return_difference": found.least,
+            "recovered_gain_relative_error": found.recovered if found.optimal else None,
+            "Q": None if found.Q is None else found.Q.tolist(),
+            "diagonal_candidate": found.diagonal.tolist(),
+        },
+    )
+
+
+def run(on_share: OnShare) -> list[Claim]:
+    """All claims of this module."""
+    return [lqr_gains()]

@@ -1,0 +1,77 @@
+"""Remark 1 of aranovskiy2020: what an update of the observer (10) costs beside those of (9) and (11)."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
+from cmg_mj.papers.aranovskiy2020.riccati import DT, Plain, euler, rk4
+from cmg_mj.papers.claim import Claim, OnShare, verdict
+
+
+def update_times(worlds: int | None, repeats: int, updates: int) -> dict[str, float]:
+    """Median time of an update [us], the observers taking turns.
+
+    Args:
+        worlds: So many at once, on arrays; None for one, on floats, and then the plain forms of (10) too.
+        repeats: Turns.
+        updates: Updates a turn.
+
+    Returns:
+        Time by observer.
+    """
+    model = printed_model()
+    cases: dict[str, Any] = {name: make_observer(name, DT, model) for name in ("linear", "homogeneous", "ltv")}
+    if worlds is None:
+        cases |= {"ltv, plain Euler": Plain(euler), "ltv, plain Runge-Kutta 4": Plain(rk4)}
+    value: Any = 0.01 if worlds is None else np.full(worlds, 0.01)
+    y, u = Measurement(value, 2.0 * value), 3.0 * value
+    states = {name: observer.init(y) for name, observer in cases.items()}
+    times: dict[str, list[float]] = {name: [] for name in cases}
+    for _ in range(repeats):
+        for name, observer in cases.items():
+            state, step = states[name], observer.step
+            start = time.perf_counter()
+            for _ in range(updates):
+                state, _ = step(state, y, u)
+            times[name].append((time.perf_counter() - start) / updates * 1e6)
+            states[name] = state
+    return {name: statistics.median(values) for name, values in times.items()}
+
+
+def cost() -> Claim:
+    """Time of an update of (10) relative to (9) and (11)."""
+    one = update_times(None, repeats=15, updates=200)
+    worlds = 4096
+    many = update_times(worlds, repeats=5, updates=4)
+    ratios = {name: one[name] / one["linear"] for name in one}
+    arithmetic = {name: many[name] / many["linear"] for name in many}
+    dearest = one["ltv"] > one["homogeneous"] > one["linear"] and arithmetic["ltv"] > 1.0
+    return Claim(
+        place="Remark 1, cost",
+        says="The observer (10) is computationally heavy: its gain takes differential equations solved online.",
+        found=(
+            f"An update takes, by that of (9): (11) {ratios['homogeneous']:.1f}, (10) {ratios['ltv']:.1f} with the "
+            "exact step on the 2x2 block that is left of H; written out with 3x3 matrices "
+            f"{ratios['ltv, plain Euler']:.0f} with Euler and {ratios['ltv, plain Runge-Kutta 4']:.0f} with "
+            f"Runge-Kutta 4 (one world, in Python). The arithmetic alone, on {worlds} worlds at once: (11) "
+            f"{arithmetic['homogeneous']:.1f}, (10) {arithmetic['ltv']:.1f}. (10) takes {one['ltv']:.0f} us of the "
+            "5000 us of a control period here."
+        ),
+        verdict=verdict(dearest),
+        figures={
+            "update_us": one,
+            "update_by_linear": ratios,
+            "update_by_linear_4096_worlds": arithmetic,
+        },
+    )
+
+
+def run(on_share: OnShare) -> list[Claim]:
+    """All claims of this module."""
+    return [cost()]

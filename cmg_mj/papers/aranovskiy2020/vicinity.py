@@ -1,0 +1,165 @@
+"""The homogeneous differentiator (11) of aranovskiy2020: where its error converges to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
+from cmg_mj.papers.aranovskiy2020.riccati import DT
+from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.replay import replay
+from cmg_mj.trajectory import Trajectory
+
+SEED = 77_000
+ALPHAS = (0.55, 0.7, 0.85, 1.0)
+BIASES_DEG = (0.125, 0.25, 0.5, 1.0, 2.0)
+NOISES_RAD = (0.0005, 0.001, 0.002, 0.004, 0.008)
+K1, K2 = 20.0, 150.0
+"""Table 2."""
+VANISHED = 1e-3
+"""Of the first error of the rate: what is left counts as none."""
+SEEN_RAD_S = 0.01
+"""Biases of the rate above this one are compared with the closed form by their ratio, those below by the difference."""
+
+
+def left_of_an_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, span_s: float = 3.0) -> float:
+    """What is left of a wrong rate without bias, noise or motion, by its first size: largest of the last 0.5 s."""
+    observer = make_observer("homogeneous", dt, printed_model(), alpha=alpha)
+    still = Measurement(0.0, 0.0)
+    state = observer.init(still)._replace(x1=0.05, x2=first_rad_s)
+    errors = []
+    for _ in range(round(span_s / dt)):
+        state, estimate = observer.step(state, still, 0.0)
+        errors.append(abs(estimate.x2 / first_rad_s))
+    return float(max(errors[-round(0.5 / dt) :]))
+
+
+def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
+    """RMS of the rate estimated at rest, whose true value is zero, (n_worlds,) [rad/s].
+
+    Args:
+        alpha: The exponent.
+        y1: What is measured, (n_ticks, n_worlds) [rad].
+    """
+    columns = {"y1_rad": y1, "y2_rad": np.zeros_like(y1), "u_rad_s": np.zeros_like(y1)}
+    observer = make_observer("homogeneous", DT, printed_model(), alpha=alpha)
+    x2 = replay(observer, Trajectory(columns)).x2[len(y1) // 2 :]
+    return np.sqrt(np.mean(x2**2, axis=0))
+
+
+def bias_bound(alpha: float, e_rad: float) -> float:
+    """k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), where (11) rests if y1 = -e [rad/s]."""
+    model = printed_model()
+    pull = model.gravity_torque * math.sin(e_rad) / model.J1
+    return K1 * (pull / K2) ** (alpha / (2.0 * alpha - 1.0))
+
+
+def hurwitz(b: float, c: float) -> bool:
+    """Whether s^2 + b s + c is."""
+    return bool(np.roots([1.0, b, c]).real.max() < 0.0)
+
+
+def _listed(by_alpha: Mapping[float, float], form: str) -> str:
+    return ", ".join(f"{alpha:g}: {value:{form}}" for alpha, value in by_alpha.items())
+
+
+def vicinity_claim(seed: int = SEED) -> Claim:
+    """Convergence to a vicinity of the origin, and how large it is."""
+    left, often = ({alpha: left_of_an_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
+    # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
+    converges = all(left[a] < VANISHED or often[a] < left[a] / 10.0 for a in ALPHAS)
+    ticks = 2000
+    still = np.tile(-np.radians(BIASES_DEG), (ticks, 1))
+    by_bias = {alpha: errors_at_rest(alpha, still) for alpha in ALPHAS[1:]}
+    bound = {alpha: np.array([bias_bound(alpha, e) for e in np.radians(BIASES_DEG)]) for alpha in by_bias}
+    pairs_of = [(x, b) for alpha in by_bias for x, b in zip(by_bias[alpha], bound[alpha], strict=True)]
+    off = max(abs(x / b - 1.0) for x, b in pairs_of if b > SEEN_RAD_S)
+    apart = max(abs(x - b) for x, b in pairs_of if b <= SEEN_RAD_S)
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(0.0, 1.0, (ticks, 16))
+    by_noise = {
+        alpha: np.array([errors_at_rest(alpha, sigma * noise).mean() for sigma in NOISES_RAD]) for alpha in by_bias
+    }
+    slopes = {a: float(np.polyfit(np.log(NOISES_RAD), np.log(rms), 1)[0]) for a, rms in by_noise.items()}
+    pairs = rng.normal(0.0, 100.0, (500, 2))
+    same = all(hurwitz(k1, k2) == hurwitz(k2, k1) for k1, k2 in pairs)
+    holds = converges and off < 0.01 and apart < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5
+    why = "With s^2 + k1 s + k2 Hurwitz; the printed s^2 + k2 s + k1 has k1 and k2 exchanged" + (
+        ", without consequence: either is Hurwitz just when both gains are positive."
+        if same
+        else ", and the two are not Hurwitz together."
+    )
+    return Claim(
+        place="After (11), the vicinity",
+        says="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
+        found=(
+            "k1, k2 of Table 2, at rest. Without bias and noise a first error of 1 rad/s has fallen after 2.5 s, by "
+            f"alpha, to {_listed(left, '.0e')} rad/s at 200 Hz, to {_listed(often, '.0e')} at 2000 Hz: near 1/2 "
+            "what is left is chatter between samples. With a bias e the rate rests off by "
+            f"k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), to {off:.0e} of it for e from {BIASES_DEG[0]:g} to "
+            f"{BIASES_DEG[-1]:g} deg where that is above {SEEN_RAD_S:g} rad/s, else to {apart:.0e} rad/s; at 0.5 deg "
+            f"{_listed({a: values[2] for a, values in by_bias.items()}, '.4f')} rad/s. With noise in y1 and e = "
+            "0 its RMS rises with the noise to the power "
+            f"{_listed(slopes, '.2f')}: the vicinity shrinks to the origin "
+            f"with either. Of {len(pairs)} random pairs of gains, of any sign, the two polynomials are Hurwitz "
+            f"together in {'all' if same else 'some'}."
+        ),
+        verdict=verdict(holds, why),
+        why=why if holds else "The error does not converge, or not to the vicinity foreseen.",
+        figures={
+            "error_left_share": {str(alpha): value for alpha, value in left.items()},
+            "bias_deg": list(BIASES_DEG),
+            "rate_error_by_bias_rad_s": {str(alpha): values.tolist() for alpha, values in by_bias.items()},
+            "error_left_share_2000_hz": {str(alpha): value for alpha, value in often.items()},
+            "closed_form_relative_difference": float(off),
+            "closed_form_difference_where_small_rad_s": float(apart),
+            "noise_rad": list(NOISES_RAD),
+            "rate_error_by_noise_rad_s": {str(alpha): values.tolist() for alpha, values in by_noise.items()},
+            "exponent_of_noise": {str(alpha): value for alpha, value in slopes.items()},
+        },
+        pictures=[
+            Picture(
+                "aranovskiy2020-vicinity",
+                "aranovskiy2020, (11): how far from the true rate its estimate rests, k1 and k2 of Table 2",
+                [
+                    Panel(
+                        "rate error [rad/s]",
+                        [
+                            line
+                            for i, alpha in enumerate(by_bias)
+                            for line in (
+                                Line(BIASES_DEG, by_bias[alpha], f"alpha = {alpha:g}", "o", color=i + 1),
+                                Line(BIASES_DEG, bound[alpha], color=i + 1, width=0.8),
+                            )
+                        ],
+                        "no noise; lines: closed form; above: chatter",
+                        "equilibrium bias e [deg]",
+                        "log",
+                        "log",
+                    ),
+                    Panel(
+                        "RMS rate error\n[rad/s]",
+                        [
+                            Line(np.degrees(NOISES_RAD), by_noise[a], f"alpha = {a:g}", "o-", color=i + 1)
+                            for i, a in enumerate(by_noise)
+                        ],
+                        "with noise, no bias",
+                        "standard deviation of y1's noise [deg]",
+                        "log",
+                        "log",
+                    ),
+                ],
+                share_x=False,
+            )
+        ],
+    )
+
+
+def run(on_share: OnShare) -> list[Claim]:
+    """All claims of this module."""
+    return [vicinity_claim()]

@@ -1,0 +1,155 @@
+"""What an observer does to a signal: its lag, its noise gain, and what an update costs."""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.observers import Measurement, Observer, make_observer
+from cmg_mj.reduced import ReducedModel
+from cmg_mj.replay import replay
+from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.trajectory import Trajectory
+
+PUSH_N_M, PUSH_S = 1.0, 0.1
+"""The push whose lag is found."""
+
+
+class Motion(NamedTuple):
+    """A motion of the rig, measured with and without noise, the law fed by the gyro."""
+
+    experiment: Experiment
+    noisy: Trajectory
+    clean: Trajectory
+
+
+def record_motion(noise_ug: float, worlds: int, seed: int) -> Motion:
+    """Record the tuning experiment without equilibrium bias.
+
+    Args:
+        noise_ug: Noise density of the accelerometers [ug/rtHz].
+        worlds: How many.
+        seed: Of their noise.
+
+    Returns:
+        The motion; the noiseless measurement is the true tilt of one physics step ago, as the accelerometers have it.
+    """
+    settings = [
+        "plant.equilibrium_bias_deg=0.0",
+        f"sensors.accelerometer.noise_density_ug_rthz={noise_ug}",
+        f"seed={seed}",
+        "duration_s=5.0",
+        "companions=[]",
+    ]
+    experiment = prepare(load_scenario("observer_tuning", settings))
+    noisy = experiment.run_many(worlds).trajectory
+    assert noisy is not None
+    late = noisy["x1_rad"] - experiment.plant.settings.timestep_s * noisy["x2_rad_s"]
+    return Motion(experiment, noisy, Trajectory({**noisy.columns, "y1_rad": late}))
+
+
+class Character(NamedTuple):
+    """An observer's answer to motion and to noise."""
+
+    lag_s: float | None
+    """`push_lag` [s]."""
+    noise_gain_per_s: float
+    """RMS of what noise adds to the velocity estimate, over RMS of the noise of y1 [1/s]."""
+
+
+def character(kind: str, motion: Motion) -> Character:
+    """Replay an observer on the same motion with and without noise.
+
+    Args:
+        kind: The observer.
+        motion: What `record_motion` recorded.
+
+    Returns:
+        Its lag and noise gain.
+    """
+    experiment = motion.experiment
+    observer = make_observer(kind, experiment.law.dt, experiment.plant.reduced)
+    clean = replay(observer, motion.clean).x2
+    added = replay(observer, motion.noisy).x2 - clean
+    settled = motion.noisy["time_s"] > 1.0
+    noise = motion.noisy["y1_rad"] - motion.clean["y1_rad"]
+    gain = np.sqrt(np.mean(added[settled] ** 2) / np.mean(noise[settled] ** 2))
+    return Character(push_lag(observer, experiment.plant.reduced, experiment.law.dt), float(gain))
+
+
+def push_lag(observer: Observer, model: ReducedModel, dt: float) -> float | None:
+    """How long an observer takes to see a sudden push, without noise and with the gimbals still.
+
+    From rest at the upright the rig is pushed with 1 N m for 0.1 s and left to itself: in linear terms its rate is
+    a sinh. The lag is the time between the true rate and the estimate passing half of the rate at the push's end. In
+    the loop the law's answer hides this: an observer with a model knows at once what the gimbals do about the push,
+    and of the push nothing, so that its estimate first moves the wrong way.
+
+    Args:
+        observer: The observer.
+        model: The rig's reduced model.
+        dt: The sample period [s].
+
+    Returns:
+        The lag [s]; None if the estimate has not come there after half a second.
+    """
+    pole = math.sqrt(model.gravity_torque / model.J1)
+    acceleration = PUSH_N_M / (model.gimbals * model.J1)
+    t = np.arange(-0.2, 0.5, dt)
+
+    def pushed(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tilt and rate under a torque that began at t = 0."""
+        t = np.maximum(t, 0.0)
+        return acceleration / pole**2 * (np.cosh(pole * t) - 1.0), acceleration / pole * np.sinh(pole * t)
+
+    tilt, rate = (now - later for now, later in zip(pushed(t), pushed(t - PUSH_S), strict=True))
+    state = observer.init(Measurement(float(tilt[0]), 0.0))
+    estimate = [0.0]
+    for y1 in tilt[1:].tolist():
+        state, estimated = observer.step(state, Measurement(y1, 0.0), 0.0)
+        estimate.append(estimated[1])
+    half = 0.5 * acceleration / pole * math.sinh(pole * PUSH_S)
+    true, seen = _first_passing(t, rate, half), _first_passing(t, np.array(estimate), half)
+    return None if true is None or seen is None else seen - true
+
+
+def _first_passing(time_s: np.ndarray, values: np.ndarray, level: float) -> float | None:
+    """When a signal first passes a level on its way from zero [s]; None if it never does."""
+    beyond = np.flatnonzero(values / level >= 1.0)
+    if not len(beyond):
+        return None
+    k = int(beyond[0])
+    if k == 0:
+        return float(time_s[0])
+    share = (level - values[k - 1]) / (values[k] - values[k - 1])
+    return float(time_s[k - 1] + share * (time_s[k] - time_s[k - 1]))
+
+
+def update_us(kind: str, motion: Motion, repeats: int = 7) -> float:
+    """Microseconds of one update on floats, the median of some repeats.
+
+    Args:
+        kind: The observer.
+        motion: What it is given.
+        repeats: How many times half a second of updates is timed.
+
+    Returns:
+        The time [us].
+    """
+    experiment = motion.experiment
+    observer = make_observer(kind, experiment.law.dt, experiment.plant.reduced)
+    short = motion.noisy.between(2.0, 2.5)
+    columns = (short[name][:, 0].tolist() for name in ("y1_rad", "y2_rad", "u_rad_s"))
+    samples = [(Measurement(y1, y2), u) for y1, y2, u in zip(*columns, strict=True)]
+    times = []
+    for _ in range(repeats):
+        state = observer.init(samples[0][0])
+        start = time.perf_counter()
+        for y, u in samples:
+            state, _ = observer.step(state, y, u)
+        times.append((time.perf_counter() - start) / len(samples) * 1e6)
+    return statistics.median(times)

@@ -1,0 +1,77 @@
+"""A claim of a paper beside what this software obtains, and the section of a paper it stands in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from cmg_mj.picture import Picture
+
+Verdict = Literal["reproduced", "reproduced within stated conditions", "not reproduced"]
+
+OnShare = Callable[[float], None]
+"""Called with the share of a section that is done."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """One figure, table, remark, proof or statement. Its verdict follows from what was found.
+
+    Attributes:
+        place: Where in the paper: `Fig. 2`, `Remark 1`, `Section V`.
+        says: What the paper says there, in our words.
+        found: What was obtained, with its figures, in words.
+        holds: Whether what was obtained bears the paper out, computed from the figures.
+        conditions: Under which conditions it holds, a whole sentence; empty if it holds outright.
+        otherwise: What to make of it where it does not hold, a whole sentence.
+        figures: The numbers behind `found`, by names that end in their unit, as JSON can hold them.
+        pictures: Plots.
+        ours: Whether the claim is not the paper's but ours, such as its observer on the rig; `says` is what was asked.
+    """
+
+    place: str
+    says: str
+    found: str
+    holds: bool
+    conditions: str = ""
+    otherwise: str = "The figures above do not bear it out."
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    pictures: Sequence[Picture] = ()
+    ours: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("conditions", "otherwise"):
+            text = getattr(self, name)
+            if text and not (" " in text and text.endswith(".")):
+                raise ValueError(f"{self.place}: {name} = {text!r}: must be a whole sentence, which the report prints")
+        if not self.otherwise:
+            raise ValueError(f"{self.place}: otherwise: say what to make of it where it does not hold")
+        object.__setattr__(self, "holds", bool(self.holds))  # numpy's truth is no JSON
+
+    @property
+    def verdict(self) -> Verdict:
+        """How the paper and what was obtained compare."""
+        if not self.holds:
+            return "not reproduced"
+        return "reproduced within stated conditions" if self.conditions else "reproduced"
+
+    @property
+    def why(self) -> str:
+        """The conditions under which it holds, or why it does not; empty if it holds outright."""
+        return self.conditions if self.holds else self.otherwise
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a paper whose claims are obtained in one go.
+
+    Attributes:
+        title: What the progress bar shows.
+        seconds: About how long it takes, for the progress bar.
+        claims: Obtains them.
+    """
+
+    title: str
+    seconds: float
+    claims: Callable[[OnShare], list[Claim]]

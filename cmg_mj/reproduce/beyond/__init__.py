@@ -1,5 +1,0 @@
-"""A step beyond the papers. Not part of `reproduce all`: a hundred seeds a cell take about half an hour."""
-
-from cmg_mj.reproduce.beyond.claims import STEPS
-
-__all__ = ["STEPS"]

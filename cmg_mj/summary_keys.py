@@ -1,0 +1,50 @@
+"""What the numbers of a summary are called, their units and how many digits of them are worth showing."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+
+class Key(NamedTuple):
+    """One number of a summary.
+
+    Attributes:
+        label: In words.
+        unit: Empty for none.
+        pattern: How it is written.
+    """
+
+    label: str
+    unit: str
+    pattern: str
+
+    @property
+    def heading(self) -> str:
+        """The label with its unit, as axes and columns want it."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+
+KEYS = {
+    "velocity_rms_error_rad_s": Key("velocity RMS error", "rad/s", "{:.4f}"),
+    "velocity_rms_error_fog_rad_s": Key("against the gyro", "rad/s", "{:.4f}"),
+    "tilt_rms_deg": Key("tilt RMS", "deg", "{:.3f}"),
+    "settle_time_s": Key("settle time", "s", "{:.2f}"),
+    "gimbal_peak_deg": Key("gimbal peak", "deg", "{:.1f}"),
+    "command_rms_rad_s": Key("command RMS", "rad/s", "{:.3f}"),
+    "command_saturated_fraction": Key("command limited", "", "{:.1%}"),
+    "bias_estimate_deg": Key("equilibrium bias found", "deg", "{:.4f}"),
+    "bias_rms_error_deg": Key("bias RMS error", "deg", "{:.4f}"),
+    "fell_fraction": Key("fell", "", "{:.0%}"),
+    "stopped_fraction": Key("stopped", "", "{:.0%}"),
+}
+"""Summary key -> what it is. In this order they stand in every table."""
+
+
+def heading(key: str) -> str:
+    """A summary key in words, with its unit."""
+    return KEYS[key].heading
+
+
+def written(key: str, value: Any) -> str:
+    """A summary's number as tables show it; a dash where there is none."""
+    return "-" if value is None else KEYS[key].pattern.format(value)

@@ -1,0 +1,329 @@
+"""andrieu2009 reproduced: the plant against its equations, the claims on other seeds, and that they can fail."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+from cmg_mj.papers.andrieu2009 import (
+    STEPS,
+    bi_limit_theory,
+    bioreactor_bounds,
+    bioreactor_figures,
+    finite_escape,
+    high_gain_rig,
+)
+from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor, dilution
+from cmg_mj.papers.andrieu2009.bioreactor_figures import Study, study
+from cmg_mj.papers.andrieu2009.bioreactor_study import (
+    CONSTANT,
+    HOMOGENEOUS,
+    UPDATED,
+    replay,
+    rms_late,
+    run_plant,
+    window_means,
+)
+from cmg_mj.papers.claim import Claim
+from cmg_mj.picture import Picture
+
+SEEDS, FIRST = 6, 500
+"""Other seeds than the report's."""
+
+
+@pytest.fixture(scope="module")
+def done() -> Study:
+    return study(SEEDS, FIRST)
+
+
+def of_json(claim: Claim) -> Claim:
+    """A claim whose figures JSON can hold and whose words are whole."""
+    json.dumps(dict(claim.figures), allow_nan=False)
+    for text in (claim.says, claim.found, claim.why):
+        assert "{" not in text.replace("{eta1 >=", "")
+        assert "  " not in text
+    return claim
+
+
+# --- the plant ----------------------------------------------------------------------------------------------
+
+
+def test_f2_is_the_derivative_of_x2_along_the_plant() -> None:
+    """(15) from (14) by sympy."""
+    e1, e2, u, h = sp.symbols("eta1 eta2 u hbar", positive=True)
+    growth = e1 * e2 / (h * e1 + e2)
+    derivative = sp.diff(growth, e1) * (growth - u * e1) + sp.diff(growth, e2) * (-growth + u * (1 - e2))
+    m = (u / h, -u - 1 / h - 2 * u / (h * e1), 2 / (h * e1) + u / (h * e1**2), (h - 1) / (h * e1**2))
+    assert sp.simplify(derivative - sum(m_i * growth**i for i, m_i in enumerate(m))) == 0
+    reactor = Bioreactor(0.8)
+    for point in ((0.3, 0.4, 0.2), (0.9, 0.05, 0.6)):
+        expected = float(derivative.subs({e1: point[0], e2: point[1], u: point[2], h: sp.Rational(4, 5)}))
+        assert reactor.f2(point[0], reactor.to_x2(*point[:2]), point[2]) == pytest.approx(expected, rel=1e-12)
+
+
+def test_slope_of_f2_is_its_derivative() -> None:
+    reactor, d = Bioreactor(0.8), 1e-6
+    for x1, x2, u in ((0.3, 0.1, 0.2), (0.02, 0.01, 0.6)):
+        numeric = (reactor.f2(x1, x2 + d, u) - reactor.f2(x1, x2 - d, u)) / (2.0 * d)
+        assert reactor.f2_slope(x1, x2, u) == pytest.approx(numeric, rel=1e-6)
+
+
+def test_domain_is_the_image_of_the_set() -> None:
+    """Random points of M_eta lie between the bounds on x2, its corners on them."""
+    reactor = Bioreactor(0.8)
+    rng = np.random.default_rng(1)
+    eta = (
+        np.array([reactor.eps1, reactor.eps2])
+        + (1.0 - reactor.eps1 - reactor.eps2) * rng.dirichlet((1, 1, 1), 500)[:, :2]
+    )
+    x2 = reactor.to_x2(*eta.T)
+    low, high = reactor.x2_bounds(eta[:, 0])
+    assert (low <= x2 + 1e-15).all()
+    assert (x2 <= high + 1e-15).all()
+    assert reactor.x2_bounds(0.3)[0] == pytest.approx(reactor.to_x2(0.3, reactor.eps2))
+    assert reactor.x2_bounds(0.3)[1] == pytest.approx(reactor.to_x2(0.3, 0.7))
+    assert reactor.limit_x1(np.array([-1.0, 0.5, 2.0])).tolist() == [reactor.eps1, 0.5, 1.0 - reactor.eps2]
+    assert reactor.limit_x2(0.3, -1.0) == reactor.x2_bounds(0.3)[0]
+    assert reactor.limit_x2(0.3, 1.0) == reactor.x2_bounds(0.3)[1]
+
+
+@pytest.mark.parametrize("hbar", [0.1, 0.8, 1.0, 1.3])
+def test_closed_forms_of_the_bounds_are_the_maxima(hbar: float) -> None:
+    """Omega_1 and Omega_2 against their definitions, over a dense grid of x2."""
+    reactor = Bioreactor(hbar)
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        x1 = math.exp(rng.uniform(math.log(reactor.eps1), math.log(1.0 - reactor.eps2)))
+        u, p = rng.uniform(reactor.u_min, reactor.u_max), rng.uniform(0.1, 0.95)
+        low, high = reactor.x2_bounds(x1)
+        hat = rng.uniform(low, high)
+        x2 = np.linspace(low, high, 4001)
+        _, m1, m2, m3 = reactor.coefficients(x1, u)
+        first = np.abs(m1 + (m2 + m3 * hat) * (hat + x2) + m3 * x2**2).max()
+        inner = (m2 + m3 * hat) * (hat ** (1.0 - p) + x2 ** (1.0 - p))
+        second = np.abs(m1 + hat**p * (inner + m3 * x2 ** (2.0 - p))).max()
+        printed = np.abs(m1 + hat**p * (inner + m2 * x2 ** (2.0 - p))).max()
+        assert reactor.Omega1(u, x1, hat) == pytest.approx(first, rel=1e-5)
+        assert reactor.Omega2(u, x1, hat, p) == pytest.approx(second, rel=1e-5)
+        assert reactor.Omega2(u, x1, hat, p, as_printed=True) == pytest.approx(printed, rel=1e-5)
+
+
+def test_input_is_the_papers() -> None:
+    assert [dilution(t) for t in (0.0, 9.99, 10.0, 19.99, 20.0, 34.99, 35.0, 50.0)] == [
+        0.410, 0.410, 0.02, 0.02, 0.6, 0.6, 0.1, 0.1,
+    ]  # fmt: skip
+
+
+def test_plant_comes_to_its_equilibrium_and_stays_in_its_set() -> None:
+    """eta1 + eta2 = 1 and growth = u: eta2 = u hbar/(1 - u + u hbar) = u for hbar = 1."""
+    run = run_plant([1, 2, 3], 0.0)
+    assert run.eta[1, -1] == pytest.approx(0.1, abs=2e-2)
+    before_20 = int(np.searchsorted(run.t, 34.99))
+    assert run.eta[1, before_20] == pytest.approx(0.6, abs=1e-3)
+    reactor = Bioreactor(1.0)
+    assert run.eta[0].min() >= reactor.eps1
+    assert run.eta[1].min() >= reactor.eps2
+    assert run.eta.sum(axis=0).max() <= 1.0 + 1e-12
+    assert np.array_equal(run.y, run.eta[0])
+    assert run_plant([1], 0.05).y[:, 0] != pytest.approx(run.y[:, 0])
+
+
+def test_noise_has_the_papers_standard_deviation() -> None:
+    run = run_plant([4, 5], [0.05, 0.1])
+    assert (run.y - run.eta[0]).std(axis=0) == pytest.approx([0.05, 0.1], rel=0.05)
+
+
+# --- the bounds ---------------------------------------------------------------------------------------------
+
+
+def test_claims_on_the_bounds() -> None:
+    parts = ("invariance", "coordinates", "increments", "order_of_bounds", "noise_level")
+    claims = [of_json(getattr(bioreactor_bounds, part)()) for part in parts]
+    within = "reproduced within stated conditions"
+    assert [claim.verdict for claim in claims] == ["reproduced", "reproduced", within, within, "not reproduced"]
+
+
+def test_the_set_is_not_invariant_for_inputs_beyond_its_own() -> None:
+    reactor = Bioreactor(1.0)
+    assert bioreactor_bounds.least_inflow(reactor, reactor.u_min, reactor.u_max) > -1e-12
+    assert bioreactor_bounds.least_inflow(reactor, 0.9 * reactor.u_min, reactor.u_max) < -1e-4
+    assert bioreactor_bounds.least_inflow(reactor, reactor.u_min, 1.05 * reactor.u_max) < -1e-4
+
+
+@pytest.mark.parametrize("p", [0.5, 0.9])
+@pytest.mark.parametrize("hbar", [0.8, 1.0])
+def test_both_inequalities_hold_and_the_misprint_shows(hbar: float, p: float) -> None:
+    found = bioreactor_bounds.increments_over_domain(hbar, p, 24)
+    assert max(found.by_Omega1, found.by_Omega2, found.by_Omega2_local) <= 1.0 + 1e-9
+    assert found.slope_over_Omega2 <= 1.0 + 1e-9
+    assert found.slope_over_Omega2_printed > 1.01
+    assert found.by_Omega2_printed <= 1.0  # c_inf is so large that the misprint does no harm there
+
+
+def test_the_largest_slope_is_at_a_corner_of_the_domain() -> None:
+    reactor = Bioreactor(0.8)
+    low, _ = reactor.x2_bounds(reactor.eps1)
+    assert reactor.df2_max == pytest.approx(abs(reactor.f2_slope(reactor.eps1, low, 0.7)))
+    assert reactor.df2_max == pytest.approx(121.07, abs=0.01)
+
+
+# --- the figures --------------------------------------------------------------------------------------------
+
+
+def test_rates_are_in_order_in_every_window(done: Study) -> None:
+    means, holds = bioreactor_figures.ordered_rates(done)
+    assert holds.tolist() == [True] * 4
+    # An independent implementation's figures. In the first window the start has not quite faded.
+    assert means[1, 1:] == pytest.approx([1.25, 2.93, 1.35], rel=0.03)
+    assert means[2, 1:] == pytest.approx([1.23, 1.04, 1.18], rel=0.03)
+    assert means[3, 1:] == pytest.approx([-1.22, -0.63, -1.11], abs=0.03)
+
+
+def test_errors_are_in_order_in_every_seed(done: Study) -> None:
+    for replays in (done.found, done.loud):
+        rms = bioreactor_figures.rms_by_kind(done.run, replays)
+        assert bioreactor_figures.share_in_order(rms) >= 0.95
+    assert bioreactor_figures.rms_by_kind(done.run, done.found).mean(axis=1) == pytest.approx(
+        [0.255, 0.071, 0.056], rel=0.08
+    )
+
+
+def test_claims_on_the_figures(done: Study) -> None:
+    within = "reproduced within stated conditions"
+    claims = {
+        bioreactor_figures.figure_1: ("reproduced",),
+        bioreactor_figures.figure_2: (within,),
+        bioreactor_figures.bias: (within,),
+        bioreactor_figures.spread: ("reproduced", within),
+        bioreactor_figures.simple_copy: ("reproduced",),
+    }
+    for make, expected in claims.items():
+        assert of_json(make(done)).verdict in expected
+
+
+def test_claims_can_fail(done: Study) -> None:
+    """The observers' names exchanged."""
+    swapped = {CONSTANT: done.found[UPDATED], UPDATED: done.found[CONSTANT], HOMOGENEOUS: done.found[HOMOGENEOUS]}
+    other = done._replace(found=swapped)
+    for make in (bioreactor_figures.figure_1, bioreactor_figures.figure_2, bioreactor_figures.bias):
+        claim = make(other)
+        assert claim.verdict == "not reproduced"
+        assert claim.why
+
+
+def test_gain_follows_its_rate(done: Study) -> None:
+    """L is phi2 + (phi3/phi1) Omega = 1 + 100 Omega in the mean."""
+    for kind in (UPDATED, HOMOGENEOUS):
+        L, rate = (
+            window_means(done.run, values).mean(axis=1) for values in (done.found[kind].L, done.found[kind].rate)
+        )
+        assert L / (1.0 + 100.0 * rate) == pytest.approx(1.0, abs=0.03)
+    constant = 1.0 + 100.0 * Bioreactor(0.8).df2_max
+    assert np.ptp(done.found[CONSTANT].L) == 0.0
+    assert done.found[CONSTANT].L[0, 0] / constant == pytest.approx(1.0)
+    assert min(replayed.L.min() for replayed in done.found.values()) >= 1.0
+
+
+def test_the_homogeneous_terms_are_inert(done: Study) -> None:
+    claim = of_json(bioreactor_figures.correction(done.run, done.found[HOMOGENEOUS]))
+    assert claim.verdict == "not reproduced"
+    assert claim.figures["largest_argument"] < 1e-3
+    assert claim.figures["largest_difference_eta2"] < 1e-4
+    assert claim.figures["rms_error_eta2_linear_correction"] == pytest.approx(claim.figures["rms_error_eta2"], rel=1e-3)
+
+
+def test_the_result_does_not_hang_on_the_step() -> None:
+    """The same noise, interpolated, at half the step."""
+    model = Bioreactor(0.8)
+    for kind, tolerance in ((UPDATED, 0.02), (HOMOGENEOUS, 0.02)):
+        coarse, fine = (run_plant([7, 8], dt=dt) for dt in (0.01, 0.005))
+        rms = [rms_late(run, replay(kind, run, model).eta2_error) for run in (coarse, fine)]
+        assert rms[0] == pytest.approx(rms[1], rel=tolerance)
+
+
+# --- the theory ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("p", "holds"), [(0.2, True), (0.8, True), (1.2, False), (3.0, False)])
+def test_increments_of_system_1(p: float, holds: bool) -> None:
+    assert (bi_limit_theory.largest_increment(p) <= 1.0 + 1e-9) is holds
+
+
+def test_claims_of_the_theory() -> None:
+    within = "reproduced within stated conditions"
+    expected = {
+        bi_limit_theory.increments: "reproduced",
+        finite_escape.no_observer_beyond_1: within,
+        bi_limit_theory.scaling_conditions: "not reproduced",
+        bi_limit_theory.gain_tracking: "reproduced",
+        bi_limit_theory.chain_of_integrators: within,
+        bi_limit_theory.theorem_1: within,
+    }
+    for make, verdict in expected.items():
+        assert of_json(make()).verdict == verdict
+
+
+def test_a_poor_correction_is_seen() -> None:
+    poor = bi_limit_theory.BiLimitCorrection((1.0, 2.0, 0.9), 0.2)
+    assert bi_limit_theory.chain_errors(poor, (1.0,), 2, 20.0) > 3.0
+
+
+@pytest.mark.parametrize("p", [0.5, 1.5, 2.0])
+def test_escaping_solution_solves_1(p: float) -> None:
+    """x1' = x2 and x2' = x2^(1+p) by scipy, up to nine tenths of its time."""
+    end = 3.0**-p / p
+    assert finite_escape.escape(p, 3.0).end_time == pytest.approx(end)
+    x = solve_ivp(lambda t, x: [x[1], x[1] ** (1.0 + p)], (0.0, 0.9 * end), [0.0, 3.0], rtol=1e-10, atol=1e-12).y[:, -1]
+    assert [float(v) for v in finite_escape.solution(p, 3.0, 0.1)] == pytest.approx(x.tolist(), rel=1e-7)
+
+
+def test_escape_is_found_below_1_and_missed_beyond() -> None:
+    """Other starts, powers and tolerances than the report's; the solution whose start is known is not missed."""
+    for start in (3.0, 300.0):
+        assert finite_escape.escape(0.4, start, tolerance=1e-8).error[-1] < finite_escape.FOUND
+        assert finite_escape.escape(2.0, 10.0 * start, tolerance=1e-8).error[-1] > finite_escape.MISSED
+    assert finite_escape.escape(1.5, 30.0, 30.0, 1e-9).error.max() < 1e-4
+    assert finite_escape.escape(1.5, 3000.0).moved == pytest.approx(3000.0**-0.5 / 0.5)
+    assert math.isinf(finite_escape.escape(0.5, 3.0).moved)
+
+
+# --- the rig ------------------------------------------------------------------------------------------------
+
+
+def test_on_the_rig() -> None:
+    """Three worlds of `high_gain` in the loop: it stands, and its gain does not move."""
+    loop = high_gain_rig.in_the_loop("high_gain", 3, 90_000)
+    assert np.isfinite(loop.errors).all()
+    assert 0.05 < loop.errors.mean() < 0.085
+    claim = of_json(high_gain_rig.idle(loop))
+    assert claim.verdict == "reproduced"
+    assert 1e-4 < claim.figures["largest_Omega_1_s"] < 0.015
+
+
+def test_a_fall_on_the_rig_is_not_hidden() -> None:
+    errors = np.array([0.06, 0.061, 0.059, math.nan])
+    loop = high_gain_rig.Loop(errors, errors, np.zeros((2, 4)))
+    found = dict.fromkeys(high_gain_rig.KINDS, loop._replace(errors=np.array([0.07, 0.071, 0.072, 0.073])))
+    claim = of_json(high_gain_rig.compared(found | {"high_gain": loop}))
+    assert claim.verdict == "not reproduced"
+    assert "3 of 4" in claim.found
+
+
+def test_steps_and_pictures_have_names(done: Study) -> None:
+    assert sum(step.seconds for step in STEPS) <= 30.0
+    pictures: list[Picture] = [
+        *bioreactor_figures.figure_1(done).pictures,
+        *bioreactor_figures.figure_2(done).pictures,
+    ]
+    assert [picture.name for picture in pictures] == ["andrieu2009-fig-1", "andrieu2009-fig-2"]
+    for i, picture in enumerate(pictures, start=1):
+        assert f"Fig. {i}" in picture.title
+        assert all("[" in panel.y_label and "[" in panel.x_label for panel in picture.panels)
+        assert all(any(line.label for line in panel.lines) for panel in picture.panels)
+    assert dataclasses.is_dataclass(pictures[0])

@@ -1,0 +1,361 @@
+"""The general adaptive disturbance observer against dao2023 (7) to (9), and what they imply."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from cmg_mj.errors import InputError
+from cmg_mj.papers.dao2023 import pendulum_robot as robot
+from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, State, System
+
+N, NM, R, M, P = 3, 4, 2, 2, 2
+"""n, nm, r, m, p of the random plants."""
+
+AM = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, -0.3, 0.0, 0.0], [0.0, 0.0, 0.0, -4.0], [0.0, 0.0, 4.0, 0.0]])
+CM = np.array([[1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.5, 1.0]])
+
+
+def random_matrix(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    return rng.normal(0.0, 1.0, shape)
+
+
+def definite(rng: np.random.Generator, size: int, scale: float = 1.0) -> np.ndarray:
+    root = random_matrix(rng, size, size)
+    return scale * (root @ root.T + 0.1 * np.eye(size))
+
+
+def plant(rng: np.random.Generator) -> tuple[Callable[[float], System], np.ndarray]:
+    """A smooth time-varying plant with constant C2 and D20, and a gain that keeps A + L C2 well damped."""
+    C2, D20, B2 = random_matrix(rng, P, N), random_matrix(rng, P, R), random_matrix(rng, N, M)
+    L = -C2.T
+    A = -2.0 * np.eye(N) + 0.5 * random_matrix(rng, N, N)
+    B0, swing = random_matrix(rng, N, R), random_matrix(rng, N, R)
+    turn = 0.3 * random_matrix(rng, N, N)
+
+    def at(t: float) -> System:
+        return System(A + np.sin(2.0 * t) * turn, B0 + np.cos(3.0 * t) * swing, B2, C2, D20)
+
+    return at, L
+
+
+def build(rng: np.random.Generator, L: np.ndarray, dt: float, sigma: float = 1.0) -> FriedlandTacker:
+    return FriedlandTacker(dt, AM, CM, L, definite(rng, NM), definite(rng, P, sigma))
+
+
+# --- the identity that no chaos can blur ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sigma", [0.1, 1.0, 1e3, 1e6])
+@pytest.mark.parametrize("seed", range(3))
+def test_discrete_identity_whatever_the_weights(seed: int, sigma: float) -> None:
+    """z = (x^ - x) - T (xm^ - xm) goes its own way, z+ = (I - h/2 M)^-1 (I + h/2 M) z: no Gamma, no Sigma in it."""
+    rng = np.random.default_rng(seed)
+    at, L = plant(rng)
+    h = 0.02
+    observer = build(rng, L, h, sigma)
+    F = expm(AM * h)
+    x, xm = random_matrix(rng, N), random_matrix(rng, NM)
+    here = at(0.0)
+    y = here.C2 @ x + here.D20 @ CM @ xm
+    state = observer.init(y, x=random_matrix(rng, N), xm=random_matrix(rng, NM), T=random_matrix(rng, N, NM))
+    z = (state.x - x) - state.T @ (state.xm - xm)
+    worst = 0.0
+    for k in range(300):
+        here, u = at((k + 0.5) * h), random_matrix(rng, M)
+        # The plant by the implicit midpoint rule, its exosystem's mean over the step driving it.
+        driven = here.B0 @ CM @ (xm + F @ xm) / 2.0 + here.B2 @ u
+        x = np.linalg.solve(np.eye(N) - h / 2.0 * here.A, x + h / 2.0 * here.A @ x + h * driven)
+        xm = F @ xm
+        y = here.C2 @ x + here.D20 @ CM @ xm
+        state = observer.step(state, here, u, y)
+        closed = h / 2.0 * (here.A + L @ here.C2)
+        z = np.linalg.solve(np.eye(N) - closed, z + closed @ z)
+        worst = max(worst, np.abs((state.x - x) - state.T @ (state.xm - xm) - z).max())
+    print(f"sigma {sigma:g}: identity held to {worst:.1e}")
+    assert worst < 1e-8
+
+
+@pytest.mark.parametrize(("sigma", "duration"), [(0.1, 8.0), (10.0, 8.0), (1000.0, 1.5)])  # (9) is stiff in Sigma
+def test_continuous_identity_along_the_chaotic_robot(sigma: float, duration: float) -> None:
+    """(7) to (9) with the robot itself, integrated as one: z(t) = exp((A + L C2) t) z(0)."""
+    worst, size = robot.identity_error(sigma, duration, seed=5)
+    print(f"Sigma {sigma:g}: identity held to {worst:.1e}, z up to {size:.2g}")
+    assert size > 0.1
+    assert worst < 1e-8
+
+
+# --- against the continuous observer -------------------------------------------------------------------
+
+
+def measured(t: float) -> np.ndarray:
+    """A smooth measurement and, whatever the plant, a fair input to an observer."""
+    return np.array([np.sin(2.0 * t + 0.3), np.cos(1.3 * t)])
+
+
+def test_converges_to_the_continuous_observer() -> None:
+    """T with the square of the period; the estimates, whose correction is implicit, with the period."""
+    rng = np.random.default_rng(5)
+    at, L = plant(rng)
+    coarse = build(rng, L, 0.02)
+    duration, u = 2.0, np.array([0.3, -0.2])
+
+    def slope(t: float, s: np.ndarray) -> np.ndarray:
+        parts = coarse.slope(t, s[:N], s[N : N + NM], s[N + NM :].reshape(N, NM), at(t), u, measured(t))
+        return np.concatenate([part.ravel() for part in parts])
+
+    reference = solve_ivp(slope, (0.0, duration), np.zeros(N + NM + N * NM), "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    errors = []
+    for n in (200, 400, 800, 1600):
+        h = duration / n
+        observer = FriedlandTacker(h, AM, CM, L, coarse.Gamma, coarse.Sigma)
+        state = observer.init(measured(0.0))
+        for k in range(n):
+            state = observer.step(state, at((k + 0.5) * h), u, measured((k + 1) * h))
+        found = (state.x, state.xm, state.T.ravel())
+        wanted = np.split(reference, [N, N + NM])
+        errors.append([np.abs(a - b).max() for a, b in zip(found, wanted, strict=True)])
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    print(f"orders of x, xm, T: {np.round(orders, 2).tolist()}; errors at {n} steps {errors[-1]}")
+    np.testing.assert_allclose(orders[-1], [1.0, 1.0, 2.0], atol=0.1)
+
+
+def test_gamma_turns_with_the_exosystem() -> None:
+    rng = np.random.default_rng(2)
+    at, L = plant(rng)
+    observer = build(rng, L, 0.02)
+    state = observer.init(np.zeros(P))
+    for k in range(50):
+        state = observer.step(state, at(0.02 * k), np.zeros(M), np.zeros(P))
+    turn = expm(AM * 1.0)
+    np.testing.assert_allclose(state.P, turn @ observer.Gamma @ turn.T, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("sigma", [10.0, 1000.0, 1e6])
+def test_stable_at_200_hz(sigma: float) -> None:
+    """At Sigma = 1000 a Runge-Kutta step of (7) to (9) at the same rate is far outside its stability region."""
+    t = np.arange(20_001) * 0.005
+    x = robot.motion(np.array([[0.5, 0.0], [-2.0, 1.0]]), t)
+    errors = robot.follow(robot.proposed(0.005, [sigma]), t, x)
+    assert np.isfinite(errors.state).all()
+    tail = np.sqrt(np.mean(errors.state[16_000:] ** 2, axis=(0, 1, 3)))
+    print(f"Sigma {sigma:g} at 200 Hz: state error RMS over 80-100 s {tail}")
+    assert tail.max() < {10.0: 0.3, 1000.0: 0.03, 1e6: 5.0}[sigma]  # so large a gain slows the learning
+    if sigma == 1000.0:
+        assert robot.explicit_escape(sigma, 0.005, 10.0) < 10.0
+
+
+# --- the conventional observer, and what the proposed one has to do with it ----------------------------
+
+
+def test_conventional_is_zhangs_observer() -> None:
+    """Zhang 2002, Liu, Zhang, Su 2011: K = -L, theta' = Gamma (C Upsilon + D)^T Sigma (y - C x - D theta)."""
+    rng = np.random.default_rng(3)
+    at, L = plant(rng)
+    here, K = at(0.7), -L
+    Gamma, Sigma = definite(rng, R), definite(rng, P)
+    observer = FriedlandTacker.conventional(0.01, L, Gamma, Sigma)
+    x, theta, Upsilon = random_matrix(rng, N), random_matrix(rng, R), random_matrix(rng, N, R)
+    u, y = random_matrix(rng, M), random_matrix(rng, P)
+    found = observer.slope(1.3, x, theta, Upsilon, here, u, y)
+
+    innovation = y - here.C2 @ x - here.D20 @ theta
+    dUpsilon = (here.A - K @ here.C2) @ Upsilon + here.B0 - K @ here.D20
+    dtheta = Gamma @ (here.C2 @ Upsilon + here.D20).T @ Sigma @ innovation
+    dx = here.A @ x + here.B0 @ theta + here.B2 @ u + K @ innovation + Upsilon @ dtheta
+    for a, b in zip(found, (dx, dtheta, dUpsilon), strict=True):
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-12)
+
+
+def test_proposed_is_the_conventional_one_of_the_exosystems_start() -> None:
+    """Upsilon = T exp(Am t), if Upsilon's equation has (B0 + L D20) Cm exp(Am t); then xm^ = exp(Am t) theta^."""
+    rng = np.random.default_rng(4)
+    at, L = plant(rng)
+    h = 0.02
+    proposed = build(rng, L, h, 100.0)
+    plain = FriedlandTacker.conventional(h, L, proposed.Gamma, proposed.Sigma)
+    a, b = proposed.init(measured(0.0)), plain.init(measured(0.0))
+    mean = (expm(AM * h) + np.eye(NM)) / 2.0
+    for k in range(200):
+        here, u, y = at((k + 0.5) * h), random_matrix(rng, M), measured((k + 1) * h)
+        turn = CM @ mean @ expm(AM * k * h)
+        turned = System(here.A, here.B0 @ turn, here.B2, here.C2, here.D20 @ turn)
+        a = proposed.step(a, here, u, y)
+        b = plain.step(b, turned, u, y, D20=here.D20 @ CM @ expm(AM * (k + 1) * h))
+        whole = expm(AM * (k + 1) * h)
+        np.testing.assert_allclose(a.T @ whole, b.T, rtol=0.0, atol=1e-10)
+        np.testing.assert_allclose(a.xm, whole @ b.xm, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(a.x, b.x, rtol=0.0, atol=1e-9)
+
+
+# --- many at once --------------------------------------------------------------------------------------
+
+
+def test_leading_dimensions_are_observers_side_by_side() -> None:
+    rng = np.random.default_rng(6)
+    at, L = plant(rng)
+    Sigma = np.stack([definite(rng, P, scale) for scale in (0.1, 10.0)])[:, None]
+    gains = np.stack([L, 1.5 * L, 2.0 * L])
+    Gamma = definite(rng, NM)
+    many = FriedlandTacker(0.02, AM, CM, gains, Gamma, Sigma)
+    starts = random_matrix(rng, 3, N)
+    inputs, outputs = random_matrix(rng, 40, 2, 3, M), random_matrix(rng, 41, 2, 3, P)
+    state = many.init(outputs[0], x=starts)
+    for k in range(40):
+        state = many.step(state, at(0.02 * k), inputs[k], outputs[k + 1])
+    for i in range(2):
+        for j in range(3):
+            one = FriedlandTacker(0.02, AM, CM, gains[j], Gamma, Sigma[i, 0])
+            alone = one.init(outputs[0, i, j], x=starts[j])
+            for k in range(40):
+                alone = one.step(alone, at(0.02 * k), inputs[k, i, j], outputs[k + 1, i, j])
+            np.testing.assert_allclose(state.x[i, j], alone.x, rtol=0.0, atol=1e-11)
+            np.testing.assert_allclose(state.xm[i, j], alone.xm, rtol=0.0, atol=1e-11)
+
+
+def test_what_varies_with_time_may_be_given_at_its_time() -> None:
+    """C2 and D20 of the sample itself, and another L, are used; without them the middle's and the construction's."""
+    rng = np.random.default_rng(7)
+    at, L = plant(rng)
+    observer = build(rng, L, 0.02)
+    before = observer.init(np.ones(P), x=np.ones(N), T=random_matrix(rng, N, NM))
+
+    def step(**given: Any) -> State:
+        return observer.step(before, at(0.0), np.zeros(M), np.zeros(P), **given)
+
+    here = at(0.0)
+    same = step(L=L, C2=here.C2, D20=here.D20)
+    assert all(np.array_equal(a, b) for a, b in zip(step(), same, strict=True))
+    for given in ({"L": 2.0 * L}, {"C2": 1.1 * here.C2}, {"D20": 1.1 * here.D20}):
+        assert np.abs(step(**given).x - same.x).max() > 1e-4
+    assert np.array_equal(step(C2=1.1 * here.C2).T, same.T)  # the sample's own matrices only correct
+
+
+# --- what does not fit ---------------------------------------------------------------------------------
+
+RIGHT: dict[str, Any] = {
+    "dt": 0.01,
+    "Am": np.zeros((4, 4)),
+    "Cm": np.ones((2, 4)),
+    "L": -np.ones((3, 2)),
+    "Gamma": np.eye(4),
+    "Sigma": np.eye(2),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("dt", 0.0, r"^dt = 0\.0: must be a number greater than 0$"),
+        ("dt", float("nan"), r"^dt = nan"),
+        ("dt", "a", r"^dt = 'a': must be a number greater than 0$"),
+        ("Am", 1j * np.eye(4), r"^Am = .*: must be real numbers, not complex128$"),
+        ("Am", [[1.0, 2.0], [3.0]], r"^Am: must be an array of real numbers, with rows of one length$"),
+        ("Cm", "C", r"^Cm = 'C': must be real numbers"),
+        ("Gamma", 2.0, r"^Gamma: must be a matrix of finite numbers, not a scalar; for one number write \[\[2\]\]$"),
+        ("Am", np.zeros((4, 3)), r"^Am: must have the shape \(3, 3\), square; it has \(4, 3\)$"),
+        ("Am", np.zeros((2, 4, 4)), r"^Am, Cm: .*without leading dimensions$"),
+        ("Cm", np.ones((2, 3)), r"^Cm: must have the shape \(2, 4\).*it has \(2, 3\)$"),
+        ("L", np.ones(3), r"^L: must be a matrix"),
+        ("L", np.full((3, 2), np.nan), r"^L: must be a matrix of finite numbers"),
+        ("Gamma", np.eye(3), r"^Gamma: must have the shape \(4, 4\), \(nm, nm\), as Am; it has \(3, 3\)$"),
+        ("Gamma", np.diag([1.0, 1.0, 1.0, 0.0]), r"^Gamma: must be symmetric and positive .*eigenvalue is 0$"),
+        ("Gamma", np.eye(4) + np.eye(4, k=1), r"^Gamma: must be symmetric and positive definite; it is not symmetric$"),
+        ("Sigma", np.eye(3), r"^Sigma: must have the shape \(2, 2\)"),
+        ("Sigma", np.array([[1.0, 2.0], [2.0, 1.0]]), r"^Sigma: .*its least eigenvalue is -1$"),
+        ("Sigma", np.array([[[1.0, 0.0], [0.0, 1.0]], [[1.0, 0.0], [0.0, -1.0]]]), r"^Sigma: .*eigenvalue is -1$"),
+    ],
+)
+def test_what_does_not_fit_is_refused_at_construction(name: str, value: Any, message: str) -> None:
+    FriedlandTacker(**RIGHT)
+    with pytest.raises(InputError, match=message) as caught:
+        FriedlandTacker(**(RIGHT | {name: value}))
+    assert "\n" not in str(caught.value)
+
+
+def test_conventional_refuses_a_scalar_weight() -> None:
+    with pytest.raises(InputError, match=r"^Gamma: must be a matrix of finite numbers, not a scalar"):
+        FriedlandTacker.conventional(0.01, -np.ones((2, 1)), 2.0, np.eye(1))  # type: ignore[arg-type]
+
+
+def test_lists_are_taken() -> None:
+    """At the construction, in the plant's matrices and at a step alike."""
+    lists = FriedlandTacker(**{name: np.asarray(value).tolist() for name, value in RIGHT.items()})
+    given = {name: value.tolist() for name, value in (STEP | {"y": np.array([0.3, -1.0]), "A": -np.eye(3)}).items()}
+    system = System(*(given[name] for name in ("A", "B0", "B2", "C2", "D20")))
+    found = lists.step(lists.init([0.1, 0.2]), system, given["u"], given["y"])  # type: ignore[arg-type]
+    arrays = FriedlandTacker(**RIGHT)
+    expected = arrays.step(arrays.init(np.array([0.1, 0.2])), system, np.zeros(1), np.array([0.3, -1.0]))
+    assert all(np.array_equal(a, b) for a, b in zip(found, expected, strict=True))
+    with pytest.raises(InputError, match=r"^A = 'no': must be real numbers"):
+        System("no", *(given[name] for name in ("B0", "B2", "C2", "D20")))  # type: ignore[arg-type]
+
+
+def test_a_gain_that_is_not_hurwitz_is_refused_on_demand() -> None:
+    """The pendulum robot's A + L C2 has s^2 + s + 1; with the sign of L turned, s^2 - s - 1."""
+    here = robot.system(0.0, 0.0)
+    robot.proposed(0.005).require_hurwitz(here)
+    wrong = FriedlandTacker(0.005, robot.A_M, robot.C_M, -robot.L, robot.GAMMA, np.eye(1))
+    with pytest.raises(InputError, match=r"^L: A \+ L C2 must be Hurwitz; it has the eigenvalue 1\.62"):
+        wrong.require_hurwitz(here)
+    undamped = FriedlandTacker(0.005, robot.A_M, robot.C_M, [[0.0], [-1.0]], robot.GAMMA, np.eye(1))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^L: A \+ L C2 must be Hurwitz"):
+        undamped.require_hurwitz(here)
+    with pytest.raises(InputError, match=r"^A: must have the shape \(3, 3\)"):
+        FriedlandTacker(**RIGHT).require_hurwitz(here)
+
+
+STEP: dict[str, np.ndarray] = {
+    "A": np.zeros((3, 3)),
+    "B0": np.zeros((3, 2)),
+    "B2": np.zeros((3, 1)),
+    "C2": np.zeros((2, 3)),
+    "D20": np.zeros((2, 2)),
+    "u": np.zeros(1),
+    "y": np.zeros(2),
+}
+
+
+def step_with(**changed: np.ndarray) -> State:
+    given = STEP | changed
+    observer = FriedlandTacker(**RIGHT)
+    system = System(*(given[name] for name in ("A", "B0", "B2", "C2", "D20")))
+    return observer.step(observer.init(np.zeros(2)), system, given["u"], given["y"])
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "needed"),
+    [
+        ("A", (2, 2), r"\(3, 3\), \(n, n\), n the rows of L"),
+        ("B0", (3, 4), r"\(3, 2\)"),
+        ("B2", (2, 1), r"\(3, 1\)"),
+        ("B2", (3,), r"\(3, 0\)"),
+        ("C2", (1, 3), r"\(2, 3\)"),
+        ("D20", (2, 4), r"\(2, 2\)"),
+        ("u", (2,), r"\(1,\)"),
+        ("y", (1,), r"\(2,\)"),
+    ],
+)
+def test_what_does_not_fit_is_refused_at_a_step(name: str, shape: tuple[int, ...], needed: str) -> None:
+    step_with()
+    with pytest.raises(ValueError, match=rf"^{name}: must have the shape {needed}"):
+        step_with(**{name: np.zeros(shape)})
+
+
+@pytest.mark.parametrize(("name", "shape"), [("x", (2,)), ("xm", (3,)), ("T", (3, 3)), ("y", (3,))])
+def test_what_does_not_fit_is_refused_at_the_start(name: str, shape: tuple[int, ...]) -> None:
+    given: dict[str, Any] = {"y": np.zeros(2)} | {name: np.zeros(shape)}
+    with pytest.raises(ValueError, match=rf"^{name}: must have the shape"):
+        FriedlandTacker(**RIGHT).init(**given)
+
+
+def test_the_papers_row_does_not_fit() -> None:
+    """dao2023 prints L = -[1 1]; with one output, L has one column."""
+    observer = FriedlandTacker(0.01, robot.A_M, robot.C_M, -np.ones((1, 2)), robot.GAMMA, np.eye(2))
+    with pytest.raises(ValueError, match=r"^A: must have the shape \(1, 1\), \(n, n\), n the rows of L"):
+        observer.step(observer.init(np.zeros(2)), robot.system(0.0, 0.0), np.zeros(1), np.zeros(1))
