@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cmg_mj.callback import control, installed
-    from cmg_mj.controller import Controller, Law, lqr_gains
+    from cmg_mj.controller import Controller
     from cmg_mj.errors import InputError, RunStopped
+    from cmg_mj.experiment import Experiment, prepare
+    from cmg_mj.law import Law, lqr_gains
     from cmg_mj.observers import OBSERVERS, Estimate, Measurement, Observer, make_observer
-    from cmg_mj.plant import Plant, PlantSettings, load_plant
+    from cmg_mj.plant import Plant, load_plant
+    from cmg_mj.plant_settings import PlantSettings
     from cmg_mj.push import Push
     from cmg_mj.reduced import ReducedModel
-    from cmg_mj.scenario import Experiment, load_scenario, parse_scenario, prepare
+    from cmg_mj.scenario import load_scenario, parse_scenario
     from cmg_mj.schema import Scenario
     from cmg_mj.sensors import Accelerometer, Encoder, Fog, Sensors
     from cmg_mj.simulate import Outcome, Result
@@ -26,13 +29,16 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "callback": ("control", "installed"),
-    "controller": ("Controller", "Law", "lqr_gains"),
+    "controller": ("Controller",),
     "errors": ("InputError", "RunStopped"),
     "observers": ("OBSERVERS", "Estimate", "Measurement", "Observer", "make_observer"),
-    "plant": ("Plant", "PlantSettings", "load_plant"),
+    "plant": ("Plant", "load_plant"),
+    "plant_settings": ("PlantSettings",),
     "push": ("Push",),
     "reduced": ("ReducedModel",),
-    "scenario": ("Experiment", "load_scenario", "parse_scenario", "prepare"),
+    "experiment": ("Experiment", "prepare"),
+    "law": ("Law", "lqr_gains"),
+    "scenario": ("load_scenario", "parse_scenario"),
     "schema": ("Scenario",),
     "sensors": ("Accelerometer", "Encoder", "Fog", "Sensors"),
     "simulate": ("Outcome", "Result"),

@@ -13,7 +13,8 @@ from mujoco.batch import Batch
 from rich import box
 from rich.table import Table
 
-from cmg_mj.scenario import Experiment, parse_scenario, prepare
+from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.scenario import parse_scenario
 from cmg_mj.schema import Scenario
 
 CONTROL_RATES_HZ = (200.0, 1000.0)

@@ -1,89 +1,23 @@
-"""The law, and the controller: sensors -> tilt -> observer -> law -> gimbal rate."""
+"""The controller: sensors -> tilt -> observer -> law -> gimbal rate."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, NoReturn
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar, clip, where
+from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.law import Law
 from cmg_mj.observers.protocol import BIAS, Estimate, Measurement, Observer, extra_signals
-from cmg_mj.reduced import ReducedModel
 from cmg_mj.sensors import Ideal, SampledSensor, Sensors, normals
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.timing import whole_steps
 
-TABLE_2_GAINS = (35.0, 4.0, -1.0, 0.3)
-"""K_e of aranovskiy2020 Table 2, on [x1, x2, x3, x_e]."""
-
 Feedback = Literal["observer", "fog", "truth"]
 Angles = Literal["measured", "estimated"]
-
-
-def lqr_gains(model: ReducedModel, state_cost: Sequence[float], input_cost: float) -> tuple[float, ...]:
-    """Solve for the gains of (8) with python-control.
-
-    Args:
-        model: The reduced model.
-        state_cost: Weights of x1, x2, x3, x_e, (4,), not negative.
-        input_cost: Weight of u, positive.
-
-    Returns:
-        K_e, (4,).
-
-    Raises:
-        InputError: The weights do not make a stabilising gain.
-    """
-    import control  # 1.5 s of import, needed only here
-
-    try:
-        K, _, poles = control.lqr(model.A_e, model.B_e, np.diag(state_cost), np.array([[input_cost]]))
-    except Exception as error:
-        raise InputError(f"controller.lqr: no stabilising gain for these weights ({error})") from error
-    if not np.all(np.isfinite(K)) or np.max(np.real(poles)) >= 0.0:
-        raise InputError("controller.lqr: no stabilising gain for these weights (give x_e a positive weight)")
-    return tuple(float(k) for k in np.ravel(K))
-
-
-@dataclass(frozen=True)
-class Law:
-    """u = -K_e [y1, x2, y2, x_e], x_e' = -x3 (aranovskiy2020 (8)), with the rate limit and anti-windup.
-
-    While the command is limited, the integrator takes no step that would push it further into the limit.
-
-    Attributes:
-        dt: Control period [s].
-        gains: K_e, (4,).
-        rate_limit: Largest gimbal rate [rad/s].
-    """
-
-    dt: float
-    gains: tuple[float, float, float, float] = TABLE_2_GAINS
-    rate_limit: float = 4.7
-
-    def __call__(self, x1: Scalar, x2: Scalar, x3: Scalar, x_e: Scalar) -> tuple[Scalar, Scalar]:
-        """Command and the next integrator state.
-
-        Args:
-            x1: Tilt [rad].
-            x2: Tilt rate [rad/s].
-            x3: Gimbal angle [rad].
-            x_e: Integrator [rad s].
-
-        Returns:
-            The gimbal rate u [rad/s] to hold for a period, and x_e at the next tick.
-        """
-        k1, k2, k3, k4 = self.gains
-        limit = self.rate_limit
-        demanded = -(k1 * x1 + k2 * x2 + k3 * x3 + k4 * x_e)
-        u = clip(demanded, -limit, limit)
-        # The integrator moves the demand at the rate k4 x3.
-        winding = (u != demanded) & (k4 * x3 * demanded > 0.0)
-        return u, where(winding, x_e, x_e - self.dt * x3)
 
 
 class Tick(NamedTuple):

@@ -7,61 +7,28 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass as plain_dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import mujoco
 import numpy as np
-from pydantic import ConfigDict, Field, ValidationError
-from pydantic.dataclasses import dataclass
+from pydantic import ValidationError
 
-from cmg_mj.controller import Angles, Controller, Feedback, Law
+from cmg_mj.complaint import complaint
+from cmg_mj.controller import Angles, Controller, Feedback
 from cmg_mj.elementwise import Scalar
 from cmg_mj.engine import control_callback, quiet
-from cmg_mj.errors import InputError, complaint
+from cmg_mj.errors import InputError
+from cmg_mj.law import Law
 from cmg_mj.mjcf import KEYFRAME, compile_model, lock_thrust_bearing, parse
 from cmg_mj.observers import Observer, make_observer
+from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
 from cmg_mj.sensors import Accelerometer, Ideal, Sensors
 from cmg_mj.tilt import RadialTilt
 
-NonNegative = Annotated[float, Field(ge=0.0)]
-Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
 QUARTER_TURN = math.pi / 2.0
 UPRIGHT = math.cos(math.radians(30.0))  # sensors farther off than this are mounted otherwise, not inaccurately
-
-
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
-class PlantSettings:
-    """Which rig, and how it differs from its model file. What is left out is as the file says.
-
-    Attributes:
-        model: A bundled MJCF by name, or a path.
-        equilibrium_bias_deg: e: the frame's centre of mass is turned about the pivot by this angle [deg].
-        initial_tilt_deg: x1(0), from the true equilibrium [deg].
-        timestep_s: Physics step [s].
-        integrator: MuJoCo's integrator. Fast flywheels need RK4.
-        lock_thrust_bearing: Take the yaw joint out.
-        gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
-        gimbal_friction_n_m: Dry friction of each gimbal [N m].
-        gimbal_damping_n_m_s: Viscous friction of each gimbal [N m s/rad].
-        tilt_friction_n_m: Dry friction of the tilt joint [N m].
-        tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
-        flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
-    """
-
-    model: str = "scissored_pair.xml"
-    equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 0.5
-    initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 1.0
-    timestep_s: Annotated[float, Field(ge=1e-6, le=0.1)] = 0.001
-    integrator: Integrator = "RK4"
-    lock_thrust_bearing: bool = False
-    gimbal_armature_kg_m2: NonNegative | None = None
-    gimbal_friction_n_m: NonNegative | None = None
-    gimbal_damping_n_m_s: NonNegative | None = None
-    tilt_friction_n_m: NonNegative | None = None
-    tilt_damping_n_m_s: NonNegative | None = None
-    flywheel_imbalance_kg_m: float = 0.0
 
 
 @plain_dataclass(frozen=True)

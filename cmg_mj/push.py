@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.fields import STRICT, NonNegative, Positive
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+
+@dataclass(frozen=True, config=STRICT)
 class Push:
     """A torque from outside.
 
@@ -18,8 +17,8 @@ class Push:
         torque_n_m: Torque about the tilt axis [N m].
     """
 
-    start_s: Annotated[float, Field(ge=0.0)]
-    duration_s: Annotated[float, Field(gt=0.0)] = 0.1
+    start_s: NonNegative
+    duration_s: Positive = 0.1
     torque_n_m: float = 1.0
 
     @property

@@ -12,9 +12,10 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
+from cmg_mj.experiment import Experiment
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.resources import bundled
-from cmg_mj.scenario import Experiment, load_scenario
+from cmg_mj.scenario import load_scenario
 
 COLUMNS = (
     ("velocity_rms_error_rad_s", "velocity\nRMS error\n[rad/s]", "{:.4f}"),

@@ -16,10 +16,10 @@ import tomli_w
 
 from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers.protocol import BIAS, extra_signals
 from cmg_mj.plant import load_plant
 from cmg_mj.plots import plot_run
-from cmg_mj.scenario import Experiment, prepare
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Outcome, Result
 from cmg_mj.trajectory import Trajectory, whole_file

@@ -6,16 +6,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
-from cmg_mj.controller import TABLE_2_GAINS, Angles, Feedback, Law, lqr_gains
+from cmg_mj.controller import Angles, Feedback
+from cmg_mj.fields import NonNegative, Positive
+from cmg_mj.law import TABLE_2_GAINS, Law, lqr_gains
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
-from cmg_mj.plant import PlantSettings
+from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.push import Push
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.sensors import Sensors
 
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
 FORBID = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 

@@ -9,20 +9,17 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, digitise
+from cmg_mj.fields import STRICT, NonNegative, Positive
 from cmg_mj.timing import whole_steps
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
-CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Ideal(NamedTuple):
@@ -36,7 +33,7 @@ class Ideal(NamedTuple):
     """Tilt rate [rad/s]."""
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class Accelerometer:
     """A pair of accelerometers of the MPU-6050 class (InvenSense PS-MPU-6000A: 400 ug/rtHz, +-2 g, 16384 counts/g).
 
@@ -96,7 +93,7 @@ class Accelerometer:
         return measure
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class Encoder:
     """The gimbals' absolute encoders (AS5045 in the Dynamixel MX-106: 12 bit).
 
@@ -120,7 +117,7 @@ class Encoder:
         return lambda ideal, normal: [digitise(angle, math.inf, step) for angle in ideal.gimbals]
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class Fog:
     """A fibre-optic gyro on the frame, along the tilt axis: the bench's ground truth.
 
@@ -167,7 +164,7 @@ class Fog:
         return measure
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class Sensors:
     """The rig's sensors.
 

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from cmg_mj import Estimate, InputError, Measurement, load_plant, parse_scenario, prepare
-from cmg_mj.errors import expected, nearest, shown
+from cmg_mj.complaint import expected
+from cmg_mj.errors import nearest, shown
 from cmg_mj.resources import folder
 from cmg_mj.trajectory import Trajectory
 from tests.command import Said, cmg_mj

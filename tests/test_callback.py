@@ -17,10 +17,11 @@ from mujoco import rollout
 from cmg_mj.callback import control, installed
 from cmg_mj.controller import Controller
 from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.sensors import Accelerometer, Sensors
 from cmg_mj.trajectory import Trajectory
 

@@ -14,7 +14,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from cmg_mj.plant import Plant, PlantSettings, load_plant
+from cmg_mj.plant import Plant, load_plant
+from cmg_mj.plant_settings import PlantSettings
 from tests import paper_model as paper
 from tests.full_model import Motion, motion, passive
 

@@ -12,11 +12,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.controller import Controller, Law, lqr_gains
+from cmg_mj.controller import Controller
 from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.experiment import prepare
+from cmg_mj.law import Law, lqr_gains
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.scenario import load_scenario, parse_scenario, prepare
+from cmg_mj.scenario import load_scenario, parse_scenario
 from cmg_mj.sensors import Accelerometer, Encoder, Fog, Ideal, Sensors
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.trajectory import Trajectory

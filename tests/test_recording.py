@@ -16,6 +16,7 @@ from rerun.chunk import RrdReader
 
 from cmg_mj import recording
 from cmg_mj.errors import InputError
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
 from cmg_mj.recording import Recorded, write_recording
@@ -26,7 +27,7 @@ from cmg_mj.recording.summary import OPTIONAL as OPTIONAL_METRICS
 from cmg_mj.recording.summary import SHORT as SHORT_METRICS
 from cmg_mj.recording.timeline import column as time_column
 from cmg_mj.recording.timeline import instant
-from cmg_mj.scenario import Experiment, Scenario, load_scenario, prepare
+from cmg_mj.scenario import Scenario, load_scenario
 from cmg_mj.simulate import Outcome
 from cmg_mj.trajectory import Trajectory
 

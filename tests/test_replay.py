@@ -7,9 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.replay import replay
-from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 

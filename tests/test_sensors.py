@@ -14,7 +14,8 @@ import pytest
 from scipy import stats
 
 from cmg_mj.errors import InputError
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.experiment import prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.sensors import Accelerometer, Encoder, Fog, Ideal, SampledSensor, Sensors, normals
 from cmg_mj.tilt import RadialTilt
 

@@ -17,11 +17,12 @@ from scipy import stats
 
 from cmg_mj.cli import studies
 from cmg_mj.errors import InputError
+from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval, mean_interval, paired_verdict, ratio_interval
 from cmg_mj.observers import Estimate, make_observer
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.replay import replay
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.trajectory import Trajectory
 from cmg_mj.tuning import Recorded, best_noise, record, tune, tuning_table

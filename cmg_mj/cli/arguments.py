@@ -11,7 +11,7 @@ import click
 from cmg_mj.errors import InputError, nearest
 
 if TYPE_CHECKING:
-    from cmg_mj.scenario import Experiment
+    from cmg_mj.experiment import Experiment
     from cmg_mj.schema import Scenario
 
 

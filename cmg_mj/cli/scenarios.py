@@ -39,7 +39,7 @@ def run(
     default written out and reruns to the same numbers.
     """
     from cmg_mj import report, runs
-    from cmg_mj.scenario import prepare
+    from cmg_mj.experiment import prepare
 
     if observer is not None:
         check_observer("--observer", observer)
@@ -153,6 +153,7 @@ def list_names(what: str | None) -> None:
 def check(file: str) -> None:
     """Check a scenario file without running it, and say what it amounts to."""
     from cmg_mj import report
-    from cmg_mj.scenario import load_scenario, prepare
+    from cmg_mj.experiment import prepare
+    from cmg_mj.scenario import load_scenario
 
     click.echo(report.description(file, prepare(load_scenario(file))))

@@ -12,7 +12,8 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, cos
-from cmg_mj.observers.protocol import BIAS, CONFIG, Measurement, NonNegative, Positive
+from cmg_mj.fields import STRICT, NonNegative, Positive
+from cmg_mj.observers.protocol import BIAS, Measurement
 from cmg_mj.reduced import ReducedModel
 
 TORQUE, SINUSOID = "torque_n_m", "disturbance_n_m"
@@ -44,7 +45,7 @@ def _estimate_type(extra_signals: tuple[str, ...]) -> Any:
     return namedtuple("Estimate", ("x1", "x2", "x3", *extra_signals))
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class Adaptive:
     """dao2023 (7) to (9) for the reduced model, with what is unknown about it as r.
 

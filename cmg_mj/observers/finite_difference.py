@@ -5,11 +5,12 @@ from __future__ import annotations
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
+from cmg_mj.fields import STRICT, Positive
+from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class FiniteDifference:
     """x2 = (y1_k - y1_{k-1})/dt: no parameter, no model, no filter.
 

@@ -9,7 +9,8 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, signed_powers, sqrt
-from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, NonNegative, Positive
+from cmg_mj.fields import STRICT, NonNegative, Positive
+from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
 
 LARGEST_RESISTANCE = 2.5  # of a step; the classical Runge-Kutta step is stable up to 2.78
@@ -24,7 +25,7 @@ class State(NamedTuple):
     terms: tuple[Scalar, Scalar, Scalar]
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class Homogeneous:
     """x1' = x2 - k1 [e]^alpha, x2' = f2(y, x2, u) - k2 [e]^(2 alpha - 1), e = x1 - y1, [e]^a = |e|^a sign e.
 

@@ -9,9 +9,10 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
+from cmg_mj.fields import STRICT, Positive
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.homogeneous import Homogeneous
-from cmg_mj.observers.protocol import BIAS, CONFIG, Measurement, Positive
+from cmg_mj.observers.protocol import BIAS, Measurement
 from cmg_mj.reduced import ReducedModel
 
 
@@ -31,7 +32,7 @@ class BiasedEstimate(NamedTuple):
     bias_rad: Scalar
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class HomogeneousAdaptive:
     """aranovskiy2020 (11) with sin(y1 + e), e estimated by dao2023's observer beside it.
 

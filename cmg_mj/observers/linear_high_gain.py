@@ -12,12 +12,13 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
+from cmg_mj.fields import STRICT, Positive
 from cmg_mj.observers.hold import FilterState, Rows, second_order_rows, second_order_step
-from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
+from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class LinearHighGain:
     """x1' = x2 + (a1/eps)(y1 - x1), x2' = (a2/eps^2)(y1 - x1): model-free.
 

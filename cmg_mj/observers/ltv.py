@@ -9,7 +9,8 @@ from typing import NamedTuple
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip
-from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
+from cmg_mj.fields import STRICT, Positive
+from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
 
 MOST_PIECES = 1000
@@ -30,7 +31,7 @@ class State(NamedTuple):
     terms: tuple[Scalar, Scalar, Scalar]
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class LinearTimeVarying:
     """x' = A'(y, u) x + b(y, u) - H C^T (C x - y), H' = H A'^T + A' H - H C^T C H + Q.
 

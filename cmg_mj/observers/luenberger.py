@@ -9,8 +9,9 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
+from cmg_mj.fields import STRICT, Positive
 from cmg_mj.observers.hold import hold_matrices
-from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
+from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
 
 
@@ -24,7 +25,7 @@ class State(NamedTuple):
     y2: Scalar
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class Luenberger:
     """x' = A x + B u + L (y - C x) with the linearisation (6).
 

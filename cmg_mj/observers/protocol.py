@@ -4,17 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Annotated, Any, NamedTuple, Protocol
-
-from pydantic import ConfigDict, Field
+from typing import Any, NamedTuple, Protocol
 
 from cmg_mj.elementwise import Scalar
-
-CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True, allow_inf_nan=False)
-"""Configuration of the observers' dataclasses: an unknown or unusable parameter is refused."""
-
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Measurement(NamedTuple):

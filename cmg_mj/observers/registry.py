@@ -8,7 +8,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cmg_mj.errors import InputError, complaint, nearest
+from cmg_mj.complaint import complaint
+from cmg_mj.errors import InputError, nearest
 from cmg_mj.observers.protocol import Observer
 from cmg_mj.reduced import ReducedModel
 

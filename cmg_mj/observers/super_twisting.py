@@ -10,7 +10,8 @@ from typing import NamedTuple
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, sign, sqrt, where
-from cmg_mj.observers.protocol import CONFIG, Estimate, Measurement, Positive
+from cmg_mj.fields import STRICT, Positive
+from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
 
 
@@ -21,7 +22,7 @@ class State(NamedTuple):
     z1: Scalar
 
 
-@dataclass(frozen=True, config=CONFIG)
+@dataclass(frozen=True, config=STRICT)
 class SuperTwisting:
     """z0' = z1 - l0 sqrt(L) |s|^(1/2) sign s, z1' = -l1 L sign s, s = z0 - y1: model-free.
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmg_mj.errors import InputError
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import Observer
 from cmg_mj.replay import replay
-from cmg_mj.scenario import Experiment, prepare
 from cmg_mj.schema import ObserverSettings, Scenario
 from cmg_mj.trajectory import Trajectory
 

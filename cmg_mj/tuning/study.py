@@ -10,10 +10,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from cmg_mj.errors import InputError
+from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval, PairedVerdict, paired_verdict, ratio_interval
 from cmg_mj.observers import make_observer
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.scenario import prepare
 from cmg_mj.schema import ObserverSettings, Scenario
 from cmg_mj.tuning.parameters import Number, narrowed, numbers_of, parameters_of, replaced
 from cmg_mj.tuning.recorded import WARM_UP_S, Recorded, Window, record

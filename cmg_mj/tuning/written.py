@@ -12,8 +12,8 @@ from rich import box
 from rich.table import Table
 
 from cmg_mj.errors import InputError
+from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval
-from cmg_mj.scenario import prepare
 from cmg_mj.trajectory import whole_file
 from cmg_mj.tuning.study import Level, Study, best_noise, tuned_scenario
 

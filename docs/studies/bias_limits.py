@@ -11,9 +11,10 @@ import dataclasses
 
 import numpy as np
 
+from cmg_mj.experiment import prepare
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.plant import load_plant
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 
 SEED, WORLDS, LARGEST_DEG, CUTS, PARTS = 30_000, 5, 4.0, 2, 8
 

@@ -11,8 +11,9 @@ import dataclasses
 import math
 import statistics
 
+from cmg_mj.experiment import prepare
 from cmg_mj.plant import load_plant
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 
 SEED, WORLDS = 40_000, 20
 NOISE_UG = (0, 100, 200, 400, 800)

@@ -5,8 +5,9 @@ python docs/studies/ride_along.py
 
 import statistics
 
+from cmg_mj.experiment import prepare
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 
 result = prepare(load_scenario("observer_tuning", ["seed=60000"])).run_many(20, keep_trajectory=False)
 print("| observer | velocity RMS error [rad/s] | standard deviation over worlds |\n|---|---:|---:|")

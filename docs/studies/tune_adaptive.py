@@ -17,8 +17,9 @@ import math
 
 import numpy as np
 
+from cmg_mj.experiment import prepare
 from cmg_mj.plant import load_plant
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import ObserverSettings
 
 SEED, WORLDS, LATE_S = 30_000, 6, 5.0

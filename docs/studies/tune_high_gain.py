@@ -15,9 +15,10 @@ import statistics
 import numpy as np
 from scipy.optimize import minimize
 
+from cmg_mj.experiment import prepare
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.papers.andrieu2009.bi_limit import largest_b
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 
 SEED, LOOP_SEED, WORLDS = 30_000, 31_000, 20
 D_INF = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)

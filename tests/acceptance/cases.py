@@ -5,8 +5,9 @@ from __future__ import annotations
 import statistics
 from functools import cache
 
+from cmg_mj.experiment import prepare
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.simulate import Result
 
 STANDING = {

@@ -12,8 +12,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, solve_continuous_are
 
 from cmg_mj.errors import InputError
+from cmg_mj.experiment import prepare
 from cmg_mj.observers import Measurement
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
 from tests.observers.reference import DT, HEAVY, J1, J2, PAPER, integrate, ltv_slope, observer, rough_signals, run
 

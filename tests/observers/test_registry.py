@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from cmg_mj.errors import InputError
+from cmg_mj.experiment import prepare
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.scenario import parse_scenario, prepare
+from cmg_mj.scenario import parse_scenario
 from tests.observers.reference import DT, PAPER, observer
 
 

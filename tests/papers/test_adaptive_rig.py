@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmg_mj.experiment import prepare
 from cmg_mj.papers.dao2023 import adaptive_rig as rig
 from cmg_mj.papers.dao2023 import on_the_rig
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 
 
 def test_bias_is_found_in_95_of_100_seeds() -> None:

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.controller import TABLE_2_GAINS
+from cmg_mj.law import TABLE_2_GAINS
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.papers.aranovskiy2020 import (
     STEPS,

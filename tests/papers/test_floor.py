@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from cmg_mj.experiment import prepare
 from cmg_mj.papers.beyond.floor import kalman_filter, tilt_noise, velocity_floor
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from tests.observers.reference import PAPER
 
 POLE = math.sqrt(PAPER.gravity_torque / PAPER.J1)

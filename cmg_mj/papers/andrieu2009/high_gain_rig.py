@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.observers import make_observer
 from cmg_mj.observers.high_gain import HighGain, updated_gain
 from cmg_mj.papers.claim import Claim, OnShare, verdict
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 
 WORLDS, SEED = 20, 82_000
 LINEAR_CORRECTION = "high_gain, d_inf = 0"

@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval, ratio_interval
 from cmg_mj.papers.aranovskiy2020.rig_loop import errors
 from cmg_mj.papers.claim import Claim, OnShare, verdict
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.tuning import BestNoise, Level, Recorded, Study, best_noise, record, tune
 

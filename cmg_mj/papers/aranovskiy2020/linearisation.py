@@ -11,7 +11,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.controller import TABLE_2_GAINS
+from cmg_mj.law import TABLE_2_GAINS
 from cmg_mj.papers.claim import Claim, OnShare, verdict
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.reduced import ReducedModel

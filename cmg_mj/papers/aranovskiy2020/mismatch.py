@@ -13,8 +13,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.plant import Plant, load_plant
-from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 

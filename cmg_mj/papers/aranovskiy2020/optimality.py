@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.controller import TABLE_2_GAINS
+from cmg_mj.law import TABLE_2_GAINS
 from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
 from cmg_mj.papers.claim import Claim, OnShare, verdict
 

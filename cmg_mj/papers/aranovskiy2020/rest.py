@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.controller import TABLE_2_GAINS
+from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval, mean_interval
+from cmg_mj.law import TABLE_2_GAINS
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
 from cmg_mj.papers.claim import Claim, OnShare, verdict
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
 
 SEED = 73_000

@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from cmg_mj.experiment import prepare
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.ltv import LinearTimeVarying, State
 from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
 from cmg_mj.papers.claim import Claim, OnShare, verdict
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
 
 Q = np.diag([1.0, 5e6, 1.0])

@@ -8,11 +8,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.papers.aranovskiy2020.riccati import Numerics, numerics
 from cmg_mj.papers.claim import Claim, OnShare, verdict
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 from cmg_mj.tuning.recorded import window_of

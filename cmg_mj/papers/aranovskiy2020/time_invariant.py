@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.experiment import prepare
 from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
 from cmg_mj.papers.aranovskiy2020.rig_loop import DURATION_S, WORLDS, errors
 from cmg_mj.papers.claim import Claim, OnShare, verdict
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.plant import load_plant
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 
 SEED = 72_002
 BIASES_DEG = (0.0, 0.25, 0.5, 1.0)

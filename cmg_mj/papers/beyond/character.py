@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import Measurement, Observer, make_observer
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.replay import replay
-from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
 
 PUSH_N_M, PUSH_S = 1.0, 0.1

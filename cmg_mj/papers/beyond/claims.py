@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.papers.beyond.league import league, markdown
 from cmg_mj.papers.claim import Claim, OnShare, Section, verdict
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 
 SEED, WORLDS = 90_000, 100
 FRICTION_N_M = 0.05

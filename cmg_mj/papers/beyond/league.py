@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
+from cmg_mj.experiment import prepare
 from cmg_mj.intervals import mean_interval
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers.beyond.character import character, record_motion, update_us
 from cmg_mj.papers.beyond.floor import tilt_noise, velocity_floor
 from cmg_mj.papers.claim import OnShare
 from cmg_mj.plant import load_plant
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.simulate import Outcome
 
 NOISES_UG = (200.0, 400.0, 800.0)

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmg_mj.experiment import prepare
 from cmg_mj.plant import load_plant
 from cmg_mj.push import Push
-from cmg_mj.scenario import load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.trajectory import Trajectory
 

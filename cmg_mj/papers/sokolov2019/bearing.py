@@ -21,12 +21,13 @@ import mujoco
 import numpy as np
 
 from cmg_mj.callback import control
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.papers.claim import Claim, OnShare, verdict
 from cmg_mj.papers.sokolov2019.single_gimbal import Runs, experiment, pushed, runs, servo_of
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.plant import Plant, load_plant
-from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.scenario import load_scenario
 from cmg_mj.timing import whole_steps
 
 SEED, WORLDS = 84_000, 20

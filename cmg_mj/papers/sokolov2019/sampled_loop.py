@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from cmg_mj.controller import Law
+from cmg_mj.law import Law
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.hold import hold_matrices
 from cmg_mj.reduced import ReducedModel

@@ -7,9 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
-from cmg_mj.plant import Plant, PlantSettings, load_plant
-from cmg_mj.scenario import Experiment, load_scenario, prepare
+from cmg_mj.plant import Plant, load_plant
+from cmg_mj.plant_settings import PlantSettings
+from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import ControllerSettings
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory

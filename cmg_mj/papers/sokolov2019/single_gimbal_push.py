@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import lsim, lti
 
+from cmg_mj.experiment import Experiment
 from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.papers.claim import Claim, OnShare, verdict
@@ -15,7 +16,6 @@ from cmg_mj.papers.sokolov2019.single_gimbal import experiment, pushed
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.replay import replay
-from cmg_mj.scenario import Experiment
 from cmg_mj.trajectory import Trajectory
 
 SEED, WORLDS = 82_000, 20

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.controller import TABLE_2_GAINS
+from cmg_mj.law import TABLE_2_GAINS
 from cmg_mj.observers import make_observer
 from cmg_mj.observers.luenberger import Luenberger
 from cmg_mj.papers.aranovskiy2020.linearisation import (

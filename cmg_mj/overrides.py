@@ -1,0 +1,43 @@
+"""`--set section.field=value`: a setting that replaces one of the scenario file."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+from cmg_mj.errors import InputError
+
+
+def override(fields: dict[str, Any], setting: str) -> None:
+    """Replace a field of a scenario, or add it.
+
+    Args:
+        fields: The TOML file's content, which is changed.
+        setting: `section.field=value`; an element of a list by its number, `push.0.torque_n_m=2.0`.
+
+    Raises:
+        InputError: It is not written so, or there is no such place.
+    """
+    name, equals, text = setting.partition("=")
+    parts = name.strip().split(".")
+    if not equals or not all(parts):
+        raise InputError(f"--set {setting!r}: write section.field=value, for example plant.equilibrium_bias_deg=1.0")
+    try:
+        (value,) = tomllib.loads(f"value = {text}").values()
+    except (tomllib.TOMLDecodeError, ValueError):
+        value = text.strip()  # a bare word is a string
+    *sections, field = parts
+    place: Any = fields
+    for i, section in enumerate(sections):
+        if isinstance(place, list) and section.isdecimal() and int(section) < len(place):
+            place = place[int(section)]
+        elif isinstance(place, dict) and not section.isdecimal():
+            following = sections[i + 1 : i + 2]
+            place = place.setdefault(section, [] if following and following[0].isdecimal() else {})
+        else:
+            there = f"; it has {len(place)} of them, counted from 0" if isinstance(place, list) else ""
+            raise InputError(f"--set {setting!r}: there is no {'.'.join(sections[: i + 1])}{there}")
+    if not isinstance(place, dict):
+        example = f"{'.'.join(sections)}.0.torque_n_m=2.0" if isinstance(place, list) else "plant.timestep_s=0.0005"
+        raise InputError(f"--set {setting!r}: {'.'.join(sections)} is not a section; write for example {example}")
+    place[field] = value

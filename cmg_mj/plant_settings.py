@@ -1,0 +1,45 @@
+"""Which rig, and how it differs from its model file: what a scenario says of the plant, checked without MuJoCo."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.fields import STRICT, NonNegative
+
+Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
+
+
+@dataclass(frozen=True, config=STRICT)
+class PlantSettings:
+    """Which rig, and how it differs from its model file. What is left out is as the file says.
+
+    Attributes:
+        model: A bundled MJCF by name, or a path.
+        equilibrium_bias_deg: e: the frame's centre of mass is turned about the pivot by this angle [deg].
+        initial_tilt_deg: x1(0), from the true equilibrium [deg].
+        timestep_s: Physics step [s].
+        integrator: MuJoCo's integrator. Fast flywheels need RK4.
+        lock_thrust_bearing: Take the yaw joint out.
+        gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
+        gimbal_friction_n_m: Dry friction of each gimbal [N m].
+        gimbal_damping_n_m_s: Viscous friction of each gimbal [N m s/rad].
+        tilt_friction_n_m: Dry friction of the tilt joint [N m].
+        tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
+        flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
+    """
+
+    model: str = "scissored_pair.xml"
+    equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 0.5
+    initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 1.0
+    timestep_s: Annotated[float, Field(ge=1e-6, le=0.1)] = 0.001
+    integrator: Integrator = "RK4"
+    lock_thrust_bearing: bool = False
+    gimbal_armature_kg_m2: NonNegative | None = None
+    gimbal_friction_n_m: NonNegative | None = None
+    gimbal_damping_n_m_s: NonNegative | None = None
+    tilt_friction_n_m: NonNegative | None = None
+    tilt_damping_n_m_s: NonNegative | None = None
+    flywheel_imbalance_kg_m: float = 0.0

@@ -1,0 +1,45 @@
+"""An observer tried once before a run, so that one that cannot work is found before its first sample."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.errors import InputError, shown
+from cmg_mj.observers import Measurement, Observer
+from cmg_mj.observers.protocol import extra_signals
+
+
+def rehearse(observer: Observer, worlds: int | None) -> None:
+    """Two samples of one observer, on floats or on arrays of so many worlds."""
+
+    def sample(tilt: float) -> Measurement:
+        y = Measurement(tilt, -tilt)
+        return y if worlds is None else Measurement(*(np.full(worlds, angle) for angle in y))
+
+    hint = "" if worlds is None else "; many worlds come at once, as arrays: use operators and cmg_mj.elementwise"
+    u: Any = 0.1 if worlds is None else np.full(worlds, 0.1)
+    call = "init(y)"
+    try:
+        names = ("x1", "x2", "x3", *extra_signals(observer))
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    try:
+        state = observer.init(sample(0.01))
+        call = "step(state, y, u)"
+        returned = observer.step(state, sample(0.011), u)
+    except Exception as error:  # a user's observer may fail in any way
+        raise InputError(f"{call} raised {type(error).__name__}: {error}{hint}") from error
+    try:
+        _, estimate = returned
+        parts = list(zip(names, estimate, strict=True))
+    except (TypeError, ValueError) as error:
+        pair = isinstance(returned, tuple) and len(returned) == 2
+        given = f"(state, {shown(returned[1])})" if pair else shown(returned)
+        raise InputError(f"{call} must return (state, ({', '.join(names)})), not {given}") from error
+    for name, value in parts:
+        number = np.asarray(value)
+        if number.dtype.kind not in "fiu" or number.shape != np.shape(u):
+            wanted = "a number" if worlds is None else f"an array of {worlds} numbers"
+            raise InputError(f"{call} must return {wanted} for {name}, not {shown(value)}{hint}")
