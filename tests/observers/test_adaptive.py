@@ -1,4 +1,4 @@
-"""The adaptive observer on the scissored pair: against the general form and the reduced model."""
+"""The adaptive observer on the scissored pair, against the reduced model."""
 
 from __future__ import annotations
 
@@ -16,12 +16,10 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.protocol import extra_signals
-from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, System
 from cmg_mj.reduced import ReducedModel
-from tests.observers.reference import DT, HEAVY, PAPER, Signal, rough_signals
+from tests.observers.reference import DT, PAPER, Signal
 
 PAIR = dataclasses.replace(PAPER, gimbals=2)
-HEAVY_PAIR = dataclasses.replace(HEAVY, gimbals=2)
 
 MODES: dict[str, dict[str, Any]] = {
     "bias": {},
@@ -37,76 +35,10 @@ SIGNALS = {
     "torque and sinusoid": ("torque_n_m", "disturbance_n_m"),
     "sinusoid": ("disturbance_n_m",),
 }
-GAINS: dict[str, Any] = {"L": (-9.0, -60.0), "Gamma": (2.0, 3.0, 5.0), "Sigma": 40.0}
 
 
 def adaptive(model: ReducedModel = PAIR, dt: float = DT, **parameters: Any) -> Any:
     return make_observer("adaptive", dt, model, **parameters)
-
-
-def general(of: Adaptive) -> tuple[FriedlandTacker, Callable[[float, float, float], System]]:
-    """The same observer in the general form, and the matrices at measured angles and a gimbal rate."""
-    m, known = of.model, math.radians(of.known_bias_deg)
-    w = 2.0 * math.pi * of.sinusoid_hz
-    constants = int(of.bias or of.torque)
-    nm = constants + 2 * bool(w)
-    Am, Cm = np.zeros((nm, nm)), np.zeros((constants + bool(w), nm))
-    Cm[:constants, :constants] = np.eye(constants)
-    weights = [of.Gamma[0] if of.bias else of.Gamma[1]] * constants
-    if w:
-        Am[-2, -1], Am[-1, -2], Cm[-1, -1] = -w, w, 1.0
-        weights += [of.Gamma[2]] * 2
-    observer = FriedlandTacker(of.dt, Am, Cm, np.array(of.L)[:, None], np.diag(weights), np.array([[of.Sigma]]))
-
-    def at(y1: float, y2: float, u: float) -> System:
-        D = m.J1 + m.J2 * math.sin(y2) ** 2
-        A = np.array([[0.0, 1.0], [0.0, -u * m.J2 * math.sin(2.0 * y2) / D]])
-        per_bias, per_torque = m.gravity_torque * math.cos(y1) / D, 1.0 / (m.gimbals * D)
-        lower = [per_bias if of.bias else per_torque] * constants + [per_torque] * bool(w)
-        known_input = (u * m.J_d * m.omega_d * math.cos(y2) + m.gravity_torque * math.sin(y1 + known)) / D
-        return System(
-            A,
-            np.array([[0.0] * len(lower), lower]),
-            np.array([[0.0], [known_input]]),
-            np.array([[1.0, 0.0]]),
-            np.zeros((1, len(lower))),
-        )
-
-    return observer, at
-
-
-@pytest.mark.parametrize("model", [PAIR, HEAVY_PAIR, HEAVY], ids=["pair", "heavy pair", "heavy"])
-@pytest.mark.parametrize("mode", MODES)
-def test_equals_the_general_form(mode: str, model: ReducedModel) -> None:
-    of = adaptive(model, **MODES[mode], **GAINS)
-    observer, at = general(of)
-    y1, y2, u = rough_signals(400, seed=1)
-    state = of.init(Measurement(float(y1[0]), float(y2[0])))
-    reference = observer.init(y1[:1], x=np.array([y1[0], 0.0]))
-    worst, largest = 0.0, 0.0
-    for k in range(1, 400):
-        state, estimate = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
-        here = at(0.5 * (y1[k - 1] + y1[k]), 0.5 * (y2[k - 1] + y2[k]), u[k - 1])
-        reference = observer.step(reference, here, np.ones(1), y1[k : k + 1])
-        expected = [*reference.x, y2[k], *(observer.Cm @ reference.xm)]
-        worst = max(worst, np.abs(np.array(estimate) - expected).max())
-        largest = max(largest, abs(estimate[3]))
-    print(f"{mode}: rig's form less general form {worst:.1e}; extra signal up to {largest:.2g}")
-    assert largest > 1e-3
-    assert worst < 1e-12
-
-
-def test_equals_the_general_form_with_the_default_gains() -> None:
-    of = adaptive()
-    observer, at = general(of)
-    y1, y2, u = rough_signals(400, seed=2)
-    state = of.init(Measurement(float(y1[0]), float(y2[0])))
-    reference = observer.init(y1[:1], x=np.array([y1[0], 0.0]))
-    for k in range(1, 400):
-        state, estimate = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
-        here = at(0.5 * (y1[k - 1] + y1[k]), 0.5 * (y2[k - 1] + y2[k]), u[k - 1])
-        reference = observer.step(reference, here, np.ones(1), y1[k : k + 1])
-        np.testing.assert_allclose(estimate, [*reference.x, y2[k], *reference.xm], rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("mode", MODES)
