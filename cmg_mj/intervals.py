@@ -49,6 +49,13 @@ def mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
     return Interval(mean, mean - half, mean + half)
 
 
+def known_interval(values: Sequence[float] | np.ndarray) -> Interval | None:
+    """The interval of the mean over the finite values, as of the worlds that stood; None of fewer than two."""
+    sample = np.asarray(values, dtype=float)
+    known = sample[np.isfinite(sample)]
+    return mean_interval(known) if len(known) >= 2 else None
+
+
 def ratio_interval(numerator: np.ndarray, denominator: np.ndarray) -> Interval:
     """Ratio of two positive quantities of the same worlds: the geometric mean of the worlds' ratios.
 
