@@ -1,10 +1,21 @@
-"""How the report writes what several papers have."""
+"""How numbers are written in a claim's words."""
 
 from __future__ import annotations
 
 from cmg_mj.intervals import Interval
 
 
-def with_half(interval: Interval | None, digits: int = 4) -> str:
-    """A mean and half its interval: `0.0601 +- 0.0005`; a dash where there is none."""
-    return "-" if interval is None else f"{interval.mean:.{digits}f} +- {interval.half:.{digits}f}"
+def plus_minus(interval: Interval | None, digits: int = 4, *, signed: bool = False) -> str:
+    """A mean with half its interval, `0.0601 +- 0.0005`; a dash where there is none.
+
+    Args:
+        interval: The interval.
+        digits: So many after the point.
+        signed: Whether a positive mean has its sign.
+
+    Returns:
+        The words.
+    """
+    if interval is None:
+        return "-"
+    return f"{interval.mean:{'+' if signed else ''}.{digits}f} +- {interval.half:.{digits}f}"
