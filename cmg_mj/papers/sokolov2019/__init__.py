@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmg_mj.papers.aranovskiy2020 import plvcc
+from cmg_mj.papers import plvcc
 from cmg_mj.papers.claim import Claim, OnShare, Section
 from cmg_mj.papers.sokolov2019 import (
     bearing,
