@@ -41,9 +41,9 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     Writes a folder: report.md, its plots, and figures.json. Every claim of the paper stands beside what is obtained
     here, with a verdict: reproduced, reproduced within stated conditions, or not reproduced and why.
     """
-    from cmg_mj.papers import BEYOND, PAPERS
+    from cmg_mj.papers import BEYOND, PAPERS, check_installed
     from cmg_mj.papers import reproduce as obtain
-    from cmg_mj.papers.report import figures_of, save, verdict_table
+    from cmg_mj.papers.report import figures_of, save_report, verdict_table
     from cmg_mj.runs import output_folder
 
     names = (*PAPERS, *BEYOND, "all")
@@ -51,11 +51,13 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
         raise InputError(f"{paper!r}: no such paper; {nearest(paper, names)}")
     if out == "":
         raise InputError("--out '': name a folder, . for the current one")
+    papers = list(PAPERS) if paper == "all" else [paper]
+    check_installed(papers)  # before a folder is made
     folder = output_folder(Path(out) if out is not None else Path("runs") / f"reproduce-{paper}")
     with CtrlC() as ctrl_c:
         with progress(f"reproduce {paper}", 1.0, ctrl_c) as on_progress:
-            entries = obtain(list(PAPERS) if paper == "all" else [paper], lambda now, done: on_progress(done, now))
-        save(folder, entries)
+            entries = obtain(papers, lambda now, done: on_progress(done, now))
+        save_report(folder, entries)
         show(figures_of(entries), verdict_table(entries), as_json)
     if not as_json:
         click.echo(f"Written to {folder}. Read {folder / 'report.md'}", err=True)

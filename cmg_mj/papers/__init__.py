@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 
+from cmg_mj.errors import InputError
 from cmg_mj.papers.claim import Claim, Section
 
 PAPERS = {
@@ -24,6 +26,9 @@ PAPERS = {
 
 BEYOND = {"beyond": "A step beyond the papers"}
 """What is reproduced only when asked for by name, because it takes long."""
+
+NEEDS = {"aranovskiy2020": ("sympy",), "sokolov2019": ("sympy",)}
+"""Paper -> the packages that it needs beyond the bench's; the extra `[papers]` has them all."""
 
 
 @dataclass
@@ -43,6 +48,23 @@ class Reproduced:
     seconds: float = 0.0
 
 
+def check_installed(papers: Iterable[str]) -> None:
+    """See whether all that the papers need is there, before anything is computed.
+
+    Args:
+        papers: Their short names.
+
+    Raises:
+        InputError: A package is missing.
+    """
+    needed = {(paper, package) for paper in papers for package in NEEDS.get(paper, ())}
+    missing = sorted((paper, package) for paper, package in needed if find_spec(package) is None)
+    if missing:
+        who = " and ".join(dict.fromkeys(paper for paper, _ in missing))
+        what = " and ".join(dict.fromkeys(package for _, package in missing))
+        raise InputError(f'{who}: {what} is not installed: python -m pip install "cmg_mj[papers]"')
+
+
 def sections_of(paper: str) -> list[Section]:
     """The sections in which a paper is reproduced."""
     return importlib.import_module(f"cmg_mj.papers.{paper}").SECTIONS
@@ -52,28 +74,37 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
     """Obtain every claim of the papers.
 
     Args:
-        papers: Their short names, of `PAPERS`.
+        papers: Their short names, of `PAPERS` and `BEYOND`.
         on_progress: Called now and then with what is being done and the share done.
 
     Returns:
         One entry a paper. If the user interrupted, what was obtained until then.
+
+    Raises:
+        InputError: A package that a paper needs is missing.
     """
-    work = [(paper, section) for paper in papers for section in sections_of(paper)]
-    total = sum(section.seconds for _, section in work)
-    entries = {paper: Reproduced(paper) for paper in papers}
+    check_installed(papers)
+    sections = {paper: sections_of(paper) for paper in papers}
+    entries = [Reproduced(paper) for paper in papers]
+    total = sum(section.seconds for of_paper in sections.values() for section in of_paper)
     before = 0.0
     try:
-        for paper, section in work:
-
-            def on_share(share: float, before: float = before, section: Section = section, paper: str = paper) -> None:
-                on_progress(f"{paper}: {section.title}", (before + share * section.seconds) / total)
-
-            on_share(0.0)
-            start = time.perf_counter()
-            entries[paper].claims += section.claims(on_share)
-            entries[paper].seconds += time.perf_counter() - start
-            before += section.seconds
-            entries[paper].complete = section is sections_of(paper)[-1]
+        for entry in entries:
+            for section in sections[entry.paper]:
+                on_share = _on_share(on_progress, f"{entry.paper}: {section.title}", before, section.seconds, total)
+                on_share(0.0)
+                start = time.perf_counter()
+                entry.claims += section.claims(on_share)
+                entry.seconds += time.perf_counter() - start
+                before += section.seconds
+            entry.complete = True
     except KeyboardInterrupt:
         pass
-    return list(entries.values())
+    return entries
+
+
+def _on_share(
+    on_progress: Callable[[str, float], None], now: str, before: float, seconds: float, total: float
+) -> Callable[[float], None]:
+    """From a section's share to that of the whole, of which so many seconds lie before it."""
+    return lambda share: on_progress(now, (before + share * seconds) / total)

@@ -26,14 +26,14 @@ def figures_of(entries: Sequence[Reproduced]) -> dict[str, Any]:
             entry.paper: {
                 "complete": entry.complete,
                 "seconds": entry.seconds,
-                "claims": [_plain(claim) for claim in entry.claims],
+                "claims": [_figures_of_claim(claim) for claim in entry.claims],
             }
             for entry in entries
         },
     }
 
 
-def _plain(claim: Claim) -> dict[str, Any]:
+def _figures_of_claim(claim: Claim) -> dict[str, Any]:
     return {
         "place": claim.place,
         "says": claim.says,
@@ -48,8 +48,9 @@ def _plain(claim: Claim) -> dict[str, Any]:
 
 def verdict_table(entries: Sequence[Reproduced]) -> str:
     """Every claim and its verdict, as a Markdown table."""
+    whose = {False: "", True: " (not the paper's)"}
     rows = [
-        (entry.paper, f"{claim.place} (not the paper's)" if claim.ours else claim.place, claim.says, _verdict(claim))
+        (entry.paper, claim.place + whose[claim.ours], claim.says, verdict_words(claim))
         for entry in entries
         for claim in entry.claims
     ]
@@ -64,43 +65,53 @@ OURS = {
 """The verdicts' words where there is no paper to reproduce."""
 
 
-def _verdict(claim: Claim) -> str:
+def verdict_words(claim: Claim) -> str:
+    """A claim's verdict, in the words for those of a paper or for ours."""
     return OURS[claim.verdict] if claim.ours else claim.verdict
 
 
-def report(entries: Sequence[Reproduced]) -> str:
+def report_text(entries: Sequence[Reproduced]) -> str:
     """The whole report in Markdown."""
-    title = "Four papers, reproduced" if len(entries) > 1 else f"{entries[0].paper}, reproduced"
-    if entries[0].paper in BEYOND:
-        title = BEYOND[entries[0].paper]
-    if not all(entry.complete for entry in entries):
-        title += " (interrupted: not all of it)"
-    parts = [f"# {title}", _count(entries), verdict_table(entries)]
+    parts = [f"# {_title(entries)}", _count_of_verdicts(entries), verdict_table(entries)]
     for entry in entries:
         parts.append(f"## {entry.paper}: {(PAPERS | BEYOND)[entry.paper]}")
         if not entry.complete:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
-        for claim in entry.claims:
-            who = "Asked" if claim.ours else "The paper"
-            parts += [f"### {claim.place}: {_verdict(claim)}", f"**{who}:** {claim.says}", f"**Here:** {claim.found}"]
-            if claim.why:
-                parts.append(f"**{'Why not' if claim.verdict == 'not reproduced' else 'Conditions'}:** {claim.why}")
-            parts += [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]
+        parts += [part for claim in entry.claims for part in _parts_of_claim(claim)]
     return "\n\n".join(parts) + "\n"
 
 
-def _count(entries: Sequence[Reproduced]) -> str:
+def _title(entries: Sequence[Reproduced]) -> str:
+    first = entries[0].paper
+    title = BEYOND.get(first, f"{first}, reproduced") if len(entries) == 1 else "Four papers, reproduced"
+    return title if all(entry.complete for entry in entries) else f"{title} (interrupted: not all of it)"
+
+
+def _parts_of_claim(claim: Claim) -> list[str]:
+    """A claim's paragraphs."""
+    parts = [
+        f"### {claim.place}: {verdict_words(claim)}",
+        f"**{'Asked' if claim.ours else 'The paper'}:** {claim.says}",
+        f"**Here:** {claim.found}",
+    ]
+    if claim.why:
+        parts.append(f"**{'Conditions' if claim.holds else 'Why not'}:** {claim.why}")
+    return parts + [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]
+
+
+def _count_of_verdicts(entries: Sequence[Reproduced]) -> str:
+    """How many claims have which verdict, the papers' and ours apart, and how long it took."""
     claims = [claim for entry in entries for claim in entry.claims]
     sentences = []
     for ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
-        counts = Counter(_verdict(claim) for claim in claims if claim.ours is ours)
+        counts = Counter(verdict_words(claim) for claim in claims if claim.ours is ours)
         if counts:
             listed = ", ".join(f"{n} {v}" for v, n in counts.most_common())
             sentences.append(f"{sum(counts.values())} {words}: {listed}.")
     return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
 
 
-def save(folder: Path, entries: Sequence[Reproduced]) -> None:
+def save_report(folder: Path, entries: Sequence[Reproduced]) -> None:
     """Write report.md, figures.json and the plots, each whole or not at all.
 
     Args:
@@ -111,6 +122,7 @@ def save(folder: Path, entries: Sequence[Reproduced]) -> None:
         for claim in entry.claims:
             for picture in claim.pictures:
                 draw(folder / f"{picture.name}.png", picture)
-    for name, text in (("figures.json", json.dumps(figures_of(entries), indent=2)), ("report.md", report(entries))):
+    texts = {"figures.json": json.dumps(figures_of(entries), indent=2), "report.md": report_text(entries)}
+    for name, text in texts.items():
         with whole_file(folder / name) as temporary:
             temporary.write_text(text.rstrip("\n") + "\n", encoding="utf-8")

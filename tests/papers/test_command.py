@@ -3,36 +3,57 @@
 from __future__ import annotations
 
 import json
+import re
+import sys
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from cmg_mj import reproduce
-from cmg_mj.papers.claim import Claim, OnShare, Step, verdict
+from cmg_mj import papers
+from cmg_mj.errors import InputError
+from cmg_mj.papers.claim import Claim, OnShare, Section
+from cmg_mj.papers.report import report_text
 from cmg_mj.picture import Line, Panel, Picture
 from tests.command import cmg_mj
 
 PICTURE = Picture("a-fig-1", "a Fig. 1", [Panel("tilt [deg]", [Line([0.0, 1.0], [0.0, 2.0], "true")])])
-GOOD = Claim("Fig. 1", "it falls | or not", "it fell at 3 s", "reproduced", figures={"time_s": 3.0}, pictures=[PICTURE])
-PARTLY = Claim("Remark 1", "always", "above 100 Hz", verdict(True, "100 Hz"), why="above 100 Hz")
-OURS = Claim("On the rig", "it stands", "it falls", "not reproduced", why="too light", ours=True)
-NOT = Claim("Section V", "best", "worst", verdict(False), why="the noise is another")
+GOOD = Claim(
+    place="Fig. 1",
+    says="it falls | or not",
+    found="it fell at 3 s",
+    holds=True,
+    figures={"time_s": 3.0},
+    pictures=[PICTURE],
+)
+PARTLY = Claim(place="Remark 1", says="always", found="above 100 Hz", holds=True, conditions="It is above 100 Hz.")
+OURS = Claim(
+    place="On the rig", says="it stands", found="it falls", holds=False, otherwise="It is too light.", ours=True
+)
+NOT = Claim(place="Section V", says="best", found="worst", holds=False, otherwise="The noise is another.")
 
 
-def steps(*claims: Claim) -> list[Step]:
-    return [Step(claim.place, 1.0, lambda on_share, claim=claim: [claim]) for claim in claims]
+def sections(*claims: Claim) -> list[Section]:
+    return [Section(claim.place, 1.0, lambda on_share, claim=claim: [claim]) for claim in claims]
 
 
 @pytest.fixture(autouse=True)
 def _quick(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     quick = {
-        "aranovskiy2020": steps(GOOD),
-        "sokolov2019": steps(NOT),
-        "dao2023": steps(PARTLY),
-        "andrieu2009": steps(OURS),
+        "aranovskiy2020": sections(GOOD),
+        "sokolov2019": sections(NOT),
+        "dao2023": sections(PARTLY),
+        "andrieu2009": sections(OURS),
+        "beyond": sections(GOOD),
     }
-    monkeypatch.setattr(reproduce, "steps_of", quick.__getitem__)
+    monkeypatch.setattr(papers, "sections_of", quick.__getitem__)
+
+
+def rows(text: str) -> list[list[str]]:
+    """The cells of the Markdown tables in a text, without their padding."""
+    return [re.split(r"\s+\|\s+", line.strip("| ")) for line in text.splitlines() if line.startswith("|")]
 
 
 def test_all_papers_make_one_report() -> None:
@@ -41,11 +62,17 @@ def test_all_papers_make_one_report() -> None:
     folder = Path("runs/reproduce-all")
     report = (folder / "report.md").read_text()
     assert "3 claims of the papers: 1 reproduced, 1 not reproduced, 1 reproduced within stated conditions." in report
-    assert "| aranovskiy2020 | Fig. 1 | it falls \\| or not | reproduced |" in report
-    assert "| aranovskiy2020 | Fig. 1 | it falls \\| or not | reproduced |" in said.out
+    table = [
+        ["aranovskiy2020", "Fig. 1", "it falls \\| or not", "reproduced"],
+        ["sokolov2019", "Section V", "best", "not reproduced"],
+        ["dao2023", "Remark 1", "always", "reproduced within stated conditions"],
+        ["andrieu2009", "On the rig (not the paper's)", "it stands", "does not hold"],
+    ]
+    assert rows(report)[2:] == table
+    assert rows(said.out)[2:] == table
     assert "### Section V: not reproduced" in report
-    assert "**Why not:** the noise is another" in report
-    assert "**Conditions:** above 100 Hz" in report
+    assert "**Why not:** The noise is another." in report
+    assert "**Conditions:** It is above 100 Hz." in report
     assert "![a Fig. 1](a-fig-1.png)" in report
     assert "1 beside them, not the papers': 1 does not hold." in report
     assert "### On the rig: does not hold" in report
@@ -71,23 +98,23 @@ def test_ctrl_c_keeps_what_was_obtained(monkeypatch: pytest.MonkeyPatch) -> None
     def pressed(on_share: OnShare) -> list[Claim]:
         raise KeyboardInterrupt
 
-    found = reproduce.reproduce(["dao2023"], lambda now, share: None)
+    found = papers.reproduce(["dao2023"], lambda now, share: None)
     assert found[0].complete
-    monkeypatch.setattr(reproduce, "steps_of", lambda paper: [*steps(GOOD), Step("endless", 9.0, pressed)])
-    (entry,) = reproduce.reproduce(["dao2023"], lambda now, share: None)
+    monkeypatch.setattr(papers, "sections_of", lambda paper: [*sections(GOOD), Section("endless", 9.0, pressed)])
+    (entry,) = papers.reproduce(["dao2023"], lambda now, share: None)
     assert entry.claims == [GOOD]
     assert not entry.complete
-    assert write.report([entry]).startswith("# dao2023, reproduced (interrupted: not all of it)")
+    assert report_text([entry]).startswith("# dao2023, reproduced (interrupted: not all of it)")
 
 
-def test_progress_is_the_share_of_all_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_progress_is_the_share_of_all_sections(monkeypatch: pytest.MonkeyPatch) -> None:
     def halfway(on_share: OnShare) -> list[Claim]:
         on_share(0.5)
         return []
 
-    monkeypatch.setattr(reproduce, "steps_of", lambda paper: [*steps(GOOD), Step("long", 3.0, halfway)])
+    monkeypatch.setattr(papers, "sections_of", lambda paper: [*sections(GOOD), Section("long", 3.0, halfway)])
     seen: list[tuple[str, float]] = []
-    reproduce.reproduce(["dao2023"], lambda now, share: seen.append((now, share)))
+    papers.reproduce(["dao2023"], lambda now, share: seen.append((now, share)))
     assert seen == [("dao2023: Fig. 1", 0.0), ("dao2023: long", 0.25), ("dao2023: long", 0.625)]
 
 
@@ -105,7 +132,72 @@ def test_wrong_input(given: list[str], complaint: str) -> None:
     assert cmg_mj("reproduce", *given).complaint.startswith(complaint)
 
 
-def test_a_verdict_with_conditions_must_state_them() -> None:
-    for kind in ("reproduced within stated conditions", "not reproduced"):
-        with pytest.raises(ValueError, match="say under which conditions, or why not"):
-            Claim("Fig. 9", "it is so", "it is", kind)  # type: ignore[arg-type]
+def test_the_verdict_follows_from_what_was_found() -> None:
+    def claim(holds: bool, conditions: str = "") -> Claim:
+        return Claim(
+            place="Fig. 9",
+            says="it is so",
+            found="it is",
+            holds=holds,
+            conditions=conditions,
+            otherwise="It is far off.",
+        )
+
+    outright, within, failed = claim(True), claim(True, "It is so at 200 Hz."), claim(False, "It is so at 200 Hz.")
+    assert (outright.verdict, outright.why) == ("reproduced", "")
+    assert (within.verdict, within.why) == ("reproduced within stated conditions", "It is so at 200 Hz.")
+    assert (failed.verdict, failed.why) == ("not reproduced", "It is far off.")
+    assert type(claim(np.float64(1.0) > 0.5).holds) is bool  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["conditions", "otherwise"])
+@pytest.mark.parametrize("text", ["conditions", "conditions.", "at 200 Hz"])
+@pytest.mark.parametrize("holds", [False, True])
+def test_conditions_and_otherwise_are_whole_sentences(name: str, text: str, holds: bool) -> None:
+    """Wrong even where it would not be printed: the next seed may print it."""
+    given: Any = {name: text}
+    with pytest.raises(ValueError, match=rf"Fig\. 9: {name} = .*: must be a whole sentence"):
+        Claim(place="Fig. 9", says="it is so", found="it is", holds=holds, **given)
+
+
+def test_what_does_not_hold_is_explained() -> None:
+    with pytest.raises(ValueError, match=r"Fig\. 9: otherwise: say what to make of it"):
+        Claim(place="Fig. 9", says="it is so", found="it is", holds=True, otherwise="")
+
+
+# --- without the packages of the extra [papers] ---------------------------------------------------------------
+
+
+@pytest.fixture
+def _without_sympy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "sympy", None)  # import sympy then raises ImportError
+
+
+@pytest.mark.usefixtures("_without_sympy")
+@pytest.mark.parametrize(
+    ("paper", "who"),
+    [
+        ("aranovskiy2020", "aranovskiy2020"),
+        ("sokolov2019", "sokolov2019"),
+        ("all", "aranovskiy2020 and sokolov2019"),
+    ],
+)
+def test_a_missing_package_ends_it_before_anything_is_computed(
+    paper: str, who: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def computed(paper: str) -> list[Section]:
+        raise AssertionError(f"{paper} was begun")
+
+    monkeypatch.setattr(papers, "sections_of", computed)
+    said = cmg_mj("reproduce", paper)
+    assert said.complaint == f'{who}: sympy is not installed: python -m pip install "cmg_mj[papers]"'
+    assert not Path("runs").exists()
+    with pytest.raises(InputError, match="sympy is not installed"):
+        papers.reproduce(list(papers.PAPERS), lambda now, share: None)
+
+
+@pytest.mark.usefixtures("_without_sympy")
+@pytest.mark.parametrize("paper", ["dao2023", "andrieu2009", "beyond"])
+def test_papers_that_do_not_need_it_are_reproduced_without(paper: str) -> None:
+    assert cmg_mj("reproduce", paper).status == 0
+    assert (Path("runs") / f"reproduce-{paper}" / "report.md").is_file()
