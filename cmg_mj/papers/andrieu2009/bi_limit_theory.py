@@ -15,7 +15,7 @@ from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, vio
 from cmg_mj.papers.andrieu2009.bioreactor_study import B, P
 from cmg_mj.papers.andrieu2009.finite_escape import no_observer_beyond_1
 from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain, updated_gain
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.picture import Line, Panel, Picture
 
 START_ERRORS = (-1e3, -1e2, -10.0, -1.0, 1.0, 10.0, 1e2, 1e3)

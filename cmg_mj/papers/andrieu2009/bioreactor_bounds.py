@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.papers.andrieu2009.bioreactor import U_MAX, Bioreactor
 from cmg_mj.papers.andrieu2009.bioreactor_study import HBAR, HBAR_OF_OBSERVERS, NOISE, P
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.claim import Claim, OnShare
 
 ROUNDING = 1e-9
 

@@ -35,7 +35,7 @@ from cmg_mj.papers.andrieu2009.bioreactor_study import (
     window_means,
     window_spreads,
 )
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.picture import Line, Panel, Picture
 
 SEEDS = 20

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from cmg_mj.elementwise import signed_power
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b
 from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
-from cmg_mj.papers.claim import Claim, verdict
+from cmg_mj.papers.claim import Claim
 from cmg_mj.picture import Line, Panel, Picture
 
 INSIDE, BEYOND = 0.5, 1.5

@@ -10,7 +10,7 @@ from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.observers import make_observer
 from cmg_mj.observers.high_gain import HighGain, updated_gain
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.scenario import load_scenario
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.dao2023 import pendulum_robot as robot
 from cmg_mj.papers.dao2023.figures import tail_rms
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker

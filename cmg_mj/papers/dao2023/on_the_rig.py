@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cmg_mj.intervals import mean_interval
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.dao2023 import adaptive_rig as rig
 from cmg_mj.picture import Line, Panel, Picture
 
