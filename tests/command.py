@@ -14,6 +14,8 @@ from cmg_mj.cli import main
 
 COMMAND = [sys.executable, "-c", "import sys; from cmg_mj.cli import main; main(sys.argv[1:])"]
 ROOT = Path(__file__).resolve().parent.parent
+HANGS_AFTER_S = 900.0
+"""A process that takes a second or two and has not come back by then never will, however busy the machine."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,11 @@ def environment(**others: str) -> dict[str, str]:
 def cmg_mj_process(*arguments: object, cwd: Path) -> Said:
     """Run the command in a process of its own."""
     done = subprocess.run(
-        [*COMMAND, *map(str, arguments)], cwd=cwd, env=environment(), capture_output=True, text=True, timeout=60
+        [*COMMAND, *map(str, arguments)],
+        cwd=cwd,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=HANGS_AFTER_S,
     )
     return Said(done.returncode, done.stdout, done.stderr)

@@ -1,53 +1,24 @@
-"""Run folders: whole, repeatable, and kept when a run is interrupted; comparisons equal to their single runs."""
+"""Run folders: whole and repeatable; comparisons equal to their single runs."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-import signal
-import subprocess
-import sys
-import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from rerun.chunk import RrdReader
 
 from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare, runs
 from cmg_mj.resources import folder
 from cmg_mj.simulate import Outcome
 from cmg_mj.trajectory import Trajectory
-from tests.command import COMMAND, cmg_mj, cmg_mj_process, environment
+from tests.command import cmg_mj
+from tests.run_folders import assert_whole, names, write
 
-FILES = ["recording.rrd", "scenario.toml", "summary.json", "trajectory.parquet"]
-
-
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))  # to which the command adds
-
-
-def write(text: str, path: str = "my.toml") -> str:
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
-    Path(path).write_text(text)
-    return path
-
-
-def names(place: str) -> list[str]:
-    return sorted(path.name for path in Path(place).iterdir())
-
-
-def assert_whole(place: str) -> Trajectory:
-    """Every file of a run folder can be read to its end, and there is no other."""
-    assert names(place) == FILES
-    json.loads((Path(place) / "summary.json").read_text())
-    tomllib.loads((Path(place) / "scenario.toml").read_text())
-    assert list(RrdReader(Path(place) / "recording.rrd").stream().to_chunks())
-    return Trajectory.load(Path(place) / "trajectory.parquet")
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 # --- the same again ------------------------------------------------------------------------------------------
@@ -232,129 +203,6 @@ def test_a_comparison_reports_progress_from_nothing_to_all() -> None:
 
 def test_observers_of_one_name_from_two_places_do_not_overwrite_each_other() -> None:
     assert runs.file_names(["ltv", "a.b:Mine", "c:Mine", "c:Yours"]) == ["ltv", "a.b.Mine", "c.Mine", "Yours"]
-
-
-# --- Ctrl-C --------------------------------------------------------------------------------------------------
-
-SOURCE = """
-import os, signal
-from cmg_mj import Estimate
-
-class Interrupts:
-    '''Presses Ctrl-C at the 600th sample, once or more often.'''
-    def __init__(self, dt, model, times=1):
-        self.times = times
-    def init(self, y):
-        return 0
-    def step(self, k, y, u):
-        if k == 598:
-            for _ in range(self.times):
-                os.kill(os.getpid(), signal.SIGINT)
-        return k + 1, Estimate(y.y1, 0.0 * y.y1, y.y2)
-"""
-LONG = "duration_s = 600.0\n[controller]\nfeedback = 'truth'\n[observer]\nkind = 'pressing:Interrupts'"
-
-
-@pytest.mark.parametrize("driver", ["native", "callback"])
-def test_ctrl_c_ends_a_run_at_the_next_clean_point(driver: str) -> None:
-    """The class is found in the current folder."""
-    write(SOURCE, "pressing.py")
-    said = cmg_mj_process("run", write(LONG), "--out", "it", "--json", "--driver", driver, cwd=Path())
-    assert said.status == 130, said
-    assert said.err == "cmg-mj: interrupted at 3.835 s; what was recorded until then is in it\n"
-    assert len(assert_whole("it")) == 768  # three pieces of 256 ticks
-    assert json.loads(said.out)["outcome"] == "interrupted"
-
-
-def test_ctrl_c_twice_ends_a_run_at_once() -> None:
-    write(SOURCE, "pressing.py")
-    said = cmg_mj_process("run", write(LONG), "--out", "it", "--set", "observer.times=2", cwd=Path())
-    assert said.status == 130, said
-    assert said.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
-    assert len(assert_whole("it")) == 599
-
-
-WRITING = """
-import os, signal
-from cmg_mj import cli, runs
-def pressed(record, times=({times})):
-    def press(*arguments):
-        for _ in range(times):
-            os.kill(os.getpid(), signal.SIGINT)
-        record(*arguments)
-    return press
-runs.write_json_before, runs._write_json = runs._write_json, pressed(runs._write_json)
-cli.main(["run", "my.toml", "--out", "it"])
-"""
-
-
-def run_python(program: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", program], env=environment(), capture_output=True, text=True, timeout=60, check=False
-    )
-
-
-def test_ctrl_c_while_files_are_written_lets_them_be_finished() -> None:
-    write("duration_s = 0.2")
-    done = run_python(WRITING.format(times=1))
-    assert done.returncode == 130, done
-    assert done.stderr.splitlines()[-1] == "cmg-mj: interrupted when all was done; it is in it"
-    assert_whole("it")
-
-
-def test_ctrl_c_twice_while_files_are_written_leaves_no_broken_one() -> None:
-    write("duration_s = 0.2")
-    done = run_python(WRITING.format(times=2))
-    assert done.returncode == 130, done
-    assert done.stderr == "cmg-mj: interrupted\n"
-    assert names("it") == ["trajectory.parquet"]
-    assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 40
-
-
-def test_ctrl_c_ends_a_comparison_with_the_observers_that_are_done() -> None:
-    write(SOURCE, "pressing.py")
-    file = write("duration_s = 3.0\n[controller]\nfeedback = 'truth'")
-    said = cmg_mj_process(
-        "compare", file, "--observers", "linear,pressing:Interrupts,ltv", "--worlds", 1, "--out", "it", cwd=Path()
-    )
-    assert said.status == 130, said
-    assert said.err.splitlines()[-1] == "cmg-mj: interrupted; 1 of 3 observers are in it"
-    assert names("it") == ["recording.rrd", "scenario.toml", "summary.json", "trajectory-linear.parquet"]
-    (entry,) = json.loads(Path("it/summary.json").read_text())
-    assert entry["observer"] == "linear"
-
-
-def test_ctrl_c_before_the_first_observer_is_done_leaves_no_files() -> None:
-    write(SOURCE, "pressing.py")
-    said = cmg_mj_process(
-        "compare", write(LONG), "--observers", "pressing:Interrupts", "--worlds", 1, "--out", "it", cwd=Path()
-    )
-    assert (said.status, said.out) == (130, "")
-    assert said.err == "cmg-mj: interrupted before the first observer was done; nothing was written\n"
-    assert names("it") == []
-
-
-def test_ctrl_c_from_outside() -> None:
-    """A real one, to a run that would take half a minute."""
-    running = subprocess.Popen(
-        [*COMMAND, "run", write("duration_s = 600.0"), "--out", "it"],
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    until = time.monotonic() + 30.0
-    while not Path("it").exists() and time.monotonic() < until:
-        time.sleep(0.01)
-    time.sleep(0.5)
-    running.send_signal(signal.SIGINT)
-    _, err = running.communicate(timeout=30)
-    assert running.returncode == 130, err
-    assert err.splitlines()[-1].startswith("cmg-mj: interrupted at ")
-    trajectory = assert_whole("it")
-    assert 0 < len(trajectory) < 600 * 200
-    verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", "it/recording.rrd"], capture_output=True)
-    assert verified.returncode == 0, verified
 
 
 def test_another_run_does_not_take_the_folder_of_one_that_is_there() -> None:

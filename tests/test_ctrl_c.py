@@ -1,0 +1,157 @@
+"""Ctrl-C: a run ends between two ticks and is written whole; a second one ends it at once."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cmg_mj.trajectory import Trajectory
+from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj_process, environment
+from tests.run_folders import assert_whole, names, write
+
+pytestmark = pytest.mark.usefixtures("elsewhere", "ctrl_c")
+
+OBSERVER = """
+import signal, time
+from pathlib import Path
+from cmg_mj import Estimate
+
+class Interrupts:
+    '''Presses Ctrl-C at the 600th sample, once or more often.'''
+    def __init__(self, dt, model, times=1):
+        self.times = times
+    def init(self, y):
+        return 0
+    def step(self, k, y, u):
+        if k == 598:
+            for _ in range(self.times):
+                self.press()
+        return k + 1, Estimate(y.y1, 0.0 * y.y1, y.y2)
+    def press(self):
+        signal.raise_signal(signal.SIGINT)
+
+class Waits(Interrupts):
+    '''Waits at the 600th sample until somebody else has pressed it.'''
+    def press(self):
+        Path('waiting').touch()
+        while not Path('pressed').exists():
+            time.sleep(0.01)
+"""
+LONG = "duration_s = 600.0\n[controller]\nfeedback = 'truth'\n[observer]\nkind = 'pressing:Interrupts'"
+
+
+@pytest.mark.parametrize("driver", ["native", "callback"])
+def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
+    """The class is found in the current folder."""
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process("run", write(LONG), "--out", "it", "--json", "--driver", driver, cwd=Path())
+    assert said.status == 130, said
+    assert said.err == "cmg-mj: interrupted at 3.835 s; what was recorded until then is in it\n"
+    assert len(assert_whole("it")) == 768  # three pieces of 256 ticks
+    assert json.loads(said.out)["outcome"] == "interrupted"
+
+
+def test_twice_ends_a_run_at_once() -> None:
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process("run", write(LONG), "--out", "it", "--set", "observer.times=2", cwd=Path())
+    assert said.status == 130, said
+    assert said.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+    assert len(assert_whole("it")) == 599
+
+
+WRITING = """
+import signal
+from cmg_mj import cli, runs
+def pressed(record, times=({times})):
+    def press(*arguments):
+        for _ in range(times):
+            signal.raise_signal(signal.SIGINT)
+        record(*arguments)
+    return press
+runs._write_json = pressed(runs._write_json)
+cli.main(["run", "my.toml", "--out", "it"])
+"""
+
+
+def run_python(program: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", program],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=HANGS_AFTER_S,
+        check=False,
+    )
+
+
+def test_while_files_are_written_lets_them_be_finished() -> None:
+    write("duration_s = 0.2")
+    done = run_python(WRITING.format(times=1))
+    assert done.returncode == 130, done
+    assert done.stderr.splitlines()[-1] == "cmg-mj: interrupted when all was done; it is in it"
+    assert_whole("it")
+
+
+def test_twice_while_files_are_written_leaves_no_broken_one() -> None:
+    write("duration_s = 0.2")
+    done = run_python(WRITING.format(times=2))
+    assert done.returncode == 130, done
+    assert done.stderr == "cmg-mj: interrupted\n"
+    assert names("it") == ["trajectory.parquet"]
+    assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 40
+
+
+def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
+    write(OBSERVER, "pressing.py")
+    file = write("duration_s = 3.0\n[controller]\nfeedback = 'truth'")
+    said = cmg_mj_process(
+        "compare", file, "--observers", "linear,pressing:Interrupts,ltv", "--worlds", 1, "--out", "it", cwd=Path()
+    )
+    assert said.status == 130, said
+    assert said.err.splitlines()[-1] == "cmg-mj: interrupted; 1 of 3 observers are in it"
+    assert names("it") == ["recording.rrd", "scenario.toml", "summary.json", "trajectory-linear.parquet"]
+    (entry,) = json.loads(Path("it/summary.json").read_text())
+    assert entry["observer"] == "linear"
+
+
+def test_before_the_first_observer_is_done_leaves_no_files() -> None:
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process(
+        "compare", write(LONG), "--observers", "pressing:Interrupts", "--worlds", 1, "--out", "it", cwd=Path()
+    )
+    assert (said.status, said.out) == (130, "")
+    assert said.err == "cmg-mj: interrupted before the first observer was done; nothing was written\n"
+    assert names("it") == []
+
+
+def test_from_outside() -> None:
+    """From another process, while the run waits for it in the middle of a tick: nothing depends on who is faster."""
+    write(OBSERVER, "pressing.py")
+    file = write(LONG.replace("Interrupts", "Waits"))
+    with subprocess.Popen(
+        [*COMMAND, "run", file, "--out", "it"],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as running:
+        try:
+            while not Path("waiting").exists():
+                assert running.poll() is None, running.communicate()
+                time.sleep(0.01)
+            running.send_signal(signal.SIGINT)
+            Path("pressed").touch()
+            _, err = running.communicate(timeout=HANGS_AFTER_S)
+        finally:
+            running.kill()
+    assert running.returncode == 130, err
+    assert err.splitlines()[-1] == "cmg-mj: interrupted at 3.835 s; what was recorded until then is in it"
+    assert len(assert_whole("it")) == 768
+    verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", "it/recording.rrd"], capture_output=True)
+    assert verified.returncode == 0, verified
