@@ -1,0 +1,18 @@
+"""What several papers read off a recorded run."""
+
+from __future__ import annotations
+
+from cmg_mj.simulate import Result
+from cmg_mj.trajectory import Trajectory
+
+
+def trajectory_of(result: Result) -> Trajectory:
+    """What was recorded, of a result that kept it."""
+    assert result.trajectory is not None
+    return result.trajectory
+
+
+def pushed(trajectory: Trajectory) -> list[tuple[float, float]]:
+    """When the push acted on one world, as panels shade it [s]."""
+    times = trajectory["time_s"][trajectory["push_n_m"] != 0.0]
+    return [(float(times[0]), float(times[-1]))] if len(times) else []
