@@ -11,6 +11,9 @@ would no longer be the same as its single runs.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import reduce
+from operator import add, mul
 from typing import Any
 
 import numpy as np
@@ -52,6 +55,14 @@ def exp(x: Scalar) -> Scalar:
     # `np.exp` may take a vector instruction that rounds differently from the C library; for complex numbers it
     # takes the library's.
     return math.exp(x) if type(x) is float else np.exp(x + 0j).real
+
+
+def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
+    """Sum of the products of two short sequences, term by term from the left.
+
+    Python's own `sum` compensates rounding on floats since 3.12, and would differ from the same on arrays.
+    """
+    return reduce(add, map(mul, a, b))
 
 
 def sign(x: Scalar) -> Scalar:

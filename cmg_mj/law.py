@@ -10,6 +10,7 @@ import numpy as np
 from cmg_mj.elementwise import Scalar, clip, where
 from cmg_mj.errors import InputError
 from cmg_mj.reduced import ReducedModel
+from cmg_mj.stability import is_hurwitz
 
 TABLE_2_GAINS = (35.0, 4.0, -1.0, 0.3)
 """K_e of aranovskiy2020 Table 2, on [x1, x2, x3, x_e]."""
@@ -35,9 +36,14 @@ def lqr_gains(model: ReducedModel, state_cost: Sequence[float], input_cost: floa
         K, _, poles = control.lqr(model.A_e, model.B_e, np.diag(state_cost), np.array([[input_cost]]))
     except Exception as error:
         raise InputError(f"controller.lqr: no stabilising gain for these weights ({error})") from error
-    if not np.all(np.isfinite(K)) or np.max(np.real(poles)) >= 0.0:
+    if not (np.all(np.isfinite(K)) and is_hurwitz(poles)):
         raise InputError("controller.lqr: no stabilising gain for these weights (give x_e a positive weight)")
     return tuple(float(k) for k in np.ravel(K))
+
+
+def closed_loop_poles(model: ReducedModel, gains: Sequence[float]) -> np.ndarray:
+    """Poles of the linearisation (6) with the law fed by the true state, (4,) [1/s]."""
+    return np.linalg.eigvals(model.A_e - model.B_e @ np.array([gains]))
 
 
 @dataclass(frozen=True)

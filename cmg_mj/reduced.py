@@ -5,15 +5,20 @@ aranovskiy2020 (2)-(6); sokolov2019 (1)-(5) is the same model with other numbers
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar, cos, sin
+from cmg_mj.elementwise import Scalar, sin
 
 if TYPE_CHECKING:
     import control
+
+
+Terms = tuple[Scalar, Scalar, Scalar]
+"""drift [rad/s^2], gain [1/s] and damping [1] of f2 in (4): f2 = drift + u (gain - damping x2)."""
 
 
 @dataclass(frozen=True)
@@ -44,16 +49,13 @@ class ReducedModel:
         s = sin(x3)
         return self.J1 + self.J2 * s * s
 
-    def terms(self, x1: Scalar, x3: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-        """Parts of f2 in (4) that the angles decide: f2 = drift + u (gain - damping x2).
-
-        Returns:
-            drift [rad/s^2], gain [1/s], damping [1].
-        """
-        s, c = sin(x3), cos(x3)
+    def terms(self, x1: Scalar, x3: Scalar) -> Terms:
+        """Parts of f2 in (4) that the angles decide: f2 = drift + u (gain - damping x2)."""
+        of: Any = math if type(x3) is float else np  # decided once: this is where observers spend their time
+        s, c = of.sin(x3), of.cos(x3)
         D = self.J1 + self.J2 * s * s
         return (
-            self.gravity_torque * sin(x1) / D,
+            self.gravity_torque * of.sin(x1) / D,
             self.J_d * self.omega_d * c / D,
             self.J2 * 2.0 * s * c / D,
         )

@@ -13,9 +13,11 @@ from rich import box
 from rich.table import Table
 
 from cmg_mj.experiment import Experiment
+from cmg_mj.law import closed_loop_poles
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.resources import bundled
 from cmg_mj.scenario import load_scenario
+from cmg_mj.stability import MARGIN, is_hurwitz
 
 COLUMNS = (
     ("velocity_rms_error_rad_s", "velocity\nRMS error\n[rad/s]", "{:.4f}"),
@@ -134,9 +136,9 @@ def description(name: str, experiment: Experiment) -> str:
     fields = experiment.resolved()
     settings = scenario.plant
     steps = f"{round(scenario.duration_s / settings.timestep_s)} physics steps of {settings.timestep_s:g} s"
-    poles = np.linalg.eigvals(plant.reduced.A_e - plant.reduced.B_e @ np.array([law.gains]))
+    poles = closed_loop_poles(plant.reduced, law.gains)
     slowest = float(np.max(poles.real))
-    stability = "stable" if slowest < 0.0 else "UNSTABLE"
+    stability = "stable" if is_hurwitz(poles) else "MARGINAL" if slowest < MARGIN else "UNSTABLE"
     observer = {key: value for key, value in fields["observer"].items() if key != "kind"}
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
     rows = [

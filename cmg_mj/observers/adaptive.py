@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
-from functools import cache, cached_property
+from collections.abc import Callable
+from functools import cached_property, reduce
+from itertools import repeat
+from operator import add, mul
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.elementwise import Scalar, cos
+from cmg_mj.elementwise import Scalar, cos, dot
 from cmg_mj.fields import STRICT, NonNegative, Positive
 from cmg_mj.observers.protocol import BIAS, Measurement
 from cmg_mj.reduced import ReducedModel
+from cmg_mj.stability import is_hurwitz
 
 TORQUE, SINUSOID = "torque_n_m", "disturbance_n_m"
 
@@ -22,27 +26,16 @@ FASTEST = 2.0
 """What the rates of the observer times the sample period must stay below."""
 
 
-class Column(NamedTuple):
-    """One entry of xm, and its column of T."""
-
-    value: Scalar
-    T1: Scalar
-    T2: Scalar
-
-
 class State(NamedTuple):
-    """The estimate, what is unknown with T's columns, and the last measurement."""
+    """The estimate, that of the exosystem's state with the rows of T, and the last measurement."""
 
     x1: Scalar
     x2: Scalar
-    columns: tuple[Column, ...]
+    xm: tuple[Scalar, ...]
+    """What is unknown: the constant if there is one, then the two parts of the sinusoid."""
+    T1: tuple[Scalar, ...]
+    T2: tuple[Scalar, ...]
     y: Measurement
-
-
-@cache
-def _estimate_type(extra_signals: tuple[str, ...]) -> Any:
-    """A named tuple of x1, x2, x3 and the extra signals."""
-    return namedtuple("Estimate", ("x1", "x2", "x3", *extra_signals))
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -56,11 +49,10 @@ class Adaptive:
         B0: M cos(y1)/D for the bias e, 1/D for a torque.
 
     A constant torque and a bias act alike, so that only one of the two can be asked for. A sinusoidal torque has the
-    exosystem [[0, -w], [w, 0]]. Each step is that of `friedland_tacker.FriedlandTacker`, written out: the implicit
-    midpoint rule for x and T, the exosystem exactly, and the correction implicit in the new sample. That step
-    is stable for any gains, but poles beyond 2/dt would be followed by a factor (1 + p dt/2)/(1 - p dt/2) whose real
-    part is negative: an error that changes its sign from sample to sample. Such poles are refused, and likewise a
-    faster learning.
+    exosystem [[0, -w], [w, 0]]. A step takes the implicit midpoint rule for x and T, the exosystem exactly, and the
+    correction implicit in the new sample, as a Kalman filter does. It is stable for any gains, but poles beyond 2/dt
+    would be followed by a factor (1 + p dt/2)/(1 - p dt/2) whose real part is negative: an error that changes its sign
+    from sample to sample. Such poles are refused, and likewise a faster learning.
 
     Attributes:
         dt: Sample period [s].
@@ -101,7 +93,7 @@ class Adaptive:
                 f"sinusoid_hz = {self.sinusoid_hz:g}: must be below half the sample rate, {0.5 / self.dt:g} Hz"
             )
         poles = np.linalg.eigvals(self.error_matrix)
-        if poles.real.max() >= 0.0:
+        if not is_hurwitz(poles):
             listed = ", ".join(f"{p:.3g}" for p in poles)
             raise ValueError(f"L: A + L C must be Hurwitz (both negative), its eigenvalues are {listed}")
         fastest, limit = float(np.abs(poles).max()), FASTEST / self.dt
@@ -137,20 +129,38 @@ class Adaptive:
         return np.array([[self.L[0], 1.0], [self.L[1], 0.0]])
 
     @cached_property
+    def _unknowns(self) -> list[tuple[str, list[float]]]:
+        """Name of each unknown, and its weights in Gamma: one for a constant, two for a sinusoid."""
+        bias, torque, sinusoid = self.Gamma
+        asked = (
+            (self.bias, BIAS, [bias]),
+            (self.torque, TORQUE, [torque]),
+            (self.sinusoid_hz, SINUSOID, [sinusoid, sinusoid]),
+        )
+        return [(name, weights) for wanted, name, weights in asked if wanted]
+
+    @cached_property
     def extra_signals(self) -> tuple[str, ...]:
         """Names of what is estimated beyond x."""
-        constant = (BIAS,) * self.bias + (TORQUE,) * self.torque
-        return constant + ((SINUSOID,) if self.sinusoid_hz else ())
+        return tuple(name for name, _ in self._unknowns)
 
     @cached_property
-    def _weights(self) -> list[float]:
-        """Diagonal of Gamma, an entry a column."""
-        bias, torque, sinusoid = self.Gamma
-        constant = [bias] * self.bias + [torque] * self.torque
-        return constant + ([sinusoid, sinusoid] if self.sinusoid_hz else [])
+    def _minus_Sigma_Gamma(self) -> list[float]:
+        """-Sigma Gamma, its diagonal, an entry a state of the exosystem."""
+        return [-self.Sigma * weight for _, weights in self._unknowns for weight in weights]
 
     @cached_property
-    def _turn(self) -> tuple[float, float]:
+    def _shown(self) -> list[int]:
+        """Which states of the exosystem are the extra signals: a constant, and the second part of a sinusoid."""
+        return [-1 if name == SINUSOID else 0 for name in self.extra_signals]
+
+    @cached_property
+    def _estimate(self) -> Any:
+        """A named tuple of x1, x2, x3 and the extra signals."""
+        return namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
+
+    @cached_property
+    def _angle(self) -> tuple[float, float]:
         """Cosine and sine of the angle by which the exosystem turns in a sample."""
         angle = 2.0 * math.pi * self.sinusoid_hz * self.dt
         return math.cos(angle), math.sin(angle)
@@ -162,55 +172,66 @@ class Adaptive:
     def init(self, y: Measurement) -> State:
         """Start at rest at the measured tilt, with nothing known and T = 0."""
         zero = 0.0 * y.y1
-        return State(y.y1, zero, (Column(zero, zero, zero),) * len(self._weights), y)
+        none = (zero,) * len(self._minus_Sigma_Gamma)
+        return State(y.y1, zero, none, none, none, y)
 
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Any]:
         """Advance by one sample period."""
         h, (l1, l2), model = self.dt, self.L, self.model
-        x1, x2, columns, (y1_before, y2_before) = state
+        x1, x2, xm, T1, T2, before = state
         y1, y2 = y
-        tilt, gimbal = 0.5 * (y1_before + y1), 0.5 * (y2_before + y2)
+        tilt, gimbal = 0.5 * (before[0] + y1), 0.5 * (before[1] + y2)
         drift, gain, damping = model.terms(tilt + self._known_bias, gimbal)
-        inertia = model.inertia(gimbal)
-        per_torque = 1.0 / (model.gimbals * inertia)  # of a torque on the whole rig, which the gimbals share
-        per_bias = model.gravity_torque * cos(tilt) / inertia
         a = -u * damping
+        B0 = self._acting(tilt, model.inertia(gimbal))
+        forward = _midpoint_rule(h, l1, l2, a)  # of v' = (A + L C) v + (w1, w2), A + L C = [[l1, 1], [l2, a]]
 
-        # (1 - k M) v+ = (1 + k M) v + h w, M = [[l1, 1], [l2, a]], k = h/2
-        k = 0.5 * h
-        scale = 1.0 / ((1.0 - k * l1) * (1.0 - k * a) - k * k * l2)
+        # (7) without its correction: x' = A x + B0 r + known input + L (C x - y), and xm' = Am xm.
+        r = dot(B0, xm)
+        x1, x2 = forward(x1, x2, -l1 * tilt, r + drift + u * gain - l2 * tilt)
+        xm = self._turned(xm)
+        # (8): T' = (A + L C) T - T Am + B0 Cm
+        T1, T2 = map(self._turned, zip(*map(forward, T1, T2, repeat(0.0), B0), strict=True))
+        # (9): Lm = -Gamma (C T)^T Sigma, C T the first row of T
+        Lm = list(map(mul, self._minus_Sigma_Gamma, T1))
+        # The correction of (7), x' += T Lm nu, xm' += Lm nu, with nu = C x - y after it.
+        nu = (x1 - y1) / (1.0 - h * dot(Lm, T1))
+        change = [h * lm * nu for lm in Lm]
+        x1, x2 = reduce(add, map(mul, T1, change), x1), reduce(add, map(mul, T2, change), x2)
+        xm = tuple(map(add, xm, change))
+        found = [xm[i] for i in self._shown]
+        return State(x1, x2, xm, T1, T2, y), self._estimate(x1, x2, y2, *found)
 
-        def onward(v1: Scalar, v2: Scalar, w1: Scalar, w2: Scalar) -> tuple[Scalar, Scalar]:
-            """Advance one column by the implicit midpoint rule."""
-            r1 = v1 + k * (l1 * v1 + v2) + h * w1
-            r2 = v2 + k * (l2 * v1 + a * v2) + h * w2
-            return scale * ((1.0 - k * a) * r1 + k * r2), scale * (k * l2 * r1 + (1.0 - k * l1) * r2)
-
-        unknown = 0.0
-        moved = []
-        for column in columns[:1] if self.bias or self.torque else ():
-            per = per_bias if self.bias else per_torque
-            unknown = per * column.value
-            moved.append(Column(column.value, *onward(column.T1, column.T2, 0.0, per)))
+    def _acting(self, tilt: Scalar, inertia: Scalar) -> list[Scalar]:
+        """Second row of B0 Cm, an entry a state of the exosystem; of a sinusoid its mean over the sample."""
+        per_torque = 1.0 / (self.model.gimbals * inertia)  # of a torque on the whole rig, which the gimbals share
+        acting = []
+        if self.bias:
+            acting.append(self.model.gravity_torque * cos(tilt) / inertia)
+        elif self.torque:
+            acting.append(per_torque)
         if self.sinusoid_hz:
-            c, s = self._turn
-            p, q = columns[-2:]
-            per_p, per_q = per_torque * 0.5 * s, per_torque * 0.5 * (1.0 + c)  # of the mean over the sample
-            unknown = unknown + per_p * p.value + per_q * q.value
-            p1, p2 = onward(p.T1, p.T2, 0.0, per_p)
-            q1, q2 = onward(q.T1, q.T2, 0.0, per_q)
-            moved.append(Column(c * p.value - s * q.value, c * p1 - s * q1, c * p2 - s * q2))
-            moved.append(Column(s * p.value + c * q.value, s * p1 + c * q1, s * p2 + c * q2))
-        x1, x2 = onward(x1, x2, -l1 * tilt, unknown + drift + u * gain - l2 * tilt)
+            c, s = self._angle
+            acting += [per_torque * 0.5 * s, per_torque * 0.5 * (1.0 + c)]
+        return acting
 
-        weighted = [self.Sigma * weight * column.T1 for weight, column in zip(self._weights, moved, strict=True)]
-        stiffness = sum(v * column.T1 for v, column in zip(weighted, moved, strict=True))
-        nu = (x1 - y1) / (1.0 + h * stiffness)
-        corrected = []
-        for v, column in zip(weighted, moved, strict=True):
-            change = -h * v * nu
-            x1, x2 = x1 + column.T1 * change, x2 + column.T2 * change
-            corrected.append(column._replace(value=column.value + change))
-        values = [column.value for column in corrected]
-        extras = values[:1] * (self.bias or self.torque) + (values[-1:] if self.sinusoid_hz else [])
-        return State(x1, x2, tuple(corrected), y), _estimate_type(self.extra_signals)(x1, x2, y2, *extras)
+    def _turned(self, row: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+        """exp(Am h) applied to the exosystem's state, or exp(-Am h) from the right to a row of T: a constant stays."""
+        if not self.sinusoid_hz:
+            return row
+        c, s = self._angle
+        *constant, p, q = row
+        return (*constant, c * p - s * q, s * p + c * q)
+
+
+def _midpoint_rule(h: float, l1: float, l2: float, a: Scalar) -> Callable:
+    """The step (1 - h/2 M) v+ = (1 + h/2 M) v + h w with M = [[l1, 1], [l2, a]], of (v1, v2, w1, w2)."""
+    k = 0.5 * h
+    scale = 1.0 / ((1.0 - k * l1) * (1.0 - k * a) - k * k * l2)
+
+    def forward(v1: Scalar, v2: Scalar, w1: Scalar, w2: Scalar) -> tuple[Scalar, Scalar]:
+        r1 = v1 + k * (l1 * v1 + v2) + h * w1
+        r2 = v2 + k * (l2 * v1 + a * v2) + h * w2
+        return scale * ((1.0 - k * a) * r1 + k * r2), scale * (k * l2 * r1 + (1.0 - k * l1) * r2)
+
+    return forward

@@ -11,9 +11,9 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, exp, signed_power
 from cmg_mj.fields import STRICT, Positive
-from cmg_mj.observers.model_copy import require_stable_step
+from cmg_mj.observers.model_copy import follow, require_stable_step, stages
 from cmg_mj.observers.protocol import Estimate, Measurement
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.reduced import ReducedModel, Terms
 
 GIMBAL_RATE = 0.4
 """Gimbal rate at which L must still be small enough for the sample period [rad/s]. A slow one: at a faster one a
@@ -49,7 +49,7 @@ class State(NamedTuple):
     x2: Scalar
     L: Scalar
     y: Measurement
-    terms: tuple[Scalar, Scalar, Scalar]
+    terms: Terms
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -111,52 +111,24 @@ class HighGain:
         zero = 0.0 * y.y1
         return State(y.y1, zero, self.phi2 + zero, y, self.model.terms(*y))
 
+    def correction(self, e: Scalar, L: Scalar) -> tuple[Scalar, Scalar]:
+        """L^(1+b) q1(s), L^(2+b) q2(l2 q1(s)) with s = l1 e/L^b."""
+        scale = signed_power(L, self.b)
+        s = self._q1(self.l1 * e / scale)
+        return L * scale * s, L * (L * scale) * self._q2(self.l2 * s)
+
+    def _q1(self, w: Scalar) -> Scalar:
+        return w + signed_power(w, 1.0 / (1.0 - self.d_inf)) if self.d_inf else w
+
+    def _q2(self, w: Scalar) -> Scalar:
+        return w + signed_power(w, 1.0 + self.d_inf) if self.d_inf else w
+
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
         """Advance by one sample period."""
-        h = self.dt
-        x1, x2, L, (y1_before, y2_before), (drift, gain, damping) = state
-        y1, y2 = y
-        y1_middle = 0.5 * (y1_before + y1)
-        middle = self.model.terms(y1_middle, 0.5 * (y2_before + y2))
-        end = self.model.terms(y1, y2)
-        Omega = abs(u * damping)
-        L_middle = updated_gain(L, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
-        L_end = updated_gain(L_middle, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
-
-        c1, c2 = self._corrections(x1 - y1_before, L)
-        p1 = x2 - c1
-        p2 = drift + u * (gain - damping * x2) - c2
-
-        drift, gain, damping = middle
-        w = x2 + 0.5 * h * p2
-        c1, c2 = self._corrections(x1 + 0.5 * h * p1 - y1_middle, L_middle)
-        q1 = w - c1
-        q2 = drift + u * (gain - damping * w) - c2
-
-        w = x2 + 0.5 * h * q2
-        c1, c2 = self._corrections(x1 + 0.5 * h * q1 - y1_middle, L_middle)
-        r1 = w - c1
-        r2 = drift + u * (gain - damping * w) - c2
-
-        drift, gain, damping = end
-        w = x2 + h * r2
-        c1, c2 = self._corrections(x1 + h * r1 - y1, L_end)
-        s1 = w - c1
-        s2 = drift + u * (gain - damping * w) - c2
-
-        x1 = x1 + h / 6.0 * (p1 + 2.0 * (q1 + r1) + s1)
-        x2 = x2 + h / 6.0 * (p2 + 2.0 * (q2 + r2) + s2)
-        return State(x1, x2, L_end, y, end), Estimate(x1, x2, y2)
-
-    def _corrections(self, e: Scalar, L: Scalar) -> tuple[Scalar, Scalar]:
-        """L^(1+b) q1(s) and L^(2+b) q2(l2 q1(s))."""
-        d_inf = self.d_inf
-        scale = signed_power(L, self.b)
-        s = self.l1 * e / scale
-        if d_inf > 0.0:
-            s = s + signed_power(s, 1.0 / (1.0 - d_inf))
-        w = self.l2 * s
-        if d_inf > 0.0:
-            w = w + signed_power(w, 1.0 + d_inf)
-        scale = L * scale
-        return scale * s, L * scale * w
+        x1, x2, L, before, terms = state
+        *moments, end = stages(self.model, before, terms, y, u)
+        Omega, half = abs(u * terms[2]), 0.5 * self.dt
+        L_middle = updated_gain(L, Omega, half, self.phi1, self.phi2, self.phi3)
+        L_end = updated_gain(L_middle, Omega, half, self.phi1, self.phi2, self.phi3)
+        x1, x2 = follow(self.correction, x1, x2, self.dt, *moments, gains=(L, L_middle, L_end))
+        return State(x1, x2, L_end, y, end), Estimate(x1, x2, y[1])

@@ -81,5 +81,5 @@ class HomogeneousAdaptive:
         """Advance by one sample period: first the bias, then (11) with it."""
         adaptive, found = self._adaptive.step(state.adaptive, y, u)
         bias = found[3]
-        homogeneous, estimate = self._homogeneous.step_with_bias(state.homogeneous, y, u, bias)
+        homogeneous, estimate = self._homogeneous.step(state.homogeneous, y, u, bias)
         return State(adaptive, homogeneous), BiasedEstimate(*estimate, bias)

@@ -13,6 +13,7 @@ from cmg_mj.fields import STRICT, Positive
 from cmg_mj.observers.hold import hold_matrices
 from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
+from cmg_mj.stability import is_hurwitz
 
 
 class State(NamedTuple):
@@ -47,7 +48,7 @@ class Luenberger:
 
     def __post_init__(self) -> None:
         poles = np.linalg.eigvals(self.error_matrix)
-        if poles.real.max() >= 0.0:
+        if not is_hurwitz(poles):
             shown = ", ".join(f"{p:.3g}" for p in poles)
             raise ValueError(f"L: A - L C must be Hurwitz, its eigenvalues are {shown}")
 

@@ -159,7 +159,7 @@ def test_learning_rate_is_the_stiffness_that_a_quiet_rig_comes_to(hertz: float) 
     for _ in range(600):
         state, _ = of.step(state, Measurement(0.0, 0.0), 0.0)
     weights = (of.Gamma[2],) * 2 if hertz else of.Gamma[:1]
-    found = of.Sigma * sum(weight * c.T1**2 for weight, c in zip(weights, state.columns, strict=True))
+    found = of.Sigma * sum(weight * T1**2 for weight, T1 in zip(weights, state.T1, strict=True))
     print(f"learning rate {of.learning_rate:.4f} 1/s, found {found:.4f}")
     assert of.learning_rate == pytest.approx(found, rel=0.02)
 

@@ -231,7 +231,7 @@ def test_a_known_bias_is_where_gravity_pulls() -> None:
     with_bias: Any = None
     without: Any = None
     for _ in range(2000):
-        told, with_bias = of.step_with_bias(told, y, 0.0, e)
+        told, with_bias = of.step(told, y, 0.0, e)
         untold, without = of.step(untold, y, 0.0)
     assert abs(with_bias.x2) < 1e-8
     assert abs(without.x2) > 0.05

@@ -25,7 +25,7 @@ def test_is_adaptive_and_then_the_homogeneous_one_told_its_bias() -> None:
         y = Measurement(y1[k], y2[k])
         state, estimate = both.step(state, y, u[k - 1])
         a, found = adaptive.step(a, y, u[k - 1])
-        b, expected = homogeneous.step_with_bias(b, y, u[k - 1], found.bias_rad)
+        b, expected = homogeneous.step(b, y, u[k - 1], found.bias_rad)
         assert tuple(estimate) == (*expected, found.bias_rad)
     assert estimate.bias_rad != 0.0
 
