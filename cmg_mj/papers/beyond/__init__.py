@@ -1,5 +1,15 @@
-"""A step beyond the papers. Not part of `reproduce all`: a hundred seeds a cell take about half an hour."""
+"""A step beyond the papers: friction in the observer, the bias fed in, and all observers in one table.
 
-from cmg_mj.papers.beyond.claims import SECTIONS
+Not part of `reproduce all`: a hundred seeds a cell take about half an hour.
+"""
 
-__all__ = ["SECTIONS"]
+from __future__ import annotations
+
+from cmg_mj.papers.beyond import all_observers, fed_bias, friction
+from cmg_mj.papers.claim import Section
+
+SECTIONS: list[Section] = [
+    Section("friction in the observer", 40.0, friction.claims),
+    Section("the bias fed in", 120.0, fed_bias.claims),
+    Section("all observers", 1500.0, all_observers.claims),
+]

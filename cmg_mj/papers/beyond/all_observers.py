@@ -1,0 +1,132 @@
+"""All observers in one table, and where the papers' order holds in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from cmg_mj import markdown
+from cmg_mj.intervals import Interval
+from cmg_mj.papers.beyond.league import MEANS, league
+from cmg_mj.papers.beyond.push_recovery import ERROR
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.summary_keys import heading, written
+
+SEED, WORLDS = 90_000, 100
+ORDER = ("homogeneous", "ltv", "linear")
+"""aranovskiy2020, section V, the best first."""
+
+Row = dict[str, Any]
+Cell = tuple[float, float]
+"""Noise density [ug/rtHz] and equilibrium bias [deg]."""
+
+SHOWN: Cell = (400.0, 0.5)
+"""Whose lags and noise gains are drawn."""
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """All observers, and where the papers' order holds."""
+    return [order_claim(league(WORLDS, SEED, on_share))]
+
+
+def order_claim(rows: Sequence[Row]) -> Claim:
+    """The claim.
+
+    Args:
+        rows: What `league` found.
+
+    Returns:
+        It holds if the paper's order is that of some cell.
+    """
+    cells = by_cell(rows)
+    ordered = [cell for cell, of_cell in cells.items() if in_order(of_cell)]
+    where = ", ".join(f"{noise:g} ug/rtHz and {bias:g} deg" for noise, bias in ordered)
+    best = [of_cell[0]["observer"] for of_cell in cells.values()]
+    winners = ", ".join(f"`{kind}` {best.count(kind)}" for kind in dict.fromkeys(best))
+    return Claim(
+        place="All observers, three noises, three biases",
+        says="aranovskiy2020 section V: homogeneous before ltv before linear; here over a grid, with every observer",
+        found=(
+            f"{rows[0]['worlds']} seeds a cell. The smallest velocity error: {winners} of {len(cells)} cells. The "
+            f"paper's order holds at {where or 'none of them'}. The floor is the error of the filter that knows the "
+            "model, e, the push, the gimbals' motion and the noise exactly: none of the observers knows e or the "
+            f"push.\n\n{league_table(rows)}"
+        ),
+        holds=bool(ordered),
+        conditions="" if len(ordered) == len(cells) else "The order turns round where noise is low or the bias large.",
+        otherwise="Another order is found at every noise and bias tried.",
+        figures={"rows": rows},
+        pictures=[_trade_off(rows)],
+    )
+
+
+def by_cell(rows: Sequence[Row]) -> dict[Cell, list[Row]]:
+    """The rows of each noise and bias, the smallest velocity error first."""
+    cells: dict[Cell, list[Row]] = {}
+    for row in rows:
+        cells.setdefault((row["noise_ug_rthz"], row["bias_deg"]), []).append(row)
+    return {cell: sorted(of_cell, key=lambda row: row[ERROR] or np.inf) for cell, of_cell in cells.items()}
+
+
+def in_order(of_cell: Sequence[Row]) -> bool:
+    """Whether the paper's three observers come in its order."""
+    errors = {row["observer"]: row[ERROR] for row in of_cell}
+    values = [errors[kind] for kind in ORDER]
+    return None not in values and all(better < worse for better, worse in pairwise(values))
+
+
+def league_table(rows: Sequence[Row]) -> str:
+    """The table, one block a noise and bias, the smallest velocity error first."""
+    error, *others = (heading(key) for key in MEANS)
+    headings = (
+        "observer",
+        error,
+        "over the floor",
+        "push lag [ms]",
+        "noise gain [1/s]",
+        *others,
+        "falls [%]",
+        "update [us]",
+    )
+    blocks = []
+    for (noise, bias), of_cell in by_cell(rows).items():
+        blocks.append(f"**{noise:g} ug/rtHz, e = {bias:g} deg** (floor {of_cell[0]['floor_rad_s']:.4f} rad/s)")
+        blocks.append(markdown.table(headings, [_line(row) for row in of_cell]))
+    return "\n\n".join(blocks)
+
+
+def _line(row: Row) -> list[str]:
+    error, *others = (_mean(row, key) for key in MEANS)
+    ratio, lag = row["ratio_to_floor"], row["push_lag_s"]
+    fell, low, high = (100.0 * row[f"fell_fraction{end}"] for end in ("", "_low", "_high"))
+    return [
+        f"`{row['observer']}`",
+        error,
+        "-" if ratio is None else f"{ratio:.1f}",
+        "-" if lag is None else f"{1e3 * lag:.1f}",
+        f"{row['noise_gain_per_s']:.1f}",
+        *others,
+        f"{fell:.0f} ({low:.0f} to {high:.0f})",
+        f"{row['update_us']:.1f}",
+    ]
+
+
+def _mean(row: Row, key: str) -> str:
+    """A mean and half its interval, with the digits that the key has in every table."""
+    if row[key] is None:
+        return "-"
+    half = Interval(row[key], row[f"{key}_low"], row[f"{key}_high"]).half
+    return f"{written(key, row[key])} +- {written(key, half)}"
+
+
+def _trade_off(rows: Sequence[Row]) -> Picture:
+    """Lag against noise gain, a mark an observer."""
+    of_cell = [row for row in rows if (row["noise_ug_rthz"], row["bias_deg"]) == SHOWN]
+    shown = [row for row in of_cell if row["push_lag_s"] is not None]
+    marks = [Line([1e3 * row["push_lag_s"]], [row["noise_gain_per_s"]], row["observer"], "o") for row in shown]
+    panel = Panel("noise gain [1/s]", marks, x_label="lag in a sudden push [ms]", x_scale="log", y_scale="log")
+    return Picture("beyond-trade-off", f"Every observer trades lag for noise ({SHOWN[0]:g} ug/rtHz)", [panel])

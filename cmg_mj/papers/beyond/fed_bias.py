@@ -1,0 +1,101 @@
+"""(11) told the equilibrium bias by `adaptive`, beside each of the two alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from cmg_mj import markdown
+from cmg_mj.intervals import Interval, known_interval
+from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.words import plus_minus
+from cmg_mj.picture import Line, Panel, Picture
+
+SEED, WORLDS = 90_002, 100
+BIASES_DEG = (0.25, 0.5, 1.0, 1.5)
+ALONE, TOLD = "homogeneous", "homogeneous_adaptive"
+KINDS = (ALONE, "adaptive", TOLD)
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """What feeding the estimated bias into (11) brings."""
+    return [fed_bias_claim(fed_bias(WORLDS, SEED, on_share))]
+
+
+def fed_bias(
+    worlds: int, seed: int, on_share: OnShare, biases_deg: Sequence[float] = BIASES_DEG, settings: Sequence[str] = ()
+) -> list[dict[str, Any]]:
+    """(11) alone, `adaptive` alone, and (11) told the bias by `adaptive`, at several biases.
+
+    Args:
+        worlds: How many a bias, the same ones each time.
+        seed: Of the sensors' noise.
+        on_share: Called with the share done.
+        biases_deg: The equilibrium biases e [deg].
+        settings: What else is changed in `push_recovery`.
+
+    Returns:
+        A row a bias: each observer's velocity RMS error and share of falls, and what (11) gains by being told.
+    """
+    found = {}
+    for i, kind in enumerate(KINDS):
+        found[kind] = on_rigs(push_recovery(kind, seed, settings), worlds, "equilibrium_bias_deg", biases_deg)
+        on_share((i + 1) / len(KINDS))
+    rows = []
+    for i, bias in enumerate(biases_deg):
+        row: dict[str, Any] = {"bias_deg": bias, "worlds": worlds, "seed": seed}
+        values = {kind: results[i].values(ERROR) for kind, results in found.items()}
+        for kind in KINDS:
+            row[f"{kind}_rad_s"] = known_interval(values[kind])
+            row[f"{kind}_fell_fraction"] = 1.0 - float(found[kind][i].stood.mean())
+        rows.append(row | {"gain_rad_s": gain(values[ALONE], values[TOLD])})
+    return rows
+
+
+def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
+    """The claim.
+
+    Args:
+        rows: What `fed_bias` found.
+
+    Returns:
+        It holds if being told the bias helps at some bias: a smaller error beyond chance, or fewer falls.
+    """
+    helped = [
+        row["bias_deg"]
+        for row in rows
+        if (row["gain_rad_s"] is not None and row["gain_rad_s"].low > 0.0)
+        or row[f"{TOLD}_fell_fraction"] < row[f"{ALONE}_fell_fraction"]
+    ]
+    where = f"It helps at e = {', '.join(f'{e:g}' for e in helped)} deg of those tried."
+    headings = ("e [deg]", *(f"`{kind}` [1e-3 rad/s]" for kind in KINDS))
+    cells = [(f"{row['bias_deg']:g}", *(_cell(row, kind) for kind in KINDS)) for row in rows]
+    return Claim(
+        place="homogeneous with the bias fed in from adaptive",
+        ours=True,
+        says="the rate error of (11) that e causes goes when e is estimated beside it",
+        found=("Velocity RMS error in `push_recovery`, 95 % intervals:\n\n" + markdown.table(headings, cells)),
+        holds=bool(helped),
+        conditions="" if len(helped) == len(rows) else where,
+        otherwise="It helps at none of the biases tried.",
+        figures={"rows": rows},
+        pictures=[_picture(rows)],
+    )
+
+
+def _cell(row: dict[str, Any], kind: str) -> str:
+    error, fell = row[f"{kind}_rad_s"], row[f"{kind}_fell_fraction"]
+    shown = plus_minus(None if error is None else Interval(*(1e3 * value for value in error)), 1)
+    return shown + (f" [{fell:.0%} fell]" if fell else "")
+
+
+def _picture(rows: Sequence[dict[str, Any]]) -> Picture:
+    lines = []
+    for kind in KINDS:
+        known = [(row["bias_deg"], row[f"{kind}_rad_s"]) for row in rows if row[f"{kind}_rad_s"] is not None]
+        biases, errors = [bias for bias, _ in known], [error for _, error in known]
+        means, halves = [error.mean for error in errors], [error.half for error in errors]
+        lines.append(Line(biases, means, kind, "o-", spread=halves))
+    panel = Panel("velocity RMS error [rad/s]", lines, x_label="equilibrium bias e [deg]")
+    return Picture("beyond-fed-bias", "The bias fed into (11): velocity RMS error with 95 % intervals", [panel])

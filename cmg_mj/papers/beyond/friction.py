@@ -1,0 +1,88 @@
+"""A friction model in the observer, on a rig that rubs and on one that does not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from cmg_mj.intervals import Interval, known_interval
+from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.summary_keys import written
+
+SEED, WORLDS = 90_001, 100
+FRICTION_N_M = 0.05
+WITH = {False: "without", True: "with"}
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """What a friction model in the observer brings."""
+    return [friction_claim(friction(WORLDS, SEED, on_share))]
+
+
+def friction(worlds: int, seed: int, on_share: OnShare, settings: Sequence[str] = ()) -> dict[str, Any]:
+    """Dry friction in the plant and in the observer, each with and without the other.
+
+    Args:
+        worlds: How many, the same ones each time.
+        seed: Of the sensors' noise.
+        on_share: Called with the share done.
+        settings: What else is changed in `push_recovery`.
+
+    Returns:
+        Mean errors by plant and observer; the gain of the observer's friction model on both plants, and how much of
+        the gain on the rig that rubs is not had on the one that does not.
+    """
+    found = {}
+    for knows in (False, True):
+        observer = f"observer.friction_n_m={FRICTION_N_M if knows else 0.0}"
+        experiment = push_recovery("homogeneous", seed, [observer, *settings])
+        rigs = on_rigs(experiment, worlds, "tilt_friction_n_m", (0.0, FRICTION_N_M))
+        found[False, knows], found[True, knows] = rigs
+        on_share(0.5 + 0.5 * knows)
+    means = {
+        f"{WITH[rubs]}_friction_in_the_plant_{WITH[knows]}_in_the_observer_rad_s": found[rubs, knows].mean(ERROR)
+        for rubs in (False, True)
+        for knows in (False, True)
+    }
+    values = {key: result.values(ERROR) for key, result in found.items()}
+    gains = {f"gain_{WITH[rubs]}_friction_rad_s": gain(values[rubs, False], values[rubs, True]) for rubs in WITH}
+    due = (values[True, False] - values[True, True]) - (values[False, False] - values[False, True])
+    return means | gains | {"gain_due_to_friction_rad_s": known_interval(due), "worlds": worlds, "seed": seed}
+
+
+def friction_claim(figures: dict[str, Any]) -> Claim:
+    """The claim.
+
+    Args:
+        figures: What `friction` found.
+
+    Returns:
+        It holds if knowing the friction brings something beyond the damping.
+    """
+    smooth, rubbing, due = (figures[f"gain_{which}_friction_rad_s"] for which in (*WITH.values(), "due_to"))
+    errors = (figures[f"with_friction_in_the_plant_{knows}_in_the_observer_rad_s"] for knows in WITH.values())
+    before, after = (written(ERROR, error) for error in errors)
+    return Claim(
+        place="Future work of both papers: friction in the observer",
+        says="a friction model in the velocity estimator would reduce its modelling errors",
+        found=(
+            f"On a rig with {FRICTION_N_M:g} N m of dry friction on the tilt axis the same friction in (11) takes "
+            f"{_milli(rubbing)} off the velocity RMS error ({before} to {after} rad/s). But on a rig without it, it "
+            f"takes {_milli(smooth)} off as well: it also damps the estimate of a rate whose true value is small. What "
+            f"is due to knowing the friction is the difference, {_milli(due)}."
+        ),
+        holds=due is not None and due.low > 0.0,
+        conditions=(
+            "Most of the gain is damping that would help without any friction; push_recovery, e = 0.5 deg, 400 ug/rtHz."
+        ),
+        otherwise="What it takes off on the rig that rubs is, within chance, damping that helps without any friction.",
+        figures=figures,
+    )
+
+
+def _milli(interval: Interval | None) -> str:
+    if interval is None:
+        return "an unknown amount"
+    mean, low, high = (1e3 * value for value in interval)
+    return f"{mean:.2f}e-3 rad/s (95 %: {low:.2f} to {high:.2f})"

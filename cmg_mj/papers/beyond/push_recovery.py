@@ -1,0 +1,51 @@
+"""Many worlds of the scenario push_recovery on several rigs, and what one observer gains on another there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.intervals import Interval, known_interval
+from cmg_mj.scenario import load_scenario
+from cmg_mj.simulate import Result
+
+ERROR = "velocity_rms_error_rad_s"
+"""What is compared."""
+
+
+def push_recovery(kind: str, seed: int, settings: Sequence[str] = ()) -> Experiment:
+    """The scenario with an observer.
+
+    Args:
+        kind: The observer.
+        seed: Of the sensors' noise.
+        settings: What else is changed in the scenario.
+
+    Returns:
+        The experiment.
+    """
+    return prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], kind))
+
+
+def on_rigs(experiment: Experiment, worlds: int, field: str, values: Sequence[float]) -> list[Result]:
+    """The same worlds on rigs that differ in one setting, all in one batch.
+
+    Args:
+        experiment: The experiment; its own value of the setting does not count.
+        worlds: How many a rig; world i has the same noise on all.
+        field: The setting, a field of [plant].
+        values: Its value on each rig.
+
+    Returns:
+        A result a rig.
+    """
+    each = [value for value in values for _ in range(worlds)]
+    numbers = [*range(worlds)] * len(values)
+    return experiment.run_many(numbers, vary={field: each}, keep_trajectory=False).groups(len(values))
+
+
+def gain(before: np.ndarray, after: np.ndarray) -> Interval | None:
+    """By how much an error shrank, world by world, in those that stood both times; None if fewer than two did."""
+    return known_interval(before - after)
