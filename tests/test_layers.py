@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import cmg_mj
+from tests.observers.reference import PAPER
 
 PACKAGE = Path(cmg_mj.__file__).parent
 
@@ -127,11 +128,11 @@ def test_nothing_above_the_line_imports_mujoco() -> None:
 
 
 def test_every_observer_works_without_mujoco() -> None:
-    code = """
+    code = f"""
 import sys
 from cmg_mj.observers import OBSERVERS, Measurement, make_observer
 from cmg_mj.reduced import ReducedModel
-model = ReducedModel(0.061841, -1.9e-4, 11e-4, 314.0, 3.4531)
+model = {PAPER!r}
 for kind in OBSERVERS:
     observer = make_observer(kind, 0.005, model)
     observer.step(observer.init(Measurement(0.0, 0.0)), Measurement(0.01, 0.0), 0.0)

@@ -16,7 +16,7 @@ from scipy import stats
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import prepare
 from cmg_mj.scenario import load_scenario
-from cmg_mj.sensors import Accelerometer, Encoder, Fog, Ideal, SampledSensor, Sensors, normals
+from cmg_mj.sensors import Accelerometer, Encoder, Fog, Ideal, SampledSensor, normals
 from cmg_mj.tilt import RadialTilt
 
 G = 9.80665
@@ -66,7 +66,7 @@ def test_accelerometer_noise_is_density_times_root_of_half_the_rate(
 
 
 def test_accelerometer_noise_is_white() -> None:
-    """One-sided density of the mean of two halves of the band: 400 ug/rtHz in either."""
+    """One-sided density of the mean of two halves of the band: 400 ug/rtHz (MPU-6050) in either."""
     noise = readings(Accelerometer(counts_per_g=0.0), N)[:, 0]
     spectrum = 2.0 * np.abs(np.fft.rfft(noise)[1:-1]) ** 2 / (200.0 * N)  # (m/s^2)^2/Hz
     for half in np.array_split(spectrum, 2):
@@ -74,21 +74,9 @@ def test_accelerometer_noise_is_white() -> None:
         assert low < half.mean() / (400e-6 * 9.80665) ** 2 < high
 
 
-def test_default_sensors_are_those_of_the_data_sheets() -> None:
-    """MPU-6050: 400 ug/rtHz, 2 g, 16384 counts/g. AS5045: 12 bit. DSP-1750: 440 Hz, 490 deg/s."""
-    sensors = Sensors()
-    accelerometer, encoder, fog = sensors.accelerometer, sensors.encoder, sensors.fog
-    assert (accelerometer.rate_hz, accelerometer.noise_density_ug_rthz) == (200.0, 400.0)
-    assert (accelerometer.range_g, accelerometer.counts_per_g, accelerometer.bias_mg) == (2.0, 16384.0, (0.0, 0.0))
-    assert (encoder.rate_hz, encoder.counts_per_revolution) == (200.0, 4096.0)
-    assert (fog.rate_hz, fog.angle_random_walk_deg_rth, fog.bias_deg_h) == (200.0, 0.02, 0.0)
-    assert (fog.bandwidth_hz, fog.range_deg_s) == (440.0, 490.0)
-    assert accelerometer.latency_s == encoder.latency_s == fog.latency_s == 0.0
-
-
 def test_accelerometer_counts() -> None:
-    """16384 counts a g: readings are whole counts, and rounding adds step^2/12 to the variance."""
-    noise = readings(Accelerometer(counts_per_g=16384.0, noise_density_ug_rthz=400.0), N)[:, 0]
+    """16384 counts a g (MPU-6050): readings are whole counts, and rounding adds step^2/12 to the variance."""
+    noise = readings(Accelerometer(), N)[:, 0]
     counts = noise * 16384.0 / G
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
     coarse = readings(Accelerometer(counts_per_g=100.0, noise_density_ug_rthz=2000.0), N)[:, 0]
@@ -99,10 +87,9 @@ def test_accelerometer_counts() -> None:
 @pytest.mark.parametrize(("force", "shown"), [(5.0, 2.0), (-5.0, -2.0), (1.5, 1.5)])
 def test_accelerometer_saturates_at_its_range(force: float, shown: float) -> None:
     ideal = Ideal([force * G] * 4, [0.0, 0.0], 0.0)
-    for counts in (0.0, 16384.0):
-        sensor = Accelerometer(range_g=2.0, noise_density_ug_rthz=0.0, counts_per_g=counts)
+    for sensor in (Accelerometer(noise_density_ug_rthz=0.0), Accelerometer(range_g=2.0, **QUIET)):
         np.testing.assert_allclose(readings(sensor, 1, ideal=ideal)[0], shown * G, rtol=1e-12)
-    noisy = readings(Accelerometer(range_g=2.0), 500, ideal=ideal)
+    noisy = readings(Accelerometer(), 500, ideal=ideal)
     assert np.abs(noisy).max() <= 2.0 * G * (1.0 + 1e-12)
 
 
@@ -135,10 +122,11 @@ def test_accelerometer_bias_and_equilibrium_bias_move_the_loop_alike() -> None:
 # --- encoders ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("counts", [4096.0, 360.0])
-def test_encoder_shows_the_nearest_count(counts: float) -> None:
+@pytest.mark.parametrize(("encoder", "counts"), [(Encoder(), 2**12), (Encoder(counts_per_revolution=360.0), 360)])
+def test_encoder_shows_the_nearest_count(encoder: Encoder, counts: int) -> None:
+    """12 bits (AS5045), and another resolution."""
     step = 2.0 * math.pi / counts
-    measure = Encoder(counts_per_revolution=counts).meter()
+    measure = encoder.meter()
     for angle in np.linspace(-2.0, 2.0, 1001).tolist():
         shown = measure(Ideal((), [angle, 0.5 * angle], 0.0), ())
         for ideal, reading in zip((angle, 0.5 * angle), shown, strict=True):
@@ -165,7 +153,7 @@ def test_fog_angle_walks_randomly(walk_deg_rth: float, rate_hz: float) -> None:
 
 
 def test_fog_noise_of_one_sample() -> None:
-    """0.02 deg/rt(h) at 200 Hz: 8.23e-5 rad/s."""
+    """0.02 deg/rt(h) (DSP-1750) at 200 Hz: 8.23e-5 rad/s."""
     rate = readings(Fog(), N)[:, 0]
     assert_sigma(rate, 0.02 / 60.0 * math.pi / 180.0 * math.sqrt(200.0))
 
@@ -180,10 +168,17 @@ def test_fog_bias_and_range() -> None:
         assert readings(Fog(range_deg_s=2000.0, **quiet), 1, ideal=fast)[0, 0] == pytest.approx(rate)
 
 
-@pytest.mark.parametrize(("bandwidth_hz", "rate_hz"), [(440.0, 200.0), (10.0, 200.0), (10.0, 1000.0)])
-def test_fog_step_response(bandwidth_hz: float, rate_hz: float) -> None:
+@pytest.mark.parametrize(
+    ("given", "bandwidth_hz", "rate_hz"),
+    [
+        ({"rate_hz": 1000.0}, 440.0, 1000.0),  # DSP-1750
+        ({"bandwidth_hz": 10.0}, 10.0, 200.0),
+        ({"bandwidth_hz": 10.0, "rate_hz": 1000.0}, 10.0, 1000.0),
+    ],
+)
+def test_fog_step_response(given: dict, bandwidth_hz: float, rate_hz: float) -> None:
     """A first-order low-pass: 1 - exp(-2 pi f t), the step coming right after the sample at t = 0."""
-    measure = Fog(rate_hz=rate_hz, bandwidth_hz=bandwidth_hz, angle_random_walk_deg_rth=0.0).meter()
+    measure = Fog(angle_random_walk_deg_rth=0.0, **given).meter()
     shown = [measure(Ideal((), [], 0.0 if k == 0 else 1.0), (0.0,)) for k in range(30)]
     t = np.arange(30) / rate_hz
     np.testing.assert_allclose(shown, 1.0 - np.exp(-2.0 * math.pi * bandwidth_hz * t), rtol=1e-12, atol=1e-14)

@@ -14,17 +14,12 @@ from scipy.integrate import solve_ivp
 
 from cmg_mj.observers import Measurement, Observer, make_observer
 from cmg_mj.reduced import ReducedModel
+from tests import paper_model as paper
 
 DT = 0.005
 
-# aranovskiy2020 Table 1 and the closed forms below (2), with g = 9.81.
-J1 = 5.6e-4 + 13e-3 + 9.9e-4 + 2.62 * 0.19**2 / 2.0
-J2 = 2.6e-4 - 5.6e-4 + 11e-4 - 9.9e-4
-J_D = 11e-4
-OMEGA_D = 314.0
-GRAVITY_TORQUE = 2.62 * 9.81 * 0.19 / math.sqrt(2.0)
-
-PAPER = ReducedModel(J1, J2, J_D, OMEGA_D, GRAVITY_TORQUE)
+J1, J2, GRAVITY_TORQUE = paper.J1, paper.J2, paper.gravity_torque
+PAPER = ReducedModel(J1, J2, paper.J_d, paper.omega_d, GRAVITY_TORQUE)
 HEAVY = ReducedModel(J1=0.06, J2=0.05, J_d=2e-3, omega_d=150.0, gravity_torque=2.0)
 """A rig whose gimbal and flywheel matter, so that no term is small. In Table 1, J2 is 0.3 % of J1."""
 

@@ -43,7 +43,7 @@ def test_equals_the_continuous_observer(parameters: dict, L: tuple, model: Reduc
 def test_error_poles_are_those_of_table_II() -> None:
     """(s^2 + 20 s + 150 - m g l/(sqrt(2) J1)) (s + 20)."""
     poles = np.linalg.eigvals(observer("luenberger").error_matrix)  # type: ignore[attr-defined]
-    half = math.sqrt(100.0 - 150.0 + 3.4530979831684485 / 0.061841)
+    half = math.sqrt(100.0 - 150.0 + GRAVITY_TORQUE / J1)
     np.testing.assert_allclose(sorted(poles.real), [-20.0, -10.0 - half, -10.0 + half], rtol=1e-9)
     np.testing.assert_allclose(poles.imag, 0.0, atol=1e-12)
 
