@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from cmg_mj.papers.claim import Section
-from cmg_mj.papers.dao2023 import equations, figures, on_the_rig
+from cmg_mj.papers.dao2023 import as_printed, figures, identities, on_the_rig
 
 SECTIONS: list[Section] = [
-    Section("pendulum robot", 14.0, figures.run),
-    Section("equations", 7.0, equations.run),
-    Section("on the rig", 13.0, on_the_rig.run),
+    Section("pendulum robot", 14.0, figures.claims),
+    Section("equations (7) to (9)", 5.0, identities.claims),
+    Section("as printed", 2.0, as_printed.claims),
+    Section("on the rig", 13.0, on_the_rig.claims),
 ]

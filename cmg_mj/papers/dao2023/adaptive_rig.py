@@ -2,42 +2,43 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from cmg_mj.experiment import prepare
-from cmg_mj.plant import load_plant
 from cmg_mj.push import Push
 from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
+from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 
 DURATION_S, LATE_S = 10.0, 5.0
 
 
-def quiet(seed: int, *settings: str, pushes: Sequence[Push] = ()) -> Scenario:
-    """The scenario push_recovery for ten seconds, without its push."""
+def without_push(seed: int, *settings: str, pushes: Sequence[Push] = ()) -> Scenario:
+    """The scenario push_recovery for ten seconds, without its push, or with others."""
     scenario = load_scenario("push_recovery", [f"seed={seed}", f"duration_s={DURATION_S}", *settings])
     return scenario.model_copy(update={"push": list(pushes)})
 
 
-def run(scenario: Scenario, biases_deg: Sequence[float]) -> Trajectory:
-    """One world a bias, side by side.
+def run(scenario: Scenario, biases_deg: Sequence[float], **options: Any) -> Result:
+    """One world a bias, side by side; options are those of `simulate`."""
+    return prepare(scenario).run_many(len(biases_deg), vary={"equilibrium_bias_deg": biases_deg}, **options)
 
-    Args:
-        scenario: The experiment; its own bias does not count.
-        biases_deg: e in each world, (n_worlds,) [deg].
 
-    Returns:
-        What was recorded, (n_ticks, n_worlds).
-    """
-    plants = {bias: load_plant(dataclasses.replace(scenario.plant, equilibrium_bias_deg=bias)) for bias in biases_deg}
-    result = prepare(scenario).run_many(range(len(biases_deg)), plants=[plants[bias] for bias in biases_deg])
-    assert result.trajectory is not None
-    return result.trajectory
+def record(scenario: Scenario, biases_deg: Sequence[float]) -> Trajectory:
+    """What was recorded of one world a bias over seconds 5 to 10, (n_ticks, n_worlds)."""
+    trajectory = run(scenario, biases_deg).trajectory
+    assert trajectory is not None
+    return trajectory.between(LATE_S, DURATION_S)
+
+
+def errors(result: Result, key: str) -> np.ndarray:
+    """An error of every world, (n_worlds,); infinite for one that ended early."""
+    return np.nan_to_num(result.values(key), nan=np.inf)
 
 
 def rms_in_time(error: np.ndarray) -> np.ndarray:
@@ -54,33 +55,30 @@ def signed_biases(seed: int, worlds: int, low_deg: float = 0.3, high_deg: float 
 
 
 def learnt_bias(
-    seed: int, biases_deg: Sequence[float], accelerometer_bias_mg: tuple[float, float] = (0.0, 0.0)
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What `adaptive`, in the loop, finds of the bias.
+    seed: int,
+    biases_deg: Sequence[float],
+    accelerometer_bias_mg: tuple[float, float] = (0.0, 0.0),
+    *,
+    keep_trajectory: bool = False,
+) -> Result:
+    """Let `adaptive`, in the loop, find the bias.
 
     Args:
         seed: Of the sensors' noise.
         biases_deg: e in each world, (n_worlds,) [deg].
         accelerometer_bias_mg: Zero offsets of the inner and outer accelerometer's tangential axes [mg].
+        keep_trajectory: Whether to keep every tick.
 
     Returns:
-        Times (n_ticks,) [s], the estimate less e (n_ticks, n_worlds) [deg], and what should be found less e,
-        (n_worlds,) [deg].
+        The run, whose summaries have what should be found, what was found over seconds 5 to 10, and its RMS error.
     """
     setting = f"sensors.accelerometer.bias_mg=[{accelerometer_bias_mg[0]}, {accelerometer_bias_mg[1]}]"
-    scenario = quiet(seed, "observer.kind=adaptive", setting)
-    recorded = run(scenario, biases_deg)
-    e = np.radians(biases_deg)
-    plants = [load_plant(dataclasses.replace(scenario.plant, equilibrium_bias_deg=bias)) for bias in biases_deg]
-    apparent = np.array([plant.apparent_bias(scenario.sensors.accelerometer) for plant in plants])
-    estimate = recorded["estimate/adaptive/bias_rad"]
-    return recorded["time_s"], np.degrees(estimate - e), np.degrees(apparent - e)
+    return run(without_push(seed, "observer.kind=adaptive", setting), biases_deg, keep_trajectory=keep_trajectory)
 
 
 def bias_errors(seed: int, biases_deg: Sequence[float]) -> np.ndarray:
     """RMS error of the bias over seconds 5 to 10, (n_worlds,) [deg]."""
-    time, error, apparent = learnt_bias(seed, biases_deg)
-    return rms_in_time((error - apparent)[time >= LATE_S])
+    return errors(learnt_bias(seed, biases_deg), "bias_rms_error_deg")
 
 
 def velocity_errors(
@@ -97,12 +95,11 @@ def velocity_errors(
     Returns:
         Observer -> errors, (n_biases, worlds) [rad/s].
     """
-    each = [bias for bias in biases_deg for _ in range(worlds)]
+    each = np.repeat(biases_deg, worlds).tolist()
     found = {}
     for name in observers:
-        recorded = run(quiet(seed, f"observer.kind={name}"), each)
-        error = recorded[f"estimate/{name}/x2_rad_s"] - recorded["x2_rad_s"]
-        found[name] = rms_in_time(error).reshape(len(biases_deg), worlds)
+        result = run(without_push(seed, f"observer.kind={name}"), each, keep_trajectory=False)
+        found[name] = errors(result, "velocity_rms_error_rad_s").reshape(len(biases_deg), worlds)
     return found
 
 
@@ -132,24 +129,22 @@ def learnt_gait(
         `disturbance_n_m` and `bias_deg` of what the first finds.
     """
     pushes = gait(amplitude_n_m, frequency_hz)
-    found = {}
-    for name, hertz in (("knowing_rad_s", frequency_hz), ("not_knowing_rad_s", 0.0)):
-        settings = ("observer.kind=adaptive", f"observer.sinusoid_hz={hertz}")
-        recorded = run(quiet(seed, *settings, pushes=pushes), biases_deg)
-        late = recorded["time_s"] >= LATE_S
-        time = recorded["time_s"][late][:, None]
-        found[name] = rms_in_time((recorded["estimate/adaptive/x2_rad_s"] - recorded["x2_rad_s"])[late])
-        if hertz:
-            torque = amplitude_n_m * np.sin(2.0 * math.pi * frequency_hz * time)
-            found["disturbance_n_m"] = rms_in_time(recorded["estimate/adaptive/disturbance_n_m"][late] - torque)
-            estimate = recorded["estimate/adaptive/bias_rad"][late]
-            found["bias_deg"] = np.degrees(rms_in_time(estimate - np.radians(biases_deg)))
-    return found
+    knowing, blind = (
+        record(without_push(seed, "observer.kind=adaptive", f"observer.sinusoid_hz={hertz}", pushes=pushes), biases_deg)
+        for hertz in (frequency_hz, 0.0)
+    )
+    torque = amplitude_n_m * np.sin(2.0 * math.pi * frequency_hz * knowing["time_s"][:, None])
+    return {
+        "knowing_rad_s": rms_in_time(knowing["estimate/adaptive/x2_rad_s"] - knowing["x2_rad_s"]),
+        "disturbance_n_m": rms_in_time(knowing["estimate/adaptive/disturbance_n_m"] - torque),
+        "bias_deg": np.degrees(rms_in_time(knowing["estimate/adaptive/bias_rad"] - np.radians(biases_deg))),
+        "not_knowing_rad_s": rms_in_time(blind["estimate/adaptive/x2_rad_s"] - blind["x2_rad_s"]),
+    }
 
 
 def learnt_torque(seed: int, worlds: int, torque_n_m: float = 0.1, bias_deg: float = 0.5) -> np.ndarray:
     """RMS error over seconds 5 to 10 of a constant torque that acts from the start, e being known, (worlds,) [N m]."""
-    scenario = quiet(
+    scenario = without_push(
         seed,
         "observer.kind=adaptive",
         "observer.bias=false",
@@ -157,6 +152,5 @@ def learnt_torque(seed: int, worlds: int, torque_n_m: float = 0.1, bias_deg: flo
         f"observer.known_bias_deg={bias_deg}",
         pushes=[Push(start_s=0.0, duration_s=DURATION_S, torque_n_m=torque_n_m)],
     )
-    recorded = run(scenario, [bias_deg] * worlds)
-    late = recorded["time_s"] >= LATE_S
-    return rms_in_time(recorded["estimate/adaptive/torque_n_m"][late] - torque_n_m)
+    recorded = record(scenario, [bias_deg] * worlds)
+    return rms_in_time(recorded["estimate/adaptive/torque_n_m"] - torque_n_m)

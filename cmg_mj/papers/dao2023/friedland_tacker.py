@@ -12,15 +12,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 
-from cmg_mj.errors import InputError, shown
-from cmg_mj.papers.andrieu2009.bi_limit import require_positive
-
-SYMMETRIC = 1e-10  # relative asymmetry of a matrix that is symmetric but for rounding
+from cmg_mj.errors import InputError
+from cmg_mj.papers.dao2023.matrices import real, real_matrix, require_positive_definite, require_shape, solve, times
+from cmg_mj.papers.require import require_positive
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class System:
 
     def __post_init__(self) -> None:
         for name in ("A", "B0", "B2", "C2", "D20"):
-            object.__setattr__(self, name, _real(name, getattr(self, name)))
+            object.__setattr__(self, name, real(name, getattr(self, name)))
 
 
 class State(NamedTuple):
@@ -101,16 +100,16 @@ class FriedlandTacker:
     def __post_init__(self) -> None:
         object.__setattr__(self, "dt", require_positive("dt", self.dt))
         for name in ("Am", "Cm", "L", "Gamma", "Sigma"):
-            object.__setattr__(self, name, _matrix(name, getattr(self, name)))
+            object.__setattr__(self, name, real_matrix(name, getattr(self, name)))
         nm, p = self.Am.shape[-1], self.L.shape[-1]
-        _fit("Am", self.Am, (nm, nm), "square")
+        require_shape("Am", self.Am, (nm, nm), "square")
         if self.Am.ndim > 2 or self.Cm.ndim > 2:
             raise InputError("Am, Cm: all observers must share one exosystem, two matrices without leading dimensions")
-        _fit("Cm", self.Cm, (self.Cm.shape[0], nm), "(r, nm), a column an exosystem state of Am")
-        _fit("Gamma", self.Gamma, (nm, nm), "(nm, nm), as Am")
-        _fit("Sigma", self.Sigma, (p, p), "(p, p), p the columns of L")
+        require_shape("Cm", self.Cm, (self.Cm.shape[0], nm), "(r, nm), a column an exosystem state of Am")
+        require_shape("Gamma", self.Gamma, (nm, nm), "(nm, nm), as Am")
+        require_shape("Sigma", self.Sigma, (p, p), "(p, p), p the columns of L")
         for name in ("Gamma", "Sigma"):
-            _positive_definite(name, getattr(self, name))
+            require_positive_definite(name, getattr(self, name))
 
     @classmethod
     def conventional(cls, dt: float, L: np.ndarray, Gamma: np.ndarray, Sigma: np.ndarray) -> FriedlandTacker:
@@ -125,7 +124,7 @@ class FriedlandTacker:
         Returns:
             The observer; its T is the papers' Upsilon.
         """
-        r = _matrix("Gamma", Gamma).shape[-1]
+        r = real_matrix("Gamma", Gamma).shape[-1]
         return cls(dt, np.zeros((r, r)), np.eye(r), L, Gamma, Sigma)
 
     @property
@@ -161,14 +160,14 @@ class FriedlandTacker:
             ValueError: A vector or matrix does not fit.
         """
         n, p, _, nm = self.sizes.values()
-        y = _real("y", y)
-        x = np.zeros(n) if x is None else _real("x", x)
-        xm = np.zeros(nm) if xm is None else _real("xm", xm)
-        T = np.zeros((n, nm)) if T is None else _real("T", T)
-        _fit("y", y, (p,), "(p,), p the columns of L")
-        _fit("x", x, (n,), "(n,), n the rows of L")
-        _fit("xm", xm, (nm,), "(nm,), as Am")
-        _fit("T", T, (n, nm), "(n, nm), n the rows of L, nm those of Am")
+        y = real("y", y)
+        x = np.zeros(n) if x is None else real("x", x)
+        xm = np.zeros(nm) if xm is None else real("xm", xm)
+        T = np.zeros((n, nm)) if T is None else real("T", T)
+        require_shape("y", y, (p,), "(p,), p the columns of L")
+        require_shape("x", x, (n,), "(n,), n the rows of L")
+        require_shape("xm", xm, (nm,), "(nm,), as Am")
+        require_shape("T", T, (n, nm), "(n, nm), n the rows of L, nm those of Am")
         return State(x, xm, T, self.Gamma, y)
 
     def step(
@@ -199,10 +198,10 @@ class FriedlandTacker:
         Raises:
             ValueError: A matrix or vector does not fit.
         """
-        u, y = _real("u", u), _real("y", y)
-        L = self.L if L is None else _real("L", L)
-        C2 = system.C2 if C2 is None else _real("C2", C2)
-        D20 = system.D20 if D20 is None else _real("D20", D20)
+        u, y = real("u", u), real("y", y)
+        L = self.L if L is None else real("L", L)
+        C2 = system.C2 if C2 is None else real("C2", C2)
+        D20 = system.D20 if D20 is None else real("D20", D20)
         self._check(system, u, y, L, C2, D20)
         h = self.dt
         F, F_back, F_middle = self._turn
@@ -210,20 +209,20 @@ class FriedlandTacker:
 
         half = h / 2.0 * (system.A + L @ system.C2)
         W = (system.B0 + L @ system.D20) @ (self.Cm @ F_middle)
-        known = _times(system.B2, u) - _times(L, (y_before + y) / 2.0)
-        right_x = x + _times(half, x) + h * (_times(W, xm) + known)
+        known = times(system.B2, u) - times(L, (y_before + y) / 2.0)
+        right_x = x + times(half, x) + h * (times(W, xm) + known)
         right_T = T + half @ T + h * W
         left = np.eye(half.shape[-1]) - half
-        x = _solve(left, right_x)
+        x = solve(left, right_x)
         T = np.linalg.solve(left, right_T) @ F_back
-        xm = _times(F, xm)
+        xm = times(F, xm)
         P = F @ P @ F.T
 
         G = C2 @ T + D20 @ self.Cm
         gain = P @ np.swapaxes(G, -1, -2) @ self.Sigma  # -Lm
-        nu = _solve(np.eye(y.shape[-1]) + h * (G @ gain), _times(C2, x) + _times(D20 @ self.Cm, xm) - y)
-        step = -h * _times(gain, nu)
-        return State(x + _times(T, step), xm + step, T, P, y)
+        nu = solve(np.eye(y.shape[-1]) + h * (G @ gain), times(C2, x) + times(D20 @ self.Cm, xm) - y)
+        step = -h * times(gain, nu)
+        return State(x + times(T, step), xm + step, T, P, y)
 
     def require_hurwitz(self, system: System) -> None:
         """Refuse a gain with which A + L C2 is not Hurwitz.
@@ -238,8 +237,8 @@ class FriedlandTacker:
             ValueError: A or C2 does not fit, or an eigenvalue of A + L C2 is not in the open left half plane.
         """
         n, p, _, _ = self.sizes.values()
-        _fit("A", system.A, (n, n), "(n, n), n the rows of L")
-        _fit("C2", system.C2, (p, n), "(p, n), the shape of L transposed")
+        require_shape("A", system.A, (n, n), "(n, n), n the rows of L")
+        require_shape("C2", system.C2, (p, n), "(p, n), the shape of L transposed")
         poles = np.linalg.eigvals(system.A + self.L @ system.C2)
         worst = poles.ravel()[np.argmax(poles.real)]
         if worst.real >= 0.0:
@@ -265,7 +264,8 @@ class FriedlandTacker:
         A, B0, B2, C2, D20 = system.A, system.B0, system.B2, system.C2, system.D20
         Am, Cm, L = self.Am, self.Cm, self.L
         n, nm = T.shape
-        Lm = -expm(Am * t) @ self.Gamma @ expm(Am.T * t) @ (C2 @ T + D20 @ Cm).T @ self.Sigma  # (9)
+        turn = expm(Am * t)
+        Lm = -turn @ self.Gamma @ turn.T @ (C2 @ T + D20 @ Cm).T @ self.Sigma  # (9)
         augmented_A = np.block([[A, B0 @ Cm], [np.zeros((nm, n)), Am]])
         augmented_B = np.vstack([B2, np.zeros((nm, B2.shape[1]))])
         augmented_C = np.hstack([C2, D20 @ Cm])
@@ -284,61 +284,14 @@ class FriedlandTacker:
         D20: np.ndarray,
     ) -> None:
         n, p, r, _ = self.sizes.values()
-        _fit("A", system.A, (n, n), "(n, n), n the rows of L")
-        _fit("B0", system.B0, (n, r), "(n, r), n the rows of L, r those of Cm")
+        require_shape("A", system.A, (n, n), "(n, n), n the rows of L")
+        require_shape("B0", system.B0, (n, r), "(n, r), n the rows of L, r those of Cm")
         m = system.B2.shape[-1] if system.B2.ndim > 1 else 0
-        _fit("B2", system.B2, (n, m), "(n, m), n the rows of L")
-        _fit("u", u, (m,), "(m,), m the columns of B2")
-        _fit("y", y, (p,), "(p,), p the columns of L")
+        require_shape("B2", system.B2, (n, m), "(n, m), n the rows of L")
+        require_shape("u", u, (m,), "(m,), m the columns of B2")
+        require_shape("y", y, (p,), "(p,), p the columns of L")
         for matrix in (system.C2, C2):
-            _fit("C2", matrix, (p, n), "(p, n), the shape of L transposed")
+            require_shape("C2", matrix, (p, n), "(p, n), the shape of L transposed")
         for matrix in (system.D20, D20):
-            _fit("D20", matrix, (p, r), "(p, r), p the columns of L, r the rows of Cm")
-        _fit("L", L, (n, p), "(n, p), as the L of the construction")
-
-
-def _fit(name: str, value: np.ndarray, shape: tuple[int, ...], words: str) -> None:
-    """Refuse what does not end in this shape."""
-    if np.shape(value)[-len(shape) :] != shape:
-        raise InputError(f"{name}: must have the shape {shape}, {words}; it has {np.shape(value)}")
-
-
-def _real(name: str, value: Any) -> np.ndarray:
-    """As an array of floats; refuse what is not real numbers."""
-    try:
-        array = np.asarray(value)
-    except ValueError as error:  # rows of different lengths
-        raise InputError(f"{name}: must be an array of real numbers, with rows of one length") from error
-    if array.dtype.kind not in "iuf":
-        raise InputError(f"{name} = {shown(value)}: must be real numbers, not {array.dtype}".replace("\n", ""))
-    return array.astype(float, copy=False)
-
-
-def _matrix(name: str, value: Any) -> np.ndarray:
-    """The same with at least two dimensions, and finite."""
-    matrix = _real(name, value)
-    if matrix.ndim < 2 or not np.isfinite(matrix).all():
-        what = f"not of shape {matrix.shape}" if matrix.ndim else f"not a scalar; for one number write [[{matrix:g}]]"
-        raise InputError(f"{name}: must be a matrix of finite numbers, {what}")
-    return matrix
-
-
-def _positive_definite(name: str, matrix: np.ndarray) -> None:
-    mirrored = np.swapaxes(matrix, -1, -2)
-    if np.abs(matrix - mirrored).max() > SYMMETRIC * np.abs(matrix).max():
-        raise InputError(f"{name}: must be symmetric and positive definite; it is not symmetric")
-    least = float(np.linalg.eigvalsh((matrix + mirrored) / 2.0).min())
-    if least <= 0.0:
-        raise InputError(f"{name}: must be symmetric and positive definite; its least eigenvalue is {least:.3g}")
-
-
-def _times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Matrix times vector, (..., a, b) and (..., b) -> (..., a)."""
-    return (matrix @ vector[..., None])[..., 0]
-
-
-def _solve(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Solve for one right-hand side, (..., a, a) and (..., a) -> (..., a)."""
-    if matrix.shape[-1] == 1:
-        return vector / matrix[..., 0]
-    return np.linalg.solve(matrix, vector[..., None])[..., 0]
+            require_shape("D20", matrix, (p, r), "(p, r), p the columns of L, r the rows of Cm")
+        require_shape("L", L, (n, p), "(n, p), as the L of the construction")

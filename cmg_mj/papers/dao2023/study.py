@@ -1,0 +1,80 @@
+"""The simulations behind Figs 2 and 3: some motions of the pendulum robot, followed by both observers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmg_mj.papers.claim import OnShare
+from cmg_mj.papers.dao2023 import paper
+from cmg_mj.papers.dao2023 import pendulum_robot as robot
+
+SIGMAS = (*paper.SIGMAS, 10_000.0)
+"""The paper's three weights, in the order of Fig. 3, and one beyond."""
+
+SETTLED = 0.1
+"""Settled: the errors of theta1, theta2 and d, as a vector of their numbers in the units of Fig. 3, stay below this."""
+
+UNSTATED = (
+    "The paper gives neither time span nor initial values: ten motions with angles within half a turn and rates within "
+    "2 rad/s, observers started from zero, 200 s, with the corrected L = -[1; 1]."
+)
+
+
+@dataclass(frozen=True)
+class Study:
+    """The arm's motions and what the observers made of them.
+
+    Attributes:
+        proposed: Errors with each of `SIGMAS`.
+        conventional: Errors at Sigma = 10.
+        largest_angle: The largest |q| [rad].
+    """
+
+    proposed: robot.Errors
+    conventional: robot.Errors
+    largest_angle: float
+
+
+def study(
+    seed: int = 0,
+    motions: int = 10,
+    duration_s: float = 200.0,
+    rates_hz: tuple[float, float] = (400.0, 200.0),
+    on_share: OnShare = lambda share: None,
+) -> Study:
+    """Let both observers follow the arm.
+
+    Args:
+        seed: Of the initial values.
+        motions: How many.
+        duration_s: How long [s].
+        rates_hz: Sample rates of the proposed and of the conventional observer [Hz].
+        on_share: Called with the share done.
+
+    Returns:
+        All errors.
+    """
+    start = robot.starts(seed, motions)
+    t = [np.arange(round(duration_s * rate) + 1) / rate for rate in rates_hz]
+    x = [robot.motion(start, times) for times in t]
+    proposed = robot.follow(robot.proposed(1.0 / rates_hz[0], SIGMAS), t[0], x[0], lambda s: on_share(0.1 + 0.65 * s))
+    plain = robot.follow(robot.conventional(1.0 / rates_hz[1]), t[1], x[1], lambda s: on_share(0.75 + 0.25 * s))
+    return Study(proposed, plain, float(np.abs(x[0][..., 0]).max()))
+
+
+def exogenous_settle_times(errors: robot.Errors, band: float = SETTLED) -> np.ndarray:
+    """When the errors of theta1, theta2 and d settle, (n_sigmas, n) [s]; infinite if they do not."""
+    return robot.settle_times(np.linalg.norm(errors.exogenous, axis=-1), errors.t, band)
+
+
+def words_of_time(time: float) -> str:
+    """A settling time in words."""
+    return f"{time:.0f} s" if math.isfinite(time) else "not within 200 s"
+
+
+def known_times(times: np.ndarray) -> list[float | None]:
+    """Settling times as JSON can hold them."""
+    return [float(time) if math.isfinite(time) else None for time in times]
