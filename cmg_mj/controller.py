@@ -20,6 +20,39 @@ Feedback = Literal["observer", "fog", "truth"]
 Angles = Literal["measured", "estimated"]
 
 
+CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s"})
+"""Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
+
+
+def trim_of(trim_s: float, law: Law, extra_signals: Sequence[str]) -> tuple[int, float]:
+    """How the integrator is trimmed by the observer's estimate of the bias.
+
+    Args:
+        trim_s: For how long [s]; 0 for not at all.
+        law: The law, whose integrator settles at k_e1/k_e4 e.
+        extra_signals: What the observer estimates beyond x.
+
+    Returns:
+        Which part of the estimate is the bias, and the gain on it.
+
+    Raises:
+        InputError: It cannot be trimmed.
+    """
+    if not (isinstance(trim_s, (int, float)) and trim_s >= 0.0):
+        raise InputError(f"controller.trim_s = {trim_s!r}: must be a number greater than or equal to 0")
+    if not trim_s:
+        return 0, 0.0
+    k1, _, _, k4 = law.gains
+    if BIAS not in extra_signals:
+        raise InputError(
+            f"controller.trim_s = {trim_s:g}: needs an observer in the loop that estimates the bias, "
+            "such as adaptive; or set controller.trim_s=0"
+        )
+    if k4 == 0.0:
+        raise InputError(f"controller.trim_s = {trim_s:g}: the gain on the integrator is zero")
+    return 3 + list(extra_signals).index(BIAS), k1 / k4
+
+
 class Tick(NamedTuple):
     """All that one control period measured and decided (floats, or arrays (n_worlds,))."""
 
@@ -120,30 +153,12 @@ class Controller:
         self._observers: list[Observer] = []
         self.extra_signals = [_extra_signals(o) for o in (observer, *self.companions.values())]
         self._widths = [3 + len(names) for names in self.extra_signals]
-        self.trim_s = trim_s
-        self._prepare_trim()
+        self._trim_part, self._trim_gain = trim_of(trim_s, law, self.extra_signals[0])
+        self._trimmed_until = whole_steps(trim_s, timestep, "controller.trim_s", f"{trim_s:g} s")
         # y2 = sum of share * encoder - offset: half the difference of the encoders of a scissored pair.
         self._shares = [direction / len(self.directions) for direction in self.directions]
         self._offset = sum(share * zero for share, zero in zip(self._shares, self.gimbal_zero, strict=True))
         self.reset()
-
-    def _prepare_trim(self) -> None:
-        """Until which step the integrator is trimmed, with what gain on which part of the estimate."""
-        self._trimmed_until = 0
-        if not (isinstance(self.trim_s, (int, float)) and self.trim_s >= 0.0):
-            raise InputError(f"controller.trim_s = {self.trim_s!r}: must be a number greater than or equal to 0")
-        if not self.trim_s:
-            return
-        self._trimmed_until = whole_steps(self.trim_s, self.timestep, "controller.trim_s", f"{self.trim_s:g} s")
-        k1, _, _, k4 = self.law.gains
-        if BIAS not in self.extra_signals[0]:
-            raise InputError(
-                f"controller.trim_s = {self.trim_s:g}: needs an observer in the loop that estimates the bias, "
-                "such as adaptive; or set controller.trim_s=0"
-            )
-        if k4 == 0.0:
-            raise InputError(f"controller.trim_s = {self.trim_s:g}: the gain on the integrator is zero")
-        self._trim_part, self._trim_gain = 3 + self.extra_signals[0].index(BIAS), k1 / k4
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""

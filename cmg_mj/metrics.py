@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -33,31 +33,33 @@ class Metrics:
 
     Args:
         observers: The observer in the loop, then the companions.
-        biases: What an observer of the bias should find in each world, (n_worlds,) [rad].
+        n_worlds: How many worlds.
         dt: Control period [s].
         push_end_s: End of the last push, 0 without one [s].
         rate_limit: Largest gimbal rate [rad/s].
         settings: The settle band.
+        targets: Extra signal -> what an observer that estimates it should find in each world, (n_worlds,); in rad.
     """
 
     def __init__(
         self,
         observers: Sequence[str],
-        biases: Sequence[float],
+        n_worlds: int,
         dt: float,
         push_end_s: float,
         rate_limit: float,
         settings: MetricsSettings,
+        targets: Mapping[str, Sequence[float]] | None = None,
     ) -> None:
         self.observers = list(observers)
         self._dt = dt
         self._push_end = push_end_s
         self._limit = rate_limit
         self._band = math.radians(settings.settle_band_deg)
-        n_worlds = len(biases)
-        self._biases = np.array(biases)
-        self._bias_from = settings.bias_from_s
-        self._bias_sums: dict[str, np.ndarray] = {}  # observer -> count, sum, squared error, (3, n_worlds)
+        self._targets = {signal: np.array(values) for signal, values in (targets or {}).items()}
+        self._judged_from = settings.bias_from_s
+        # (observer, signal) -> count, sum, squared error, (3, n_worlds)
+        self._found: dict[tuple[str, str], np.ndarray] = {}
         self._ticks = 0
         self._count = np.zeros(n_worlds)
         self._squares = {name: np.zeros(n_worlds) for name in ("tilt", "command")}
@@ -75,7 +77,7 @@ class Metrics:
         x3: np.ndarray,
         u: np.ndarray,
         fog: np.ndarray,
-        rates: Sequence[np.ndarray],
+        estimates: Sequence[Mapping[str, np.ndarray]],
     ) -> None:
         """Add the next ticks.
 
@@ -85,7 +87,7 @@ class Metrics:
             x3: True gimbal angle, (n_rows, n_worlds) [rad].
             u: Command, (n_rows, n_worlds) [rad/s].
             fog: The gyro's rate, (n_rows, n_worlds) [rad/s].
-            rates: Each observer's estimate of x2, (n_rows, n_worlds) [rad/s].
+            estimates: Each observer's estimates by their names, `x2_rad_s` among them, (n_rows, n_worlds).
         """
         counted = np.isfinite(x1)
         tick = self._ticks + np.arange(len(x1))[:, None]
@@ -93,48 +95,44 @@ class Metrics:
         self._count += counted.sum(axis=0)
         self._squares["tilt"] += _sum_of_squares(x1, counted)
         self._squares["command"] += _sum_of_squares(u, counted)
-        for name, rate in zip(self.observers, rates, strict=True):
-            self._errors[name] += _sum_of_squares(rate - x2, counted)
-            self._fog_errors[name] += _sum_of_squares(rate - fog, counted)
+        judged = counted & (tick * self._dt >= self._judged_from - 1e-9)
+        for name, estimate in zip(self.observers, estimates, strict=True):
+            self._errors[name] += _sum_of_squares(estimate["x2_rad_s"] - x2, counted)
+            self._fog_errors[name] += _sum_of_squares(estimate["x2_rad_s"] - fog, counted)
+            for signal in self._targets.keys() & estimate.keys():
+                self._add_found(name, signal, estimate[signal], judged)
         self._saturated += (counted & (np.abs(u) >= self._limit)).sum(axis=0)
         self._gimbal_peak = np.maximum(self._gimbal_peak, np.where(counted, np.abs(x3), 0.0).max(axis=0, initial=0.0))
         outside = counted & (np.abs(x1) > self._band)
         self._last_outside = np.maximum(self._last_outside, np.where(outside, tick, -1).max(axis=0, initial=-1))
         self._last_tick = np.maximum(self._last_tick, np.where(counted, tick, -1).max(axis=0, initial=-1))
 
-    def update_bias(self, x1: np.ndarray, biases: Sequence[np.ndarray | None]) -> None:
-        """Add the bias estimates of the ticks that `update` was just given.
+    def _add_found(self, name: str, signal: str, values: np.ndarray, judged: np.ndarray) -> None:
+        sums = self._found.setdefault((name, signal), np.zeros((3, len(self._count))))
+        sums[0] += judged.sum(axis=0)
+        sums[1] += np.where(judged, values, 0.0).sum(axis=0)
+        sums[2] += _sum_of_squares(values - self._targets[signal], judged)
 
-        Args:
-            x1: True tilt, (n_rows, n_worlds) [rad].
-            biases: Each observer's estimate of e, (n_rows, n_worlds) [rad]; None for one that has none.
-        """
-        tick = self._ticks - len(x1) + np.arange(len(x1))[:, None]
-        counted = np.isfinite(x1) & (tick * self._dt >= self._bias_from - 1e-9)
-        for name, bias in zip(self.observers, biases, strict=True):
-            if bias is not None:
-                sums = self._bias_sums.setdefault(name, np.zeros((3, len(self._biases))))
-                sums[0] += counted.sum(axis=0)
-                sums[1] += np.where(counted, bias, 0.0).sum(axis=0)
-                sums[2] += _sum_of_squares(bias - self._biases, counted)
+    def _found_summary(self, name: str, world: int) -> dict[str, float | None]:
+        """Of each signal what was to be found, the mean estimate and its RMS error; None if the run ended too early."""
+        summary = {}
+        for (observer, signal), sums in self._found.items():
+            if observer == name:
+                n, total, squares = sums[:, world]
+                what = signal.removesuffix("_rad")
+                summary |= {
+                    f"{what}_deg": math.degrees(self._targets[signal][world]),
+                    f"{what}_estimate_deg": _number(math.degrees(total / n)) if n else None,
+                    f"{what}_rms_error_deg": _number(math.degrees(math.sqrt(squares / n))) if n else None,
+                }
+        return summary
 
-    def _bias_summary(self, name: str, world: int) -> dict[str, float | None]:
-        """What was to be found, the mean estimate and its RMS error; None for these if the run ended too early."""
-        if name not in self._bias_sums:
-            return {}
-        n, total, squares = self._bias_sums[name][:, world]
-        return {
-            "bias_deg": math.degrees(self._biases[world]),
-            "bias_estimate_deg": _number(math.degrees(total / n)) if n else None,
-            "bias_rms_error_deg": _number(math.degrees(math.sqrt(squares / n))) if n else None,
-        }
-
-    def summary(self, world: int, fell: bool) -> dict[str, Any]:
+    def summary(self, world: int, stood: bool) -> dict[str, Any]:
         """The numbers of one world.
 
         Args:
             world: Its index.
-            fell: Whether it fell: then it never settled.
+            stood: Whether it stood to the end; otherwise it never settled.
 
         Returns:
             Values by the names that `--json` prints; None where there is no such number.
@@ -150,27 +148,27 @@ class Metrics:
             name: {
                 "velocity_rms_error_rad_s": rms(self._errors[name]),
                 "velocity_rms_error_fog_rad_s": rms(self._fog_errors[name]),
-                **self._bias_summary(name, world),
+                **self._found_summary(name, world),
             }
             for name in self.observers[1:]
         }
         return {
-            "settle_time_s": self._settle_time(world, fell),
+            "settle_time_s": self._settle_time(world, stood),
             "velocity_rms_error_rad_s": rms(self._errors[loop]),
             "velocity_rms_error_fog_rad_s": rms(self._fog_errors[loop]),
             "tilt_rms_deg": None if tilt is None else math.degrees(tilt),
             "gimbal_peak_deg": math.degrees(self._gimbal_peak[world]) if n else None,
             "command_rms_rad_s": rms(self._squares["command"]),
             "command_saturated_fraction": float(self._saturated[world] / n) if n else None,
-            **self._bias_summary(loop, world),
+            **self._found_summary(loop, world),
             **({"companions": companions} if companions else {}),
         }
 
-    def _settle_time(self, world: int, fell: bool) -> float | None:
+    def _settle_time(self, world: int, stood: bool) -> float | None:
         """From the end of the last push until |x1| stays inside the band to the end [s]; None if it does not."""
         end = float(self._last_tick[world] * self._dt)
         first_inside = float((self._last_outside[world] + 1) * self._dt)
-        if fell or self._last_tick[world] < 0 or first_inside > end + 1e-9 or end < self._push_end:
+        if not stood or self._last_tick[world] < 0 or first_inside > end + 1e-9 or end < self._push_end:
             return None
         return max(0.0, first_inside - self._push_end)
 

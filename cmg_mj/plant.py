@@ -1,9 +1,8 @@
-"""MJCF -> compiled model: load, vary, resolve names once, read the reduced model's parameters off it."""
+"""The rig: a compiled model with its names resolved once, and the reduced model's parameters read off it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass as plain_dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,10 +13,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from cmg_mj.complaint import complaint
-from cmg_mj.controller import Angles, Controller, Feedback
+from cmg_mj.controller import CONTROLLER_OPTIONS, Controller
 from cmg_mj.elementwise import Scalar
 from cmg_mj.engine import control_callback, quiet
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, nearest
+from cmg_mj.known_rigs import RigFacts
 from cmg_mj.law import Law
 from cmg_mj.mjcf import KEYFRAME, compile_model, lock_thrust_bearing, parse
 from cmg_mj.observers import Observer, make_observer
@@ -26,6 +26,7 @@ from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
 from cmg_mj.sensors import Accelerometer, Ideal, Sensors
 from cmg_mj.tilt import RadialTilt
+from cmg_mj.variations import vary
 
 QUARTER_TURN = math.pi / 2.0
 UPRIGHT = math.cos(math.radians(30.0))  # sensors farther off than this are mounted otherwise, not inaccurately
@@ -82,7 +83,14 @@ class Plant:
         self.model = compile_model(spec, path)
         self._resolve()
         self.reduced = self._read_reduced()
-        self._vary()
+        vary(
+            self.model,
+            settings,
+            path,
+            tilt=self.tilt,
+            gimbals=self._gimbals,
+            flywheels=[cube.flywheel for cube in self.cubes],
+        )
 
     # --- names ---------------------------------------------------------------------------------------------
 
@@ -111,7 +119,7 @@ class Plant:
         self._specific_forces = [address + axis for address, _ in self._accelerometers for axis in (0, 2)]
 
     def _id(self, kind: str, name: str) -> int:
-        """Address of an element that `_require` has found."""
+        """Address of an element that `mjcf.require` has found."""
         return int(mujoco.mj_name2id(self.model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
 
     def _accelerometer(self, name: str) -> tuple[int, float]:
@@ -182,56 +190,6 @@ class Plant:
             )
         return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n)
 
-    # --- variations ----------------------------------------------------------------------------------------
-
-    def _vary(self) -> None:
-        model, settings = self.model, self.settings
-        model.opt.timestep = settings.timestep_s
-        model.opt.integrator = _INTEGRATORS[settings.integrator]
-        # A plant that diverges must say so, not start again from its reference pose.
-        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-        gimbals = self._gimbals
-        for field, joints, value in (
-            (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),
-            (model.dof_frictionloss, gimbals, settings.gimbal_friction_n_m),
-            (model.dof_damping, gimbals, settings.gimbal_damping_n_m_s),
-            (model.dof_frictionloss, [self.tilt], settings.tilt_friction_n_m),
-            (model.dof_damping, [self.tilt], settings.tilt_damping_n_m_s),
-        ):
-            if value is not None:
-                field[joints] = value
-        if self.bias:
-            self._shift(self.frame, self._bias_shift())
-        if settings.flywheel_imbalance_kg_m:
-            for cube in self.cubes:
-                body = int(model.jnt_bodyid[cube.flywheel])
-                self._shift(body, np.array([settings.flywheel_imbalance_kg_m / model.body_mass[body], 0.0, 0.0]))
-        mujoco.mj_setConst(model, mujoco.MjData(model))
-
-    def _bias_shift(self) -> np.ndarray:
-        """How far the frame's centre of mass moves so that the whole rig's turns about the pivot by e [m], (3,).
-
-        The first moment of all that tilts is turned, not lengthened: gravity's torque keeps its amplitude.
-        """
-        model = self.model
-        if model.body_mass[self.frame] <= 0.0:
-            raise InputError(
-                f"plant.equilibrium_bias_deg: {self.path}: the body with the joint 'tilt' needs a mass of its own to "
-                "move (give the model's compiler fusestatic=\"true\", so that the cubes' halves become part of it)"
-            )
-        data = mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, data, self.key)
-        mujoco.mj_forward(model, data)
-        to_frame = data.xmat[self.frame].reshape(3, 3).T
-        centre = to_frame @ (data.subtree_com[self.frame] - data.xanchor[self.tilt])
-        c, s = math.cos(self.bias), math.sin(self.bias)
-        turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-        return model.body_subtreemass[self.frame] / model.body_mass[self.frame] * (turn @ centre - centre)
-
-    def _shift(self, body: int, offset: np.ndarray) -> None:
-        """Move a body's centre of mass (mj_setConst, called once at the end, makes what follows from it)."""
-        self.model.body_ipos[body] += offset
-
     # --- running -------------------------------------------------------------------------------------------
 
     def controller(
@@ -240,13 +198,7 @@ class Plant:
         *,
         law: Law | None = None,
         sensors: Sensors | None = None,
-        seed: int = 0,
-        worlds: int | Sequence[int] = 0,
-        feedback: Feedback = "observer",
-        angles: Angles = "measured",
-        companions: Mapping[str, Observer] | None = None,
-        trim_s: float = 0.0,
-        **parameters: Any,
+        **options: Any,
     ) -> Controller:
         """A fresh controller for this rig.
 
@@ -254,13 +206,8 @@ class Plant:
             observer: An observer, or its name (or package.module:Class).
             law: The law; by default Table 2's gains at 200 Hz.
             sensors: The sensors; by default those of the datasheets.
-            seed: Seed of the sensors' noise.
-            worlds: The number of one world, or the numbers of many: noise depends on (seed, number) alone.
-            feedback: Which rate the law uses: the observer's, the gyro's (`fog`) or the true one (`truth`).
-            angles: Whether the law uses the measured or the estimated angles.
-            companions: Observers that ride along open loop, by name.
-            trim_s: For so long the integrator is held where the observer's bias estimate asks for it [s].
-            **parameters: The observer's parameters, if it is given by name.
+            **options: Options of `Controller`, such as seed, feedback and companions; whatever else is given is a
+                parameter of the observer, if that is given by name.
 
         Returns:
             The controller.
@@ -269,8 +216,12 @@ class Plant:
             InputError: The observer does not exist or refuses a parameter, or a rate does not fit the physics step.
         """
         law = law or Law(dt=0.005)
+        parameters = {name: options.pop(name) for name in options.keys() - CONTROLLER_OPTIONS}
         if isinstance(observer, str):
             observer = make_observer(observer, law.dt, self.reduced, **parameters)
+        elif parameters:
+            name = next(iter(parameters))
+            raise InputError(f"controller({name}=...): no such option; {nearest(name, CONTROLLER_OPTIONS)}")
         return Controller(
             observer,
             law,
@@ -279,13 +230,13 @@ class Plant:
             directions=self.directions,
             gimbal_zero=[cube.gimbal_zero for cube in self.cubes],
             timestep=self.model.opt.timestep,
-            seed=seed,
-            worlds=worlds,
-            feedback=feedback,
-            angles=angles,
-            companions=companions,
-            trim_s=trim_s,
+            **options,
         )
+
+    @property
+    def facts(self) -> RigFacts:
+        """What a scenario's controller and observers are made from."""
+        return RigFacts(self.path, tuple(cube.name for cube in self.cubes), self.reduced)
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
         """What an observer of the bias should find: e less the tilt that the accelerometers' own bias makes.
@@ -346,15 +297,6 @@ class Plant:
     def joint_names(self) -> list[str]:
         """Names of the joints in the order of qpos."""
         return [self.model.joint(i).name for i in range(self.model.njnt)]
-
-
-_INTEGRATORS = {
-    "RK4": int(mujoco.mjtIntegrator.mjINT_RK4),
-    "Euler": int(mujoco.mjtIntegrator.mjINT_EULER),
-    "implicit": int(mujoco.mjtIntegrator.mjINT_IMPLICIT),
-    "implicitfast": int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST),
-    "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
-}
 
 
 @quiet()

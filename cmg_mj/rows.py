@@ -10,9 +10,8 @@ import numpy as np
 from cmg_mj.controller import Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.metrics import Metrics
-from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
-from cmg_mj.trajectory import Trajectory, column_names
+from cmg_mj.trajectory import ESTIMATES, Layout, Trajectory
 
 TICKS_A_PIECE = 256
 """So many ticks wait until they are made into columns together, which is much cheaper than one by one."""
@@ -44,8 +43,8 @@ class Rows:
     ) -> None:
         self._rig = plants[0]
         self._bias = np.array([plant.bias for plant in plants])
-        self._names = column_names(observers, extras, self._rig.joint_names)
-        self._bias_parts = [3 + list(names).index(BIAS) if BIAS in names else None for names in extras]
+        self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), tuple(self._rig.joint_names))
+        self._estimated = [(*ESTIMATES, *names) for names in extras]
         self._metrics = metrics
         self._dt = dt
         self._keep = keep
@@ -91,9 +90,8 @@ class Rows:
         ended = None if self._single else ~np.array(runnings)
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)
-        self._metrics.update(x1, x2, x3, u, fog, [parts[1] for parts in estimated])
-        biases = zip(self._bias_parts, estimated, strict=True)
-        self._metrics.update_bias(x1, [None if part is None else parts[part] for part, parts in biases])
+        named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
+        self._metrics.update(x1, x2, x3, u, fog, named)
         if self._keep:
             columns = [
                 x1,
@@ -125,10 +123,11 @@ class Rows:
         if not self._keep:
             return None
         columns = {}
-        for i, name in enumerate(self._names):
+        names = self._layout.columns()
+        for i, name in enumerate(names):
             whole = (
                 np.concatenate([piece[i] for piece in self._pieces]) if self._pieces else np.zeros((0, len(self._bias)))
             )
             columns[name] = whole[:, 0] if self._single else whole
-        n_ticks = len(columns[self._names[0]])
-        return Trajectory({"time_s": np.arange(n_ticks) * self._dt, **columns})
+        n_ticks = len(columns[names[0]])
+        return Trajectory({"time_s": np.arange(n_ticks) * self._dt, **columns}, self._layout)

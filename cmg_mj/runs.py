@@ -6,19 +6,19 @@ import dataclasses
 import itertools
 import json
 import math
-import statistics
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 
 from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers.protocol import BIAS, extra_signals
-from cmg_mj.plant import load_plant
+from cmg_mj.plant import Plant, load_plant
 from cmg_mj.plots import plot_run
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Outcome, Result
@@ -52,21 +52,21 @@ class Compared:
     @property
     def summary(self) -> dict[str, Any]:
         """Means over the worlds that stood to the end, by the names of a run's summary, and the share of falls."""
-        outcomes, summaries = self.result.outcomes, self.result.summaries
-        stood = [summary for summary, outcome in zip(summaries, outcomes, strict=True) if outcome.kind == "done"]
-        means = {key: _mean([summary[key] for summary in stood]) for key in summaries[0] if key != "companions"}
-        scenario = self.experiment.scenario
+        result, scenario = self.result, self.experiment.scenario
+        worlds = len(result.outcomes)
+        errors = result.values("velocity_rms_error_rad_s")
+        errors = errors[np.isfinite(errors)]
         return _finite(
             {
                 "observer": scenario.observer.kind,
                 "seed": scenario.seed,
-                "worlds": len(outcomes),
-                "fell": any(outcome.fell for outcome in outcomes),
-                "fell_fraction": sum(outcome.fell for outcome in outcomes) / len(outcomes),
-                "stopped_fraction": len(self.stopped) / len(outcomes),
-                "settled_fraction": sum(summary["settle_time_s"] is not None for summary in summaries) / len(outcomes),
-                **means,
-                "velocity_rms_error_std_rad_s": _deviation([summary["velocity_rms_error_rad_s"] for summary in stood]),
+                "worlds": worlds,
+                "fell": bool(result.fell.any()),
+                "fell_fraction": float(result.fell.mean()),
+                "stopped_fraction": len(self.stopped) / worlds,
+                "settled_fraction": sum(summary["settle_time_s"] is not None for summary in result.summaries) / worlds,
+                **{key: result.mean(key) for key in result.summaries[0] if key != "companions"},
+                "velocity_rms_error_std_rad_s": float(errors.std(ddof=1)) if len(errors) > 1 else None,
             }
         )
 
@@ -101,19 +101,17 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
     Raises:
         InputError: An observer does not exist, or something does not fit.
     """
-    experiments = [prepare(_untrimmed(scenario.with_observer(kind))) for kind in observers]
+    plant = load_plant(scenario.plant)
+    experiments = [prepare(_untrimmed(scenario.with_observer(kind), plant), plant) for kind in observers]
     for experiment in experiments:
         experiment.rehearse(worlds=2)
     return experiments
 
 
-def _untrimmed(scenario: Scenario) -> Scenario:
+def _untrimmed(scenario: Scenario, plant: Plant) -> Scenario:
     """The same without trimming the integrator, if the observer does not estimate the bias that takes."""
     controller = scenario.controller
-    if not controller.trim_s:
-        return scenario
-    observer = scenario.observer.make(1.0 / controller.rate_hz, load_plant(scenario.plant).reduced)
-    if BIAS in extra_signals(observer):
+    if not controller.trim_s or BIAS in extra_signals(scenario.observer.make(1.0 / controller.rate_hz, plant.reduced)):
         return scenario
     return scenario.model_copy(update={"controller": controller.model_copy(update={"trim_s": 0.0})})
 
@@ -284,14 +282,11 @@ def trajectory_with_metadata(experiment: Experiment, result: Result) -> Trajecto
     """The trajectory with what is needed to know later where it came from."""
     assert result.trajectory is not None
     outcome = dataclasses.asdict(result.outcomes[0])
-    return Trajectory(
-        result.trajectory.columns,
-        {"observers": experiment.observer_names, "outcome": outcome, "scenario": experiment.resolved()},
-    )
+    return dataclasses.replace(result.trajectory, metadata={"outcome": outcome, "scenario": experiment.resolved()})
 
 
 def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
-    from cmg_mj.recording import Recorded, write_recording  # 0.4 s of import, needed only here
+    from cmg_mj.recording import Run, write_recording  # 0.4 s of import, needed only here
 
     experiment = runs[0][0]
     scenario = experiment.scenario
@@ -299,7 +294,7 @@ def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
     for e, result in runs:
         assert result.trajectory is not None
         outcome: Outcome = result.outcomes[0]
-        recorded.append(Recorded(e.scenario.observer.kind, result.trajectory, summary_of(e, result), outcome))
+        recorded.append(Run(e.scenario.observer.kind, result.trajectory, summary_of(e, result), outcome))
     write_recording(
         path,
         experiment.plant,
@@ -322,13 +317,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return statistics.fmean(known) if known else None
-
-
-def _deviation(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return statistics.stdev(known) if len(known) > 1 else None

@@ -1,4 +1,4 @@
-"""TOML -> the objects of a run, every field checked."""
+"""TOML -> a scenario, every field checked."""
 
 from __future__ import annotations
 

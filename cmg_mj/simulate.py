@@ -1,4 +1,4 @@
-"""The only loop: one world or many."""
+"""The loop that runs a scenario: one world or many."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from cmg_mj.controller import Controller, Tick
 from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.metrics import Metrics, MetricsSettings
+from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.rows import Rows
@@ -176,8 +177,8 @@ def simulate(
     fall = np.radians(settings.fall_angle_deg).item()
     push_end = max((push.end_s for push in pushes), default=0.0)
     dt = controller.law.dt
-    biases = [rig.apparent_bias(controller.sensors.accelerometer) for rig in plants]
-    metrics = Metrics(observers, biases, dt, push_end, controller.law.rate_limit, settings)
+    targets = {BIAS: [rig.apparent_bias(controller.sensors.accelerometer) for rig in plants]}
+    metrics = Metrics(observers, len(plants), dt, push_end, controller.law.rate_limit, settings, targets)
     rows = Rows(plants, observers, controller.extra_signals, metrics, dt, keep=keep_trajectory, single=single)
     ends: list[Outcome | None] = [None] * len(plants)
     native = driver == "native"
@@ -227,7 +228,7 @@ def simulate(
         ends = [end or Outcome("interrupted", step * timestep) for end in ends]
     rows.flush()
     outcomes = [end or Outcome("done", duration_s) for end in ends]
-    summaries = [metrics.summary(i, outcome.kind != "done") for i, outcome in enumerate(outcomes)]
+    summaries = [metrics.summary(i, outcome.kind == "done") for i, outcome in enumerate(outcomes)]
     return Result(outcomes, summaries, rows.trajectory(), max(o.time_s for o in outcomes))
 
 

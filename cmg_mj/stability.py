@@ -7,7 +7,7 @@ import numpy as np
 MARGIN = 1e-6
 """A mode that takes longer than 1/MARGIN to fade, eleven days, is none that fades [1/s].
 
-Rounding moves a pole at zero by about 1e-16 times the largest entry, to either side, and differently on every processor.
+Rounding moves a pole at zero by about 1e-16 times the largest entry, to either side and otherwise on every processor.
 """
 
 

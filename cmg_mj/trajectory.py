@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,21 +28,35 @@ SIGNALS = (
 """Columns of every trajectory after `time_s`: true state, measurements, gyro, command, integrator [rad s], push."""
 
 ESTIMATES = ("x1_rad", "x2_rad_s", "x3_rad")
-"""Columns of every observer, under `estimate/<observer>/`; what it estimates beyond x comes after them."""
+"""What every observer estimates; what it estimates beyond x comes after them."""
 
 
-def column_names(observers: Sequence[str], extras: Sequence[Sequence[str]], joints: Sequence[str]) -> list[str]:
-    """Names of a trajectory's columns after `time_s`, in order."""
-    return [
-        *SIGNALS,
-        *(
-            f"estimate/{observer}/{name}"
-            for observer, more in zip(observers, extras, strict=True)
-            for name in (*ESTIMATES, *more)
-        ),
-        *(f"angle/{joint}_rad" for joint in joints),
-        *(f"rate/{joint}_rad_s" for joint in joints),
-    ]
+@dataclass(frozen=True)
+class Layout:
+    """Whose columns a trajectory has, in their order.
+
+    Attributes:
+        observers: The observer in the loop, then the companions: columns `estimate/<observer>/<signal>`.
+        extra_signals: For each of them the names of what it estimates beyond x.
+        joints: In the order of qpos: columns `angle/<joint>_rad` and `rate/<joint>_rad_s`.
+    """
+
+    observers: tuple[str, ...] = ()
+    extra_signals: tuple[tuple[str, ...], ...] = ()
+    joints: tuple[str, ...] = ()
+
+    def columns(self) -> list[str]:
+        """Names of all columns after `time_s`, in order."""
+        return [
+            *SIGNALS,
+            *(
+                f"estimate/{observer}/{name}"
+                for observer, more in zip(self.observers, self.extra_signals, strict=True)
+                for name in (*ESTIMATES, *more)
+            ),
+            *(f"angle/{joint}_rad" for joint in self.joints),
+            *(f"rate/{joint}_rad_s" for joint in self.joints),
+        ]
 
 
 @dataclass(frozen=True)
@@ -52,10 +66,12 @@ class Trajectory:
     Attributes:
         columns: Name -> values, (n_ticks,) for one world, (n_ticks, n_worlds) for many; the unit ends the name.
             In many worlds, rows after a world's end are NaN.
-        metadata: The observer, its companions, the outcome and the resolved scenario.
+        layout: Whose columns they are; empty for one put together by hand.
+        metadata: The outcome and the resolved scenario.
     """
 
     columns: dict[str, np.ndarray]
+    layout: Layout = field(default_factory=Layout)
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -65,21 +81,18 @@ class Trajectory:
         return len(self.columns["time_s"])
 
     @property
-    def observers(self) -> list[str]:
+    def observers(self) -> tuple[str, ...]:
         """Names of the observers whose estimates are recorded: the one in the loop, then the companions."""
-        return [
-            name.split("/")[1] for name in self.columns if name.startswith("estimate/") and name.endswith("/x2_rad_s")
-        ]
+        return self.layout.observers
 
-    def extra_signals(self, observer: str) -> list[str]:
+    def extra_signals(self, observer: str) -> tuple[str, ...]:
         """Names of what an observer estimates beyond x."""
-        names = [name.split("/")[2] for name in self.columns if name.startswith(f"estimate/{observer}/")]
-        return [name for name in names if name not in ESTIMATES]
+        return self.layout.extra_signals[self.layout.observers.index(observer)]
 
     @property
-    def joints(self) -> list[str]:
+    def joints(self) -> tuple[str, ...]:
         """Names of the rig's joints, in the order of qpos."""
-        return [name[len("angle/") : -len("_rad")] for name in self.columns if name.startswith("angle/")]
+        return self.layout.joints
 
     def qpos(self) -> np.ndarray:
         """Joint angles, (n_ticks, n_joints) [rad]."""
@@ -89,24 +102,25 @@ class Trajectory:
         """One world of many, up to its end."""
         columns = {name: values if name == "time_s" else values[:, index] for name, values in self.columns.items()}
         kept = np.isfinite(columns["x1_rad"])
-        return Trajectory({name: values[kept] for name, values in columns.items()}, self.metadata)
+        return replace(self, columns={name: values[kept] for name, values in columns.items()})
 
     def of_worlds(self, worlds: np.ndarray | slice) -> Trajectory:
         """Some of many worlds: their indices, a mask (n_worlds,) or a slice."""
         columns = {name: values if name == "time_s" else values[:, worlds] for name, values in self.columns.items()}
-        return Trajectory(columns, self.metadata)
+        return replace(self, columns=columns)
 
     def between(self, start_s: float, end_s: float) -> Trajectory:
         """The rows from one time to another, both included."""
         kept = (self["time_s"] >= start_s - 1e-9) & (self["time_s"] <= end_s + 1e-9)
-        return Trajectory({name: values[kept] for name, values in self.columns.items()}, self.metadata)
+        return replace(self, columns={name: values[kept] for name, values in self.columns.items()})
 
     def save(self, path: Path) -> None:
         """Write one world's trajectory as Parquet, whole or not at all."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        metadata = {b"cmg_mj": json.dumps(self.metadata).encode()}
+        stored = {"layout": asdict(self.layout), **self.metadata}
+        metadata = {b"cmg_mj": json.dumps(stored).encode()}
         table = pa.table(self.columns).replace_schema_metadata(metadata)
         with whole_file(path) as temporary:
             pq.write_table(table, temporary)
@@ -131,10 +145,12 @@ class Trajectory:
             table = pq.read_table(path)
         except (OSError, pa.ArrowException) as error:
             raise InputError(f"{path}: not a trajectory: {' '.join(str(error).split())}") from error
-        stored = (table.schema.metadata or {}).get(b"cmg_mj")
-        if stored is None or "time_s" not in table.column_names:
+        stored = json.loads((table.schema.metadata or {}).get(b"cmg_mj", b"{}"))
+        if "layout" not in stored or "time_s" not in table.column_names:
             raise InputError(f"{path}: a Parquet file, but not a trajectory written by cmg-mj")
-        return Trajectory({name: table[name].to_numpy() for name in table.column_names}, json.loads(stored))
+        observers, extras, joints = stored.pop("layout").values()
+        layout = Layout(tuple(observers), tuple(map(tuple, extras)), tuple(joints))
+        return Trajectory({name: table[name].to_numpy() for name in table.column_names}, layout, stored)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,9 @@ SIGNALS = ("x1", "x2", "x3", "u", "fog")
 
 
 def metrics(n_worlds: int = 1, push_end_s: float = 0.0, observers: tuple = ("mine",), **settings: Any) -> Metrics:
-    return Metrics(observers, [0.0] * n_worlds, DT, push_end_s, 4.7, MetricsSettings(**settings))
+    return Metrics(
+        observers, n_worlds, DT, push_end_s, 4.7, MetricsSettings(**settings), {"bias_rad": [0.0] * n_worlds}
+    )
 
 
 def rows(values: Any, n: int) -> np.ndarray:
@@ -26,10 +29,14 @@ def rows(values: Any, n: int) -> np.ndarray:
     return np.broadcast_to(np.asarray(values, dtype=float), (n,))[:, None]
 
 
+def estimates(rates: Iterable[np.ndarray]) -> list[dict[str, np.ndarray]]:
+    return [{"x2_rad_s": rate} for rate in rates]
+
+
 def summary(of: Metrics, n: int = len(T), fell: bool = False, rates: tuple = (0.0,), **signals: Any) -> dict[str, Any]:
     given = {name: rows(signals.get(name, 0.0), n) for name in SIGNALS}
-    of.update(**given, rates=[rows(rate, n) for rate in rates])
-    return of.summary(0, fell)
+    of.update(**given, estimates=[{"x2_rad_s": rows(rate, n)} for rate in rates])
+    return of.summary(0, stood=not fell)
 
 
 def settle_time(x1: np.ndarray, push_end_s: float = 0.0, fell: bool = False, **settings: Any) -> float | None:
@@ -168,9 +175,9 @@ def test_pieces_add_up_to_the_whole(cuts: tuple[int, ...]) -> None:
     signals["x1"][250:, 1] = np.nan
     rates = [0.9 * signals["x2"], 1.2 * signals["fog"]]
     whole, pieced = (metrics(n_worlds, 1.0, ("mine", "hers")) for _ in range(2))
-    whole.update(**signals, rates=rates)
+    whole.update(**signals, estimates=estimates(rates))
     for part in np.split(np.arange(n), cuts):
-        pieced.update(**{k: v[part] for k, v in signals.items()}, rates=[rate[part] for rate in rates])
+        pieced.update(**{k: v[part] for k, v in signals.items()}, estimates=estimates(rate[part] for rate in rates))
     for world in range(n_worlds):
         assert_same(pieced.summary(world, False), whole.summary(world, False))
 
@@ -181,12 +188,12 @@ def test_rows_after_a_worlds_end_do_not_count() -> None:
     signals = restless(n, 2)
     rate = 0.9 * signals["x2"]
     alone = metrics()
-    alone.update(**{k: v[:end, 1:] for k, v in signals.items()}, rates=[rate[:end, 1:]])
+    alone.update(**{k: v[:end, 1:] for k, v in signals.items()}, estimates=estimates([rate[:end, 1:]]))
     batch = metrics(2)
     for name in SIGNALS:
         signals[name][end:, 1] = np.nan
     rate[end:, 1] = np.nan
-    batch.update(**signals, rates=[rate])
+    batch.update(**signals, estimates=estimates([rate]))
     for fell in (True, False):
         assert_same(batch.summary(1, fell), alone.summary(0, fell))
 
@@ -194,11 +201,11 @@ def test_rows_after_a_worlds_end_do_not_count() -> None:
 def test_worlds_do_not_mix() -> None:
     signals = restless(300, 4)
     batch = metrics(4)
-    batch.update(**signals, rates=[signals["fog"]])
+    batch.update(**signals, estimates=estimates([signals["fog"]]))
     for world in range(4):
         alone = metrics()
         one = {name: values[:, [world]] for name, values in signals.items()}
-        alone.update(**one, rates=[one["fog"]])
+        alone.update(**one, estimates=estimates([one["fog"]]))
         assert_same(batch.summary(world, False), alone.summary(0, False))
 
 
@@ -222,13 +229,13 @@ def test_settings_are_those_of_the_documentation() -> None:
 
 def test_bias_is_judged_from_its_time_on() -> None:
     """Far off at first, then 0.3 degrees above and below 1.1 in turn, with 1.0 to be found: RMS of 0.4 and -0.2."""
-    of = Metrics(("adaptive", "other"), [DEG], DT, 0.0, 4.7, MetricsSettings(bias_from_s=5.0))
+    of = Metrics(("adaptive", "other"), 1, DT, 0.0, 4.7, MetricsSettings(bias_from_s=5.0), {"bias_rad": [DEG]})
     bias = np.where(T < 5.0 - DT / 2.0, 90.0 * DEG, (1.1 + 0.3 * (-1.0) ** np.arange(len(T))) * DEG)
     for part in np.array_split(np.arange(len(T)), 7):
         n = len(part)
-        of.update(**{name: rows(0.0, n) for name in SIGNALS}, rates=[rows(0.0, n)] * 2)
-        of.update_bias(rows(0.0, n), [rows(bias[part], n), None])
-    found = of.summary(0, False)
+        still, found = {"x2_rad_s": rows(0.0, n)}, {"bias_rad": rows(bias[part], n)}
+        of.update(**{name: rows(0.0, n) for name in SIGNALS}, estimates=[still | found, still])
+    found = of.summary(0, stood=True)
     assert found["bias_deg"] == pytest.approx(1.0)
     assert found["bias_estimate_deg"] == pytest.approx(1.1, rel=1e-12)
     assert found["bias_rms_error_deg"] == pytest.approx(math.sqrt((0.4**2 + 0.2**2) / 2.0), rel=1e-12)
@@ -237,9 +244,9 @@ def test_bias_is_judged_from_its_time_on() -> None:
 
 def test_a_run_that_ends_before_has_no_bias_figures() -> None:
     of = metrics(bias_from_s=5.0)
-    of.update(**{name: rows(0.0, 100) for name in SIGNALS}, rates=[rows(0.0, 100)])
-    of.update_bias(rows(0.0, 100), [rows(0.1, 100)])
-    found = of.summary(0, False)
+    estimate = {"x2_rad_s": rows(0.0, 100), "bias_rad": rows(0.1, 100)}
+    of.update(**{name: rows(0.0, 100) for name in SIGNALS}, estimates=[estimate])
+    found = of.summary(0, stood=True)
     assert found["bias_estimate_deg"] is None
     assert found["bias_rms_error_deg"] is None
     assert found["bias_deg"] == 0.0

@@ -19,16 +19,15 @@ from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
-from cmg_mj.recording import Recorded, write_recording
-from cmg_mj.recording.recorded import phases, torque_steps
+from cmg_mj.recording import Run, write_recording
+from cmg_mj.recording.run import phases, torque_steps
 from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, POSE_RATE_HZ, shapes
-from cmg_mj.recording.summary import METRICS
-from cmg_mj.recording.summary import OPTIONAL as OPTIONAL_METRICS
-from cmg_mj.recording.summary import SHORT as SHORT_METRICS
+from cmg_mj.recording.summary import FEWER, NUMBERS
 from cmg_mj.recording.timeline import column as time_column
 from cmg_mj.recording.timeline import instant
 from cmg_mj.scenario import Scenario, load_scenario
 from cmg_mj.simulate import Outcome
+from cmg_mj.summary_keys import BIAS_KEYS, heading, written
 from cmg_mj.trajectory import Trajectory
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1", 'companions=["linear"]')
@@ -40,14 +39,14 @@ def scenario(*overrides: str) -> Scenario:
     return load_scenario("push_recovery", [*SHORT, *overrides])
 
 
-def recorded(experiment: Experiment, name: str | None = None) -> Recorded:
+def recorded(experiment: Experiment, name: str | None = None) -> Run:
     result = experiment.run()
     assert result.trajectory is not None
     name = name or experiment.scenario.observer.kind
-    return Recorded(name, result.trajectory, result.summaries[0], result.outcomes[0])
+    return Run(name, result.trajectory, result.summaries[0], result.outcomes[0])
 
 
-def write(path: Path, experiment: Experiment, runs: list[Recorded]) -> Path:
+def write(path: Path, experiment: Experiment, runs: list[Run]) -> Path:
     write_recording(
         path,
         experiment.plant,
@@ -67,12 +66,12 @@ def experiment() -> Experiment:
 
 
 @pytest.fixture(scope="module")
-def run(experiment: Experiment) -> Recorded:
+def run(experiment: Experiment) -> Run:
     return recorded(experiment)
 
 
 @pytest.fixture(scope="module")
-def path(experiment: Experiment, run: Recorded, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def path(experiment: Experiment, run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(tmp_path_factory.mktemp("recording") / "recording.rrd", experiment, [run])
 
 
@@ -129,7 +128,7 @@ def test_everything_promised_is_there(path: Path, experiment: Experiment) -> Non
     assert len(geoms) == model.ngeom + model.nsite + (model.nbody - 1) + 2 + 1
 
 
-def test_values_equal_the_trajectory(path: Path, run: Recorded, experiment: Experiment) -> None:
+def test_values_equal_the_trajectory(path: Path, run: Run, experiment: Experiment) -> None:
     t = run.trajectory
     expected = {
         "tilt/true": np.degrees(t["x1_rad"]),
@@ -178,19 +177,20 @@ def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
     _, true = scalars(where, "/adaptive/bias/true")
     np.testing.assert_allclose(true, of.scenario.plant.equilibrium_bias_deg, rtol=1e-12)
     (summary,) = static(where, "/summary", "TextDocument:text")
-    assert "Estimated bias, mean [deg]" in summary
+    assert heading("bias_estimate_deg") in summary
 
 
-def test_summary_scenario_name_and_layout(path: Path, run: Recorded) -> None:
+def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
     (summary,) = static(path, "/summary", "TextDocument:text")
-    assert METRICS.keys() - set(OPTIONAL_METRICS) <= run.summary.keys()
-    assert not set(OPTIONAL_METRICS) & run.summary.keys()
-    assert SHORT_METRICS.keys() <= METRICS.keys()
+    assert set(NUMBERS) - set(BIAS_KEYS) <= run.summary.keys()
+    assert not set(BIAS_KEYS) & run.summary.keys()
+    assert set(FEWER) <= set(NUMBERS)
     assert "# A title" in summary
     assert "+1 N m for 0.1 s at 0.2 s" in summary
-    assert f"| Tilt, RMS [deg] | {run.summary['tilt_rms_deg']:.3g} |" in summary
-    assert "| done at 0.5 s |" in summary
-    assert "| linear | " in summary
+    rows = [[cell.strip() for cell in line.split("|")] for line in summary.splitlines()]
+    assert ["", heading("tilt_rms_deg"), written("tilt_rms_deg", run.summary["tilt_rms_deg"]), ""] in rows
+    assert ["", "Outcome", "done at 0.5 s", ""] in rows
+    assert "linear" in {row[1] for row in rows if len(row) > 2}
     assert 'kind = "made up"' in static(path, "/scenario", "TextDocument:text")[0]
     assert static(path, "/__properties", "RecordingInfo:name") == ["A title: homogeneous"]
     assert len(RrdReader(path).blueprints()) == 1
@@ -216,7 +216,7 @@ def pose(path: Path, entity: str, k: int) -> tuple[float, np.ndarray, np.ndarray
 
 
 @pytest.mark.parametrize("k", [0, 7, 25, -1])
-def test_bodies_stand_where_kinematics_puts_them(path: Path, run: Recorded, experiment: Experiment, k: int) -> None:
+def test_bodies_stand_where_kinematics_puts_them(path: Path, run: Run, experiment: Experiment, k: int) -> None:
     model = experiment.plant.model
     data = mujoco.MjData(model)
     for body in range(1, model.nbody):
@@ -234,7 +234,7 @@ def test_bodies_stand_where_kinematics_puts_them(path: Path, run: Recorded, expe
 
 
 @pytest.mark.parametrize("cube", [0, 1])
-def test_flywheels_are_drawn_slowed(path: Path, run: Recorded, experiment: Experiment, cube: int) -> None:
+def test_flywheels_are_drawn_slowed(path: Path, run: Run, experiment: Experiment, cube: int) -> None:
     plant = experiment.plant
     joint, k = plant.cubes[cube].flywheel, 30
     name = plant.model.body(plant.model.jnt_bodyid[joint]).name.replace("/", ".")
@@ -332,7 +332,7 @@ def test_times_are_rounded_to_the_nanosecond() -> None:
     assert instant(0.001 * 4.35e3) == np.timedelta64(4_350, "ms")
 
 
-def test_phases_are_recorded(path: Path, run: Recorded, experiment: Experiment) -> None:
+def test_phases_are_recorded(path: Path, run: Run, experiment: Experiment) -> None:
     times, states = column(path, "/homogeneous/phase", "StateChange:state")
     read = [(time, state) for time, (state,) in zip(times, states, strict=True)]
     expected = phases(run, experiment.scenario.push, experiment.scenario.metrics)
@@ -340,13 +340,13 @@ def test_phases_are_recorded(path: Path, run: Recorded, experiment: Experiment) 
     assert [state for _, state in read][:3] == ["balancing", "push", "recovering"]
 
 
-def made_up(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Recorded:
+def made_up(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Run:
     """A run of 100 Hz whose tilt steps at given times."""
     time = np.arange(round(end_s * 100.0)) / 100.0
     x1 = np.zeros(len(time))
     for start, value in x1_deg.items():
         x1[time >= start - 1e-9] = np.radians(value)
-    return Recorded("x", Trajectory({"time_s": time, "x1_rad": x1}), {}, Outcome(kind, end_s))  # type: ignore[arg-type]
+    return Run("x", Trajectory({"time_s": time, "x1_rad": x1}), {}, Outcome(kind, end_s))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -384,7 +384,7 @@ def made_up(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Rec
         ),
     ],
 )
-def test_phases(run: Recorded, pushes: list[Push], expected: list[tuple[float, str]]) -> None:
+def test_phases(run: Run, pushes: list[Push], expected: list[tuple[float, str]]) -> None:
     read = phases(run, pushes, MetricsSettings())
     assert [name for _, name in read] == [name for _, name in expected]
     assert [time for time, _ in read] == pytest.approx([time for time, _ in expected])
@@ -436,7 +436,7 @@ def test_two_observers_have_a_branch_each(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ticks", [0, 1, 2])
-def test_a_run_of_no_length(run: Recorded, experiment: Experiment, tmp_path: Path, ticks: int) -> None:
+def test_a_run_of_no_length(run: Run, experiment: Experiment, tmp_path: Path, ticks: int) -> None:
     short = Trajectory({name: values[:ticks] for name, values in run.trajectory.columns.items()})
     end = ticks * experiment.law.dt
     fell = replace(run, trajectory=short, summary={"settle_time_s": None}, outcome=Outcome("fell", end))
@@ -459,7 +459,7 @@ def test_a_fall_in_the_first_tick(tmp_path: Path) -> None:
     np.testing.assert_allclose(matrix(quaternion), body.xmat.reshape(3, 3), atol=1e-6)
 
 
-def test_a_companion_that_diverged(run: Recorded, experiment: Experiment, tmp_path: Path) -> None:
+def test_a_companion_that_diverged(run: Run, experiment: Experiment, tmp_path: Path) -> None:
     columns = dict(run.trajectory.columns)
     columns["estimate/linear/x2_rad_s"] = columns["x2_rad_s"].copy()
     columns["estimate/linear/x2_rad_s"][50:] = [*[1e300, -np.inf], *[np.nan] * (len(run.trajectory) - 52)]
@@ -468,7 +468,7 @@ def test_a_companion_that_diverged(run: Recorded, experiment: Experiment, tmp_pa
     assert np.array_equal(read, columns["estimate/linear/x2_rad_s"], equal_nan=True)
 
 
-def test_a_users_observer_may_have_any_name(run: Recorded, experiment: Experiment, tmp_path: Path) -> None:
+def test_a_users_observer_may_have_any_name(run: Run, experiment: Experiment, tmp_path: Path) -> None:
     name = "my_lab.observers:Kalman"
     columns = {key.replace("/linear/", f"/{name}/"): values for key, values in run.trajectory.columns.items()}
     path = write(tmp_path / "named.rrd", experiment, [replace(run, name=name, trajectory=Trajectory(columns))])
@@ -480,13 +480,13 @@ def test_a_users_observer_may_have_any_name(run: Recorded, experiment: Experimen
 
 @pytest.mark.parametrize("name", ["my_lab.observers:Kalman", "a/b (c) é", "x" * 300])
 def test_rerun_does_not_complain_of_a_name(
-    run: Recorded, experiment: Experiment, tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
+    run: Run, experiment: Experiment, tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
 ) -> None:
     write(tmp_path / "named.rrd", experiment, [replace(run, name=name)])
     assert capfd.readouterr() == ("", "")
 
 
-def test_runs_need_names_of_their_own(run: Recorded, experiment: Experiment, tmp_path: Path) -> None:
+def test_runs_need_names_of_their_own(run: Run, experiment: Experiment, tmp_path: Path) -> None:
     for runs in ([], [run, run]):
         with pytest.raises(ValueError, match="different names"):
             write(tmp_path / "recording.rrd", experiment, runs)
@@ -496,7 +496,7 @@ def test_runs_need_names_of_their_own(run: Recorded, experiment: Experiment, tmp
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError("disk full")])
 @pytest.mark.parametrize("old", [[], ["recording.rrd"]])
 def test_an_interrupted_write_leaves_no_half_file(
-    run: Recorded,
+    run: Run,
     experiment: Experiment,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -518,7 +518,7 @@ def test_an_interrupted_write_leaves_no_half_file(
 
 
 def test_an_interrupted_recording_leaves_nothing(
-    run: Recorded, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -529,13 +529,13 @@ def test_an_interrupted_recording_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_place_that_cannot_be_written(run: Recorded, experiment: Experiment, tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written(run: Run, experiment: Experiment, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         write(tmp_path / "missing" / "recording.rrd", experiment, [run])
 
 
 def test_rerun_turned_off_by_the_environment(
-    run: Recorded, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RERUN", "off")
     with pytest.raises(InputError, match="RERUN"):

@@ -152,8 +152,15 @@ def list_names(what: str | None) -> None:
 @click.argument("file")
 def check(file: str) -> None:
     """Check a scenario file without running it, and say what it amounts to."""
-    from cmg_mj import report
-    from cmg_mj.experiment import prepare
+    from cmg_mj.description import description
+    from cmg_mj.design import design
+    from cmg_mj.known_rigs import known_rig
     from cmg_mj.scenario import load_scenario
 
-    click.echo(report.description(file, prepare(load_scenario(file))))
+    scenario = load_scenario(file)
+    rig = known_rig(scenario.plant)
+    if rig is None:
+        from cmg_mj.plant import load_plant  # MuJoCo, which a bundled rig does without
+
+        rig = load_plant(scenario.plant).facts
+    click.echo(description(file, scenario, design(scenario, rig.reduced), rig))

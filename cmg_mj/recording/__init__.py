@@ -17,13 +17,13 @@ from cmg_mj.metrics import MetricsSettings
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.recording.blueprint import default_blueprint
-from cmg_mj.recording.recorded import Recorded
+from cmg_mj.recording.run import Run
 from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, log_rig
 from cmg_mj.recording.signals import Branch, log_phases, log_series, series
-from cmg_mj.recording.summary import markdown, scenario_page
+from cmg_mj.recording.summary import page, scenario_page
 from cmg_mj.trajectory import whole_file
 
-__all__ = ["Recorded", "write_recording"]
+__all__ = ["Run", "write_recording"]
 
 LONGEST_LIST = 120
 """Names of runs, put together, that still fit into an application's name [characters]."""
@@ -32,7 +32,7 @@ LONGEST_LIST = 120
 def write_recording(
     path: Path,
     plant: Plant,
-    runs: Sequence[Recorded],
+    runs: Sequence[Run],
     *,
     title: str = "",
     pushes: Sequence[Push] = (),
@@ -78,14 +78,14 @@ def write_recording(
             log_rig(rec, branch.path, plant, branch.run, pushes)
             log_series(rec, branch)
             log_phases(rec, branch, pushes, settings, end)
-        _log_page(rec, "summary", markdown(title, runs, pushes, settings, notes))
+        _log_page(rec, "summary", page(title, runs, pushes, settings, notes))
         _log_page(rec, "scenario", scenario_page(scenario_toml))
         content = memory.drain_as_bytes()
     with whole_file(path) as temporary:
         temporary.write_bytes(content)
 
 
-def _branch(run: Recorded, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> Branch:
+def _branch(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> Branch:
     rows = {row.path: row for row in series(run, plant, settings, rate_limit)}
     return Branch(f"/{rr.escape_entity_path_part(run.name)}", run, rows)
 
@@ -105,7 +105,7 @@ def _log_page(rec: rr.RecordingStream, path: str, page: str) -> None:
     rec.log(path, rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN), static=True)
 
 
-def _log_properties(rec: rr.RecordingStream, runs: Sequence[Recorded], title: str) -> None:
+def _log_properties(rec: rr.RecordingStream, runs: Sequence[Run], title: str) -> None:
     """What a catalogue of recordings can be searched by."""
     experiment: dict[str, Any] = {name: version(name) for name in ("cmg_mj", "mujoco")}
     experiment |= {"title": title, "runs": [run.name for run in runs]}

@@ -10,7 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from cmg_mj.plant import Plant
-from cmg_mj.recording.recorded import ENDINGS
+from cmg_mj.recording.run import ENDINGS
 from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, extent
 from cmg_mj.recording.signals import Branch, colors_of
 from cmg_mj.recording.timeline import TIMELINE

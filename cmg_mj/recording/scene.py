@@ -11,7 +11,7 @@ import rerun as rr
 
 from cmg_mj.plant import Cube, Plant
 from cmg_mj.push import Push
-from cmg_mj.recording.recorded import Recorded, torque_steps
+from cmg_mj.recording.run import Run, torque_steps
 from cmg_mj.recording.timeline import TIMELINE, column, instant
 
 POSE_RATE_HZ = 100.0
@@ -36,7 +36,7 @@ TILE_COLORS = ((150, 156, 164), (132, 138, 147))
 _Type = mujoco.mjtGeom
 
 
-def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Recorded, pushes: Sequence[Push]) -> None:
+def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes: Sequence[Push]) -> None:
     """Record the rig of one run under `<branch>/rig`.
 
     Args:
@@ -66,7 +66,7 @@ def body_path(branch: str, plant: Plant, body: int) -> str:
     return f"{branch}/rig/{rr.escape_entity_path_part(name.replace('/', '.'))}"
 
 
-def pose_samples(plant: Plant, run: Recorded) -> tuple[np.ndarray, np.ndarray]:
+def pose_samples(plant: Plant, run: Run) -> tuple[np.ndarray, np.ndarray]:
     """The ticks at which poses are recorded; the initial pose, if the run has no tick.
 
     Args:

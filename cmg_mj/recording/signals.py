@@ -12,7 +12,7 @@ from cmg_mj.metrics import MetricsSettings
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
-from cmg_mj.recording.recorded import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Recorded, phases
+from cmg_mj.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
 from cmg_mj.recording.timeline import TIMELINE, column, instant
 
 Color = tuple[int, int, int]
@@ -84,7 +84,7 @@ class Branch:
     """
 
     path: str
-    run: Recorded
+    run: Run
     series: dict[str, Series]
 
 
@@ -95,7 +95,7 @@ def colors_of(names: Iterable[str]) -> dict[str, Color]:
     return {name: OBSERVERS.get(name) or OTHERS[strangers.index(name) % len(OTHERS)] for name in names}
 
 
-def series(run: Recorded, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> list[Series]:
+def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> list[Series]:
     """All time series of one run.
 
     Args:

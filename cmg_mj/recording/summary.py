@@ -5,42 +5,32 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from cmg_mj import markdown
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
-from cmg_mj.recording.recorded import Recorded
+from cmg_mj.recording.run import Run
+from cmg_mj.summary_keys import BIAS_KEYS, heading, written
 
-METRICS = {
-    "settle_time_s": "Settle time [s]",
-    "velocity_rms_error_rad_s": "Rate error, RMS [rad/s]",
-    "velocity_rms_error_fog_rad_s": "… against the gyro [rad/s]",
-    "tilt_rms_deg": "Tilt, RMS [deg]",
-    "gimbal_peak_deg": "Gimbal, peak [deg]",
-    "command_rms_rad_s": "Command, RMS [rad/s]",
-    "command_saturated_fraction": "Command at its limit [%]",
-    "bias_estimate_deg": "Estimated bias, mean [deg]",
-    "bias_rms_error_deg": "… its RMS error [deg]",
-}
-"""The summary's numbers, in words and with their unit."""
+NUMBERS = (
+    "settle_time_s",
+    "velocity_rms_error_rad_s",
+    "velocity_rms_error_fog_rad_s",
+    "tilt_rms_deg",
+    "gimbal_peak_deg",
+    "command_rms_rad_s",
+    "command_saturated_fraction",
+    *BIAS_KEYS,
+)
+"""The summary's keys that are shown."""
 
-OPTIONAL = ("bias_estimate_deg", "bias_rms_error_deg")
-"""Those that only some observers have."""
-
-SHORT = {
-    "settle_time_s": "Settle [s]",
-    "velocity_rms_error_rad_s": "Rate error [rad/s]",
-    "tilt_rms_deg": "Tilt [deg]",
-    "gimbal_peak_deg": "Gimbal [deg]",
-    "command_rms_rad_s": "Command [rad/s]",
-}
+FEWER = ("settle_time_s", "velocity_rms_error_rad_s", "tilt_rms_deg", "gimbal_peak_deg", "command_rms_rad_s")
 """Those that find room when each run is a row."""
 
 MOST_COLUMNS = 3
 """More runs than this are rows."""
 
 
-def markdown(
-    title: str, runs: Sequence[Recorded], pushes: Sequence[Push], settings: MetricsSettings, notes: str
-) -> str:
+def page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: MetricsSettings, notes: str) -> str:
     """Write the summary.
 
     Args:
@@ -55,13 +45,13 @@ def markdown(
     """
     table = _by_column(runs) if len(runs) <= MOST_COLUMNS else _by_row(runs)
     band = f"Settled: the tilt stays within ±{settings.settle_band_deg:g}° to the end."
-    lines = [f"# {title or 'Run'}", "", *table, "", _pushes(pushes), "", band]
+    lines = [f"# {title or 'Run'}", "", table, "", _pushes(pushes), "", band]
     for run in runs:
         if run.outcome.reason:
             lines += ["", f"**{run.name}**: {run.outcome.reason}"]
         companions = run.summary.get("companions")
         if companions:
-            lines += ["", *_companions(run.name, companions)]
+            lines += ["", _companions(run.name, companions)]
     return "\n".join([*lines, "", notes, ""])
 
 
@@ -70,43 +60,31 @@ def scenario_page(toml: str) -> str:
     return f"# Scenario\n\n```toml\n{toml.strip()}\n```\n"
 
 
-def _by_column(runs: Sequence[Recorded]) -> list[str]:
+def _by_column(runs: Sequence[Run]) -> str:
     """A table with a column a run."""
-    lines = [_row("", *(run.name for run in runs)), "|---|" + "---:|" * len(runs)]
-    lines.append(_row("Outcome", *map(_outcome, runs)))
-    return lines + [
-        _row(words, *(_number(key, run.summary.get(key)) for run in runs))
-        for key, words in METRICS.items()
-        if key not in OPTIONAL or any(key in run.summary for run in runs)
+    rows = [("Outcome", *map(_outcome, runs))]
+    rows += [
+        (heading(key), *(written(key, run.summary.get(key)) for run in runs))
+        for key in NUMBERS
+        if key not in BIAS_KEYS or any(key in run.summary for run in runs)
     ]
+    return markdown.table(("", *(run.name for run in runs)), rows)
 
 
-def _by_row(runs: Sequence[Recorded]) -> list[str]:
+def _by_row(runs: Sequence[Run]) -> str:
     """A table with a row a run."""
-    lines = [_row("", "Outcome", *SHORT.values()), "|---|---|" + "---:|" * len(SHORT)]
-    return lines + [
-        _row(run.name, _outcome(run), *(_number(key, run.summary.get(key)) for key in SHORT)) for run in runs
-    ]
+    rows = [(run.name, _outcome(run), *(written(key, run.summary.get(key)) for key in FEWER)) for run in runs]
+    return markdown.table(("", "Outcome", *map(heading, FEWER)), rows, text_columns=2)
 
 
-def _companions(name: str, companions: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def _companions(name: str, companions: Mapping[str, Mapping[str, Any]]) -> str:
     key = "velocity_rms_error_rad_s"
-    lines = [f"Riding along open loop in the run of {name}:", "", _row("", METRICS[key]), "|---|---:|"]
-    return lines + [_row(companion, _number(key, of.get(key))) for companion, of in companions.items()]
+    rows = [(companion, written(key, of.get(key))) for companion, of in companions.items()]
+    return f"Riding along open loop in the run of {name}:\n\n{markdown.table(('', heading(key)), rows)}"
 
 
-def _row(*cells: str) -> str:
-    return "| " + " | ".join(cells) + " |"
-
-
-def _outcome(run: Recorded) -> str:
+def _outcome(run: Run) -> str:
     return f"{run.outcome.kind} at {run.outcome.time_s:.4g} s"
-
-
-def _number(key: str, value: float | None) -> str:
-    if value is None:
-        return "–"
-    return f"{100.0 * value:.1f}" if key == "command_saturated_fraction" else f"{value:.3g}"
 
 
 def _pushes(pushes: Sequence[Push]) -> str:

@@ -20,7 +20,7 @@ SCATTER_FACTOR = 30.0
 """The points are scattered up to so many times the given sizes, and down to as small a part."""
 TOLERANCE = 5e-3
 """Relative accuracy of the sizes."""
-EDGE = 0.4
+FIRST_STEP = 0.4
 """First step of a search in several dimensions, in the logarithm."""
 
 Loss = Callable[[Sequence[float]], float]
@@ -115,7 +115,7 @@ def _search_simplex(height: Callable, low: np.ndarray, high: np.ndarray, given: 
         order = np.argsort([height(point) for point in scattered], kind="stable")
         first += [scattered[i] for i in order[: starts - 1]]
     for start in first:
-        steps = np.where(start + EDGE <= high, EDGE, -np.minimum(EDGE, start - low))
+        steps = np.where(start + FIRST_STEP <= high, FIRST_STEP, -np.minimum(FIRST_STEP, start - low))
         corners = np.vstack([start, *(start + step * axis for step, axis in zip(steps, np.eye(n), strict=True))])
         minimize(
             height,

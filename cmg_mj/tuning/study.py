@@ -21,7 +21,7 @@ from cmg_mj.tuning.search import crossing, evaluations, idle, search
 
 DIGITS = 4
 """Significant digits of the tuned parameters: what is written is what was scored."""
-EDGE = 1.02
+AT_A_LIMIT = 1.02
 """A number this close to a limit of its range is at the limit."""
 
 OnShare = Callable[[float], None]
@@ -237,7 +237,11 @@ def _level(noise: float, fitter: _Fitter, numbers: Sequence[Number], held_out: R
         noise_ug_rthz=noise,
         parameters=tuned,
         sizes={n.name: size for n, size in zip(numbers, sizes, strict=True)},
-        edges=[n.name for n, size in zip(numbers, sizes, strict=True) if not n.low * EDGE < size < n.high / EDGE],
+        edges=[
+            n.name
+            for n, size in zip(numbers, sizes, strict=True)
+            if not n.low * AT_A_LIMIT < size < n.high / AT_A_LIMIT
+        ],
         fit_rms=fitter._mean(tuned),
         fit_given_rms=fitter.given_loss,
         rms=fitter.errors(tuned, held_out),

@@ -20,7 +20,7 @@ ENDINGS = {"fell": "fallen", "stopped": "stopped", "interrupted": "interrupted"}
 
 
 @dataclass(frozen=True)
-class Recorded:
+class Run:
     """One run to be shown.
 
     Attributes:
@@ -50,7 +50,7 @@ def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, floa
     return [(t, sum(p.torque_n_m for p in pushes if p.start_s <= t < p.end_s)) for t in edges]
 
 
-def phases(run: Recorded, pushes: Sequence[Push], settings: MetricsSettings) -> list[tuple[float, str]]:
+def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[tuple[float, str]]:
     """What the rig is doing, as steps.
 
     Before the first push it is `balancing`. After a push (or from the start, if there is none) it is `recovering`

@@ -1,0 +1,70 @@
+"""The bundled rigs as MuJoCo has read them, so that a scenario on one of them is checked without MuJoCo.
+
+`models/read_off.json` holds the reduced model of every bundled rig, and the hash of the files it was read off. It is no
+source of numbers: where a file has changed since, it does not count, and the model is loaded. `python -m
+cmg_mj.read_off` writes it anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from cmg_mj.plant_settings import PlantSettings
+from cmg_mj.reduced import ReducedModel
+from cmg_mj.resources import find, folder
+
+FILE = "read_off.json"
+
+
+class RigFacts(NamedTuple):
+    """What a scenario's controller and observers are made from.
+
+    Attributes:
+        path: The model's file.
+        cubes: Names of its modules.
+        reduced: Its reduced model.
+    """
+
+    path: Path
+    cubes: tuple[str, ...]
+    reduced: ReducedModel
+
+
+def name_of(model: str, *, locked: bool) -> str:
+    """Under what a rig is kept."""
+    return f"{model}, thrust bearing locked" if locked else model
+
+
+def hash_of_models() -> str:
+    """Hash of all bundled models: they include one another."""
+    digest = hashlib.sha256()
+    for path in sorted(folder("models").glob("*.xml")):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes().replace(b"\r\n", b"\n") + b"\0")
+    return digest.hexdigest()
+
+
+def known_rig(settings: PlantSettings, beside: Path | None = None) -> RigFacts | None:
+    """What is known of a scenario's rig without loading it.
+
+    Args:
+        settings: The scenario's plant.
+        beside: A folder that a relative model path may start from.
+
+    Returns:
+        The facts, if the rig is a bundled one whose files are as they were read; otherwise None.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    path = find("models", settings.model, ".xml", "plant.model =", beside)
+    kept = folder("models") / FILE
+    if path.resolve().parent != folder("models").resolve() or not kept.is_file():
+        return None
+    known = json.loads(kept.read_text(encoding="utf-8"))
+    rig = known["rigs"].get(name_of(path.name, locked=settings.lock_thrust_bearing))
+    if rig is None or known["sha256"] != hash_of_models():
+        return None
+    return RigFacts(path, tuple(rig["cubes"]), ReducedModel(**rig["reduced"]))

@@ -1,0 +1,77 @@
+"""A scenario with every default written out: running that file again gives the same run."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import TypeAdapter
+
+from cmg_mj.design import Design
+from cmg_mj.resources import folder
+from cmg_mj.schema import ControllerSettings, Scenario
+
+
+def resolved(scenario: Scenario, design: Design, model: Path) -> dict[str, Any]:
+    """The scenario with every default written out, and the versions it ran with, as TOML can hold it.
+
+    Args:
+        scenario: The scenario.
+        design: What was made of it.
+        model: The model's file.
+
+    Returns:
+        Sections and fields.
+    """
+    fields = TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
+    path = model.resolve()
+    fields["plant"]["model"] = path.name if path.parent == folder("models").resolve() else str(path)
+    controller = fields["controller"] | {"gains": list(design.law.gains), "lqr": None}
+    fields["controller"] = {
+        name: controller[name] for name in ControllerSettings.model_fields if controller[name] is not None
+    }
+    fields["companions"] = scenario.companion_names()
+    fields["observer"] = {"kind": scenario.observer.kind, **_parameters(scenario.observer.parameters, design.observer)}
+    fields["versions"] = versions()
+    return _plain(fields)
+
+
+def _parameters(given: dict[str, Any], observer: Any) -> dict[str, Any]:
+    """What was given, and the defaults of the rest as far as they can be known and TOML can hold them."""
+    if not dataclasses.is_dataclass(observer):
+        return given
+    names = [f.name for f in dataclasses.fields(observer) if f.init and f.name not in ("dt", "model")]
+    kept = {name: _plain(getattr(observer, name, None)) for name in names if name not in given}
+    return {name: value for name, value in kept.items() if _is_toml(value)} | given
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """What a run depends on (read once: that takes longer than to simulate a second)."""
+    names = ("cmg_mj", "mujoco", "numpy", "scipy")
+    return {name: version(name) for name in names} | {"python": platform.python_version()}
+
+
+def _plain(value: Any) -> Any:
+    """Tuples and arrays to lists, as TOML wants them."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _is_toml(value: Any) -> bool:
+    try:
+        tomli_w.dumps({"value": value})
+    except TypeError:
+        return False
+    return True
