@@ -215,7 +215,7 @@ def test_another_run_does_not_take_the_folder_of_one_that_is_there() -> None:
 
 
 def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
-    """Those without one run untrimmed; alone, they are refused (tests/test_bad_input.py)."""
+    """Those without one run untrimmed; alone, they are refused (tests/bad_input/)."""
     scenario = load_scenario("bias_estimation", ["duration_s=0.5"])
     experiments = runs.prepare_comparison(scenario, ["linear", "adaptive", "homogeneous_adaptive"])
     assert [experiment.scenario.controller.trim_s for experiment in experiments] == [0.0, 1.0, 1.0]

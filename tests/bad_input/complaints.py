@@ -1,0 +1,30 @@
+"""What the tests of wrong input say and look for."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.command import Said, cmg_mj
+
+OVER_0, FROM_0 = "must be a number greater than 0", "must be a number greater than or equal to 0"
+WHOLE = "must be a whole number greater than or equal to 0"
+GRID = "not a whole number of physics steps of 0.001 s"
+
+
+def table(*rows: tuple) -> pytest.MarkDecorator:
+    """Parametrise with rows (what, input, expected fragments...)."""
+    return pytest.mark.parametrize(
+        ("given", "fragments"), [pytest.param(given, fragments, id=what) for what, given, *fragments in rows]
+    )
+
+
+def check(text: str | bytes) -> Said:
+    Path("my.toml").write_bytes(text.encode() if isinstance(text, str) else text)
+    return cmg_mj("check", "my.toml")
+
+
+def assert_in_order(fragments: list[str], line: str) -> None:
+    assert re.search(".*".join(map(re.escape, fragments)), line), (fragments, line)
