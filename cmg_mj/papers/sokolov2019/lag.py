@@ -1,0 +1,216 @@
+"""Section V: which lag makes the loop oscillate by itself, on MuJoCo and by the sampled loop's eigenvalues."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.sokolov2019.paper import OBSERVERS
+from cmg_mj.papers.sokolov2019.release import (
+    LAGS_S,
+    LARGEST_LATENCY_STEPS,
+    Sweep,
+    Threshold,
+    lag_threshold,
+    latency_threshold,
+    sweep,
+)
+from cmg_mj.papers.sokolov2019.rig import estimator, experiment, servo_of
+from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
+from cmg_mj.picture import Line, Panel, Picture
+
+LARGEST_S = 0.12
+"""Lags are searched up to here in the linearised loop [s]."""
+
+
+class Predicted(NamedTuple):
+    """Of one observer in the linearised, sampled loop; None for what does not happen in the range searched."""
+
+    servo_lag_s: float | None
+    """The least servo lag at which it oscillates, as stiff."""
+    softened_lag_s: float | None
+    """The same for a critically damped servo that is less stiff."""
+    latency_s: float | None
+    """The least latency of y1, in whole physics steps."""
+    pole: complex
+    """Its least damped oscillation with the model's servo [1/s]."""
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio of that oscillation."""
+        return -self.pole.real / abs(self.pole)
+
+    @property
+    def frequency_hz(self) -> float:
+        """Its frequency [Hz]."""
+        return self.pole.imag / (2.0 * np.pi)
+
+
+Loop = Callable[..., np.ndarray]
+"""(servo, age_steps=1) -> the map of a control period."""
+
+_rig = cache(experiment)
+
+
+def linearised(observer: str | None, **parameters: float) -> tuple[Loop, Servo, float]:
+    """The sampled loop with an observer, or with the true rate (None).
+
+    Args:
+        observer: Its name.
+        **parameters: Those that are not Table II's.
+
+    Returns:
+        The loop, the model's servo and the control period [s].
+    """
+    prepared = _rig()
+    plant, law = prepared.plant, prepared.law
+    o = None if observer is None else estimator(observer, prepared, **parameters)
+
+    def loop(servo: Servo, age_steps: int = 1) -> np.ndarray:
+        return period_map(plant.reduced, servo, o, law, timestep=plant.model.opt.timestep, age_steps=age_steps)
+
+    return loop, servo_of(plant), law.dt
+
+
+def predicted(observer: str | None) -> Predicted:
+    """What the linearised loop does with a linear observer, or with the true rate (None)."""
+    loop, servo, dt = linearised(observer)
+
+    def growth(varied: Servo, age_steps: int = 1) -> float:
+        return float(modes(loop(varied, age_steps), dt)[0].real)
+
+    latencies = range(LARGEST_LATENCY_STEPS + 1) if observer else ()
+    return Predicted(
+        first_crossing(lambda lag: growth(servo.damped(lag)), 5e-3, LARGEST_S),
+        first_crossing(lambda lag: growth(servo.softened(lag)), 5e-3, LARGEST_S),
+        next((steps / 1000 for steps in latencies if growth(servo, 1 + steps) > 0.0), None),
+        oscillation(loop(servo), dt),
+    )
+
+
+def largest_tau() -> float | None:
+    """The time constant of (8) from which the loop oscillates with the model's servo [s]; its own lag is 2 tau."""
+
+    def growth(tau: float) -> float:
+        loop, servo, dt = linearised("linear", tau=tau)
+        return float(modes(loop(servo), dt)[0].real)
+
+    return first_crossing(growth, 0.01, 0.1)
+
+
+class Lags(NamedTuple):
+    """All of it."""
+
+    sweeps: dict[str, Sweep]
+    thresholds: dict[str, Threshold]
+    latencies: dict[str, Threshold]
+    predictions: dict[str, Predicted]
+    """Of the linear observers and, under `truth`, of the true rate."""
+    tau: float | None
+    own_lag_s: float
+    """Of the model's servo."""
+
+
+def lags(on_share: OnShare) -> Lags:
+    """Sweep, sharpen, and predict."""
+    sweeps: dict[str, Sweep] = {}
+    thresholds: dict[str, Threshold] = {}
+    latencies: dict[str, Threshold] = {}
+    for i, name in enumerate(OBSERVERS):
+        sweeps[name] = sweep(name)
+        thresholds[name] = lag_threshold(name, sweeps[name])
+        latencies[name] = latency_threshold(name)
+        on_share((i + 1) / 4.0)
+    predictions = {name: predicted(name) for name in ("linear", "luenberger")} | {"truth": predicted(None)}
+    return Lags(sweeps, thresholds, latencies, predictions, largest_tau(), float(sweeps["linear"].lags_s[0]))
+
+
+def _ms(seconds: float | None, otherwise: str = "none") -> str:
+    return otherwise if seconds is None else f"{1e3 * seconds:.1f} ms"
+
+
+def claim(found: Lags) -> Claim:
+    """Section V: the differentiator's lag."""
+    own, lag, latency = found.own_lag_s, found.thresholds, found.latencies
+    linear, luenberger, truth = (found.predictions[name] for name in ("linear", "luenberger", "truth"))
+    begins, others = lag["linear"], min(lag[name].low for name in ("luenberger", "homogeneous"))
+    listed = "; ".join(
+        f"{equation} servo lag {_ms(lag[name].middle, f'none up to {1e3 * LAGS_S[-1]:.0f} ms')}, latency "
+        f"{_ms(latency[name].high, f'none up to {LARGEST_LATENCY_STEPS} ms')}"
+        for name, equation in OBSERVERS.items()
+    )
+    return Claim(
+        place="Section V, the lag",
+        says="Finite differences lag, and the lag brings the loop into sustained oscillations.",
+        found=(
+            f"Released without noise, the rig oscillates by itself from these on: {listed}. Eigenvalues of the "
+            f"linearised, sampled loop say: (8) {_ms(linear.servo_lag_s)} and {_ms(linear.latency_s)}, "
+            f"(9) {_ms(luenberger.servo_lag_s)} and {_ms(luenberger.latency_s)}, the true rate in the "
+            f"law {_ms(truth.servo_lag_s)}. With the model's servo ({1e3 * own:.1f} ms) the loop of (8) has "
+            f"poles {linear.pole.real:.1f} +- {linear.pole.imag:.1f}j 1/s, a damping ratio of {linear.damping:.2f} at "
+            f"{linear.frequency_hz:.1f} Hz; from tau = {_ms(found.tau)} on it would oscillate as "
+            "it is. A servo that lags because it is soft never does it "
+            f"({_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the flywheel then turns the "
+            "gimbal back, which damps the tilt."
+        ),
+        holds=begins.high is not None and begins.high < others,
+        conditions=(
+            f"It does with a servo lag from {_ms(begins.middle)} or a latency of y1 from "
+            f"{_ms(latency['linear'].high)}; at the model's servo lag of {1e3 * own:.1f} ms the oscillation decays."
+            if begins.middle is not None and begins.middle > own
+            else ""
+        ),
+        otherwise="The loop of (8) is not the first to oscillate.",
+        figures={
+            "servo_lag_of_the_model_s": own,
+            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in lag.items()},
+            "latency_threshold_s": {name: list(threshold) for name, threshold in latency.items()},
+            "predicted": {
+                name: {
+                    "servo_lag_s": p.servo_lag_s,
+                    "softened_servo_lag_s": p.softened_lag_s,
+                    "latency_s": p.latency_s,
+                    "pole_1_s": [p.pole.real, p.pole.imag],
+                    "damping_ratio": p.damping,
+                }
+                for name, p in found.predictions.items()
+            },
+            "tau_threshold_s": found.tau,
+        },
+        pictures=[_picture(found)],
+    )
+
+
+def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
+    """Growth of the tilt's oscillation over the servo lag [1/s]."""
+    loop, servo, dt = linearised(observer)
+    return [oscillation(loop(servo.damped(float(lag))), dt).real for lag in lags_s]
+
+
+def _picture(found: Lags) -> Picture:
+    grid = np.linspace(5e-3, 0.07, 66)
+    rates = [
+        Line(1e3 * grid, _growth(name, grid), f"{OBSERVERS[name]} {name}", color=i + 1)
+        for i, name in enumerate(("linear", "luenberger"))
+    ]
+    rates.append(Line([5.0, 70.0], [0.0, 0.0], style="k:", width=0.8))
+    tilts = [
+        Line(1e3 * s.lags_s, s.amplitude_deg, f"{OBSERVERS[name]} {name}", "os^"[i] + "-", color=i + 1)
+        for i, (name, s) in enumerate(found.sweeps.items())
+    ]
+    panels = [
+        Panel("growth of the tilt's\noscillation [1/s]", rates, "linearised and sampled", x_label="servo lag [ms]"),
+        Panel(
+            "largest tilt after\n4 s [deg]",
+            tilts,
+            "MuJoCo, released at 0.2 deg, no noise",
+            x_label="servo lag [ms]",
+            y_scale="log",
+        ),
+    ]
+    title = "sokolov2019, Section V: which servo lag brings sustained oscillation"
+    return Picture("sokolov2019-lag", title, panels)

@@ -1,0 +1,92 @@
+"""What sokolov2019 prints: Tables I and II, its equations, and the rests that follow from (9) and (10)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.reduced import ReducedModel
+
+TABLE_I = {
+    "m": 2.62,
+    "l": 0.13,
+    "J_b": 13e-3,
+    "J_c": 2.6e-4,
+    "K_c": 9.9e-4,
+    "I_d": 5.6e-4,
+    "J_d": 11e-4,
+    "omega_d": 314.0,
+    "g": 9.81,
+}
+"""Table I [kg, m, kg m^2, rad/s], as far as J1 and J2 need it, and the gravity that it does not give [m/s^2]."""
+
+K_E = (35.0, 4.0, -1.0, 0.3)
+"""Table II: the gains of (7), on [y1, x2, y2, x_e]."""
+
+TABLE_II: dict[str, dict[str, Any]] = {
+    "linear": {"tau": 0.02},
+    "luenberger": {"L": ((20.0, 0.0), (150.0, 0.0), (0.0, 20.0))},
+    "homogeneous": {"k1": 20.0, "k2": 150.0, "alpha": 0.85},
+}
+"""Table II: observer -> its parameters."""
+
+OBSERVERS = {"linear": "(8)", "luenberger": "(9)", "homogeneous": "(10)"}
+"""The paper's three by the bench's names, and their equations."""
+
+
+def printed_model() -> ReducedModel:
+    """J1 and J2 below (1), J_d w_d and m g l, from Table I's numbers alone."""
+    t = TABLE_I
+    return ReducedModel(
+        J1=t["I_d"] + t["J_b"] + t["K_c"] + t["m"] * t["l"] ** 2,
+        J2=t["J_c"] - t["I_d"] + t["J_d"] - t["K_c"],
+        J_d=t["J_d"],
+        omega_d=t["omega_d"],
+        gravity_torque=t["m"] * t["g"] * t["l"],
+    )
+
+
+def torques(model: ReducedModel, I_cd: float, q: np.ndarray, w: np.ndarray, dw: np.ndarray) -> np.ndarray:
+    """(1) at e = 0: the torques on frame, gimbal and wheel, (3,) [N m].
+
+    Args:
+        model: J1, J2, J_d and m g l.
+        I_cd: I_c + I_d [kg m^2].
+        q: q_b, q_c, q_d, (3,) [rad].
+        w: Their rates, (3,) [rad/s].
+        dw: Their accelerations, (3,) [rad/s^2].
+    """
+    J1, J2, J_d, mgl = model.J1, model.J2, model.J_d, model.gravity_torque
+    (q_b, q_c, _), (w_b, w_c, w_d), (dw_b, dw_c, dw_d) = q, w, dw
+    s, c, s2 = math.sin(q_c), math.cos(q_c), math.sin(2.0 * q_c)
+    return np.array(
+        [
+            (J1 + J2 * c**2) * dw_b
+            - J2 * s2 * w_c * w_b
+            + J_d * dw_d * c
+            - J_d * s * w_c * w_d
+            - mgl * math.sin(q_b + math.pi / 4.0),
+            I_cd * dw_c + J_d * w_b * w_d * s + 0.5 * J2 * s2 * w_b**2,
+            J_d * dw_d + J_d * c * dw_b - J_d * s * w_c * w_b,
+        ]
+    )
+
+
+def error_matrix(model: ReducedModel) -> np.ndarray:
+    """A - L C of (9), (3, 3)."""
+    return model.A - np.array(TABLE_II["luenberger"]["L"]) @ model.C
+
+
+def rest_of_9(model: ReducedModel, e: float) -> np.ndarray:
+    """What (9) estimates at x = 0, u = 0, y1 = -e: the solution of (A - L C) xhat + L y = 0, (3,)."""
+    return np.linalg.solve(error_matrix(model), -np.array(TABLE_II["luenberger"]["L"]) @ [-e, 0.0])
+
+
+def rest_of_10(model: ReducedModel, e: float) -> float:
+    """The rate that (10) estimates at x = u = 0, y1 = -e: k1 [e_b]^alpha, k2 [e_b]^(2 alpha - 1) = f2(y) [rad/s]."""
+    k1, k2, alpha = TABLE_II["homogeneous"].values()
+    drift = float(model.terms(-e, 0.0)[0])
+    e_b = math.copysign((abs(drift) / k2) ** (1.0 / (2.0 * alpha - 1.0)), drift)
+    return k1 * math.copysign(abs(e_b) ** alpha, e_b)

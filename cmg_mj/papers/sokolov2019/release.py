@@ -1,0 +1,117 @@
+"""Releases of the rig without noise: does the loop oscillate by itself, and from which lag or latency on?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.papers.recorded import trajectory_of
+from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment, rig_with, servo_of
+from cmg_mj.papers.sokolov2019.sampled_loop import Servo
+from cmg_mj.trajectory import Trajectory
+
+RELEASE = (*NO_NOISE, "plant.equilibrium_bias_deg=0.0", "plant.initial_tilt_deg=0.2", "push=[]", "duration_s=6.0")
+"""Let go 0.2 degrees off, nothing else disturbing it."""
+
+WINDOW_S = 2.0
+"""Two windows of this length, the last of a release, are compared."""
+FLOOR_RAD_S = 1e-3
+"""A tilt rate below this is no oscillation: a release begins with thirty times as much."""
+STEADY = 0.98
+"""Share of the amplitude that an oscillation keeps from one window to the next if it is sustained."""
+LAGS_S = (0.012, 0.015, 0.017, 0.019, 0.020, 0.022, 0.025, 0.030, 0.035, 0.040, 0.045)
+"""Servo lags tried, after the model's own [s]. RK4 at 1 ms forbids more than 49 ms at the model's stiffness."""
+LARGEST_LATENCY_STEPS = 64
+"""The largest latency tried [physics steps]."""
+
+
+def is_sustained(trajectory: Trajectory) -> np.ndarray:
+    """Which worlds of a release oscillate without end, grow or fall, (n_worlds,).
+
+    Sustained: the tilt rate's peak over the last 2 s is at least 98 % of that over the 2 s before, and above 1e-3
+    rad/s. A fall counts too.
+    """
+    t = trajectory["time_s"]
+    x2 = np.abs(trajectory["x2_rad_s"].reshape(len(t), -1))
+    middle, end = t[-1] - WINDOW_S, t[-1]
+    before, last = x2[(t > middle - WINDOW_S) & (t <= middle)].max(axis=0), x2[(t > middle) & (t <= end)].max(axis=0)
+    return ~np.isfinite(x2[-1]) | ((last > FLOOR_RAD_S) & (last >= STEADY * before))
+
+
+def release(observer: str, servos: Sequence[Servo], settings: Sequence[str] = ()) -> Trajectory:
+    """Let the rig go without noise, one world a servo."""
+    prepared = experiment([*RELEASE, *settings], observer)
+    plants = [rig_with(prepared.scenario.plant, servo) for servo in servos]
+    return trajectory_of(prepared.run_many(len(plants), plants=plants))
+
+
+class Sweep(NamedTuple):
+    """Releases over the servo's lag."""
+
+    lags_s: np.ndarray
+    """(n_lags,)."""
+    sustained: np.ndarray
+    """Whether the loop oscillates by itself, (n_lags,)."""
+    amplitude_deg: np.ndarray
+    """Largest tilt over the last two seconds, (n_lags,); NaN where the rig fell."""
+
+    def sustained_at(self, lag_s: float) -> bool:
+        """Whether it does so at the lag nearest to this one."""
+        return bool(self.sustained[np.argmin(np.abs(self.lags_s - lag_s))])
+
+
+def sweep(observer: str) -> Sweep:
+    """Release the rig with the model's servo and with slower ones, as stiff."""
+    servo = servo_of(experiment().plant)
+    lags = np.array([servo.lag_s, *LAGS_S])
+    trajectory = release(observer, [servo.damped(lag) for lag in lags])
+    t, x1 = trajectory["time_s"], trajectory["x1_rad"]
+    return Sweep(lags, is_sustained(trajectory), np.degrees(np.abs(x1[t > t[-1] - WINDOW_S]).max(axis=0)))
+
+
+class Threshold(NamedTuple):
+    """Where something begins: not yet at `low`, already at `high`; `high` is None if nowhere in the range."""
+
+    low: float
+    high: float | None
+
+    @property
+    def middle(self) -> float | None:
+        """The best guess."""
+        return None if self.high is None else (self.low + self.high) / 2.0
+
+
+def lag_threshold(observer: str, found: Sweep, parts: int = 10) -> Threshold:
+    """The least servo lag at which the loop oscillates by itself, as stiff, to a tenth of the sweep's spacing [s]."""
+    first = np.flatnonzero(found.sustained)
+    if not len(first):
+        return Threshold(float(found.lags_s[-1]), None)
+    if first[0] == 0:
+        return Threshold(0.0, float(found.lags_s[0]))
+    grid = np.linspace(found.lags_s[first[0] - 1], found.lags_s[first[0]], parts + 1)
+    servo = servo_of(experiment().plant)
+    between = is_sustained(release(observer, [servo.damped(lag) for lag in grid[1:]]))
+    i = int(np.argmax(between))  # the last of them is the sweep's own
+    return Threshold(float(grid[i]), float(grid[i + 1]))
+
+
+def latency_threshold(observer: str, largest_steps: int = LARGEST_LATENCY_STEPS) -> Threshold:
+    """The least latency of the accelerometers at which the loop oscillates by itself, to one physics step [s].
+
+    They are sampled at every physics step here, so that the latency is not rounded up to control periods.
+    """
+
+    def sustained(steps: int) -> bool:
+        latency = f"sensors.accelerometer.latency_s={steps / 1000}"
+        result = experiment([*RELEASE, "sensors.accelerometer.rate_hz=1000.0", latency], observer).run()
+        return not result.stood.all() or bool(is_sustained(trajectory_of(result))[0])
+
+    low, high = 0, largest_steps
+    if not sustained(high):
+        return Threshold(high / 1000, None)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if sustained(middle) else (middle, high)
+    return Threshold(low / 1000, high / 1000)

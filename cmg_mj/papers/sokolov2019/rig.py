@@ -1,0 +1,77 @@
+"""The rig of sokolov2019 on MuJoCo, with the parameters of Table II and, where asked for, another gimbal servo."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.observers import Observer, make_observer
+from cmg_mj.papers.sokolov2019.paper import K_E, TABLE_II
+from cmg_mj.papers.sokolov2019.sampled_loop import Servo
+from cmg_mj.plant import Plant, load_plant
+from cmg_mj.plant_settings import PlantSettings
+from cmg_mj.scenario import load_scenario
+
+NO_NOISE = (
+    "sensors.accelerometer.noise_density_ug_rthz=0.0",
+    "sensors.accelerometer.counts_per_g=0.0",
+    "sensors.encoder.counts_per_revolution=0.0",
+    "sensors.fog.angle_random_walk_deg_rth=0.0",
+)
+
+RK4_LIMIT = 2.7
+"""Runge-Kutta 4 follows x' = -x only for steps below 2.785."""
+
+
+def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feedback: str = "observer") -> Experiment:
+    """The scenario `single_gimbal` with Table II.
+
+    Args:
+        settings: Settings `section.field=value` that differ.
+        observer: In the loop.
+        feedback: Which rate the law uses: `observer`, `fog` or `truth`.
+
+    Returns:
+        The experiment, ready to run.
+    """
+    printed = {"controller.gains": K_E} | {f"observer.{key}": value for key, value in TABLE_II[observer].items()}
+    fields = [f"{key}={json.dumps(value)}" for key, value in printed.items()]
+    return prepare(load_scenario("single_gimbal", [*fields, f"controller.feedback={feedback}", *settings], observer))
+
+
+def estimator(name: str, prepared: Experiment, **changed: Any) -> Observer:
+    """An observer with Table II's parameters or others, for the rig and control period of an experiment."""
+    return make_observer(name, prepared.law.dt, prepared.plant.reduced, **TABLE_II[name] | changed)
+
+
+def servo_of(plant: Plant) -> Servo:
+    """The gimbal servo that the model file describes."""
+    (servo,) = plant.servos
+    (cube,) = plant.cubes
+    dof = int(plant.model.jnt_dofadr[cube.gimbal])
+    return Servo(
+        float(plant.model.actuator_gainprm[servo, 0]),
+        float(-plant.model.actuator_biasprm[servo, 2]),
+        float(plant.model.dof_M0[dof]),
+    )
+
+
+def rig_with(settings: PlantSettings, servo: Servo) -> Plant:
+    """The rig with another servo: a plant of its own, whose model is changed before anything runs on it.
+
+    Raises:
+        ValueError: The servo is too stiffly damped for RK4 at this timestep: it would chatter by itself.
+    """
+    decay = servo.kv * settings.timestep_s / servo.inertia
+    if decay > RK4_LIMIT:
+        raise ValueError(
+            f"servo lag {1e3 * servo.lag_s:.3g} ms: kv h/I = {decay:.3g} must be at most {RK4_LIMIT} at timestep_s = "
+            f"{settings.timestep_s:g}"
+        )
+    plant = load_plant(settings)
+    for i in plant.servos:
+        plant.model.actuator_gainprm[i, 0] = servo.kp
+        plant.model.actuator_biasprm[i, 1:3] = -servo.kp, -servo.kv
+    return plant
