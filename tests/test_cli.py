@@ -39,10 +39,7 @@ SUMMARY = [
 COMMANDS = ["bench", "check", "compare", "list", "reproduce", "run", "tune"]
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))  # to which the command adds
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 @pytest.fixture
@@ -268,21 +265,22 @@ def test_bench(monkeypatch: pytest.MonkeyPatch) -> None:
 def on_a_terminal(*arguments: str) -> tuple[subprocess.CompletedProcess[str], str]:
     """Run with standard error on a terminal of 100 columns; what it showed."""
     ours, theirs = pty.openpty()
-    done = subprocess.run(
+    with subprocess.Popen(
         [*COMMAND, *arguments], env=environment(COLUMNS="100"), stdout=subprocess.PIPE, stderr=theirs, text=True
-    )
-    os.close(theirs)
-    shown = b""
-    while True:
-        try:
-            piece = os.read(ours, 65536)
-        except OSError:  # the terminal is closed and read to its end
-            break
-        if not piece:
-            break
-        shown += piece
+    ) as running:
+        os.close(theirs)
+        shown = b""
+        while True:  # meanwhile: a slow run shows more progress than the terminal has room for
+            try:
+                piece = os.read(ours, 65536)
+            except OSError:  # the terminal is closed and read to its end
+                break
+            if not piece:
+                break
+            shown += piece
+        out, _ = running.communicate()
     os.close(ours)
-    return done, shown.decode()
+    return subprocess.CompletedProcess(running.args, running.returncode, out), shown.decode()
 
 
 def test_progress_is_shown_on_a_terminal_and_nowhere_else() -> None:

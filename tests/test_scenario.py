@@ -17,17 +17,9 @@ from cmg_mj.law import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.resources import bundled, folder
 from cmg_mj.scenario import Scenario
+from tests.run_folders import write
 
-
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-def write(text: str, path: str = "my.toml") -> str:
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
-    Path(path).write_text(text)
-    return path
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 def copy_models(place: str) -> None:

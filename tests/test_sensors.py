@@ -21,7 +21,7 @@ from cmg_mj.tilt import RadialTilt
 
 G = 9.80665
 STILL = Ideal((0.0, G, 0.0, G), [0.0, 0.0], 0.0)
-QUIET = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
+QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
 N = 20_000
 
 
@@ -176,7 +176,7 @@ def test_fog_bias_and_range() -> None:
         ({"bandwidth_hz": 10.0, "rate_hz": 1000.0}, 10.0, 1000.0),
     ],
 )
-def test_fog_step_response(given: dict, bandwidth_hz: float, rate_hz: float) -> None:
+def test_fog_step_response(given: dict[str, Any], bandwidth_hz: float, rate_hz: float) -> None:
     """A first-order low-pass: 1 - exp(-2 pi f t), the step coming right after the sample at t = 0."""
     measure = Fog(angle_random_walk_deg_rth=0.0, **given).meter()
     shown = [measure(Ideal((), [], 0.0 if k == 0 else 1.0), (0.0,)) for k in range(30)]

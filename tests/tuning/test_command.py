@@ -16,9 +16,8 @@ from tests.tuning.own import OWN
 
 
 @pytest.fixture
-def quick(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def quick(elsewhere: None) -> str:
     """A short scenario with a push, in an empty folder."""
-    monkeypatch.chdir(tmp_path)
     Path("quick.toml").write_text("title = 'Quick'\nduration_s = 0.6\n[[push]]\nstart_s = 0.2")
     return "quick.toml"
 
