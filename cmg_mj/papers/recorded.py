@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 
@@ -16,3 +18,8 @@ def pushed(trajectory: Trajectory) -> list[tuple[float, float]]:
     """When the push acted on one world, as panels shade it [s]."""
     times = trajectory["time_s"][trajectory["push_n_m"] != 0.0]
     return [(float(times[0]), float(times[-1]))] if len(times) else []
+
+
+def rms(values: np.ndarray) -> np.ndarray:
+    """Root of the mean square over the ticks, (n_ticks, ...) -> (...)."""
+    return np.sqrt(np.mean(values**2, axis=0))

@@ -3,39 +3,40 @@
 from __future__ import annotations
 
 from cmg_mj.papers.aranovskiy2020 import (
-    gains,
+    appendix,
+    delicacy,
+    figure_4,
+    figures_5_to_7,
     hypotheses,
     lag,
     linearisation,
+    misprint,
+    model,
     observability,
     optimality,
-    plvcc,
     rest,
-    riccati,
-    rig_loop,
+    table_2,
     time_invariant,
     update_cost,
     vicinity,
 )
-from cmg_mj.papers.claim import Claim, OnShare, Section
-
-
-def _appendix(on_share: OnShare) -> list[Claim]:
-    return [plvcc.claim("aranovskiy2020")]
-
+from cmg_mj.papers.claim import Section
 
 SECTIONS: list[Section] = [
-    Section("constants and linearisation", 0.3, linearisation.run),
-    Section("Hypotheses 1 to 3 kept and broken", 8.0, hypotheses.run),
-    Section("the law's gains", 0.2, optimality.run),
-    Section("where the loop rests", 13.0, rest.run),
-    Section("observability", 1.0, observability.run),
-    Section("(9), lag and noise", 0.3, lag.run),
-    Section("(11), the vicinity", 2.0, vicinity.run),
-    Section("Remark 1, the cost of an update", 1.0, update_cost.run),
-    Section("Remark 1, the Riccati equation", 2.0, riccati.run),
-    Section("Figs 4 to 7", 21.0, rig_loop.run),
-    Section("the time-invariant observer", 10.0, time_invariant.run),
-    Section("Table 2 tuned again", 31.0, gains.run),
-    Section("the appendix", 3.0, _appendix),
+    Section("constants and reduced model", 0.2, model.claims),
+    Section("linearisation", 0.1, linearisation.claims),
+    Section("Hypotheses 1 to 3 kept and broken", 8.0, hypotheses.claims),
+    Section("the law's gains", 0.2, optimality.claims),
+    Section("where the loop rests", 13.0, rest.claims),
+    Section("observability", 1.0, observability.claims),
+    Section("(9), lag and noise", 0.3, lag.claims),
+    Section("(11), the vicinity", 2.0, vicinity.claims),
+    Section("Remark 1, the cost of an update", 1.0, update_cost.claims),
+    Section("Remark 1, the Riccati equation", 1.0, delicacy.claims),
+    Section("the Riccati equation as printed", 1.0, misprint.claims),
+    Section("Fig. 4", 3.0, figure_4.claims),
+    Section("Figs 5 to 7", 18.0, figures_5_to_7.claims),
+    Section("the time-invariant observer", 10.0, time_invariant.claims),
+    Section("Table 2 tuned again", 31.0, table_2.claims),
+    Section("the appendix", 3.0, appendix.claims),
 ]

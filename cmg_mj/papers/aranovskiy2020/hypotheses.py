@@ -8,20 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.intervals import Interval, ratio_interval
-from cmg_mj.papers.aranovskiy2020.mismatch import (
-    MISMATCHES,
-    Mismatch,
-    Ran,
-    balanced_yaw_rate,
-    foreseen_yaw_rate,
-    run_all,
-)
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.aranovskiy2020.mismatch import MISMATCHES, Mismatch, Ran, run_all
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S
+from cmg_mj.papers.aranovskiy2020.yaw_momentum import balanced_yaw_rate, foreseen_yaw_rate
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.recorded import pushed, rms, trajectory_of
 from cmg_mj.picture import Line, Panel, Picture
 
 SEED = 75_000
 WORLDS = 4
-DURATION_S = 10.0
 
 
 class Yaw(NamedTuple):
@@ -43,19 +38,19 @@ class Yaw(NamedTuple):
 
 def yaw_of(ran: Ran, mismatch: Mismatch, size: float) -> Yaw:
     """Measure one mismatch."""
-    run, key = ran.broken[mismatch.kind, size], (mismatch.kind, size)
+    broken = ran.broken[mismatch.kind, size]
+    run = trajectory_of(broken)
     rate, angle = run["rate/yaw_rad_s"], run["angle/yaw_rad"]
     largest = np.abs(rate).max(axis=0)
     miss = np.abs(balanced_yaw_rate(ran.plant, run) - rate).max(axis=0)
     foreseen = math.nan
     if mismatch.foreseen:
-        foretold = foreseen_yaw_rate(mismatch.kind, size, ran.plant, ran.symmetric)
+        foretold = foreseen_yaw_rate(mismatch.kind, size, ran.plant, trajectory_of(ran.symmetric))
         step = float(run["time_s"][1] - run["time_s"][0])
         foreseen = float(np.degrees(np.abs(np.cumsum(foretold, axis=0) * step).max(axis=0)).mean())
 
-    def ratio(name: str) -> Interval:
-        ours, reference = (np.array([s[name] for s in ran.summaries[k]]) for k in (key, ("", 0.0)))
-        return ratio_interval(ours, reference)
+    def ratio(key: str) -> Interval:
+        return ratio_interval(broken.values(key), ran.symmetric.values(key))
 
     return Yaw(
         float(np.degrees(np.abs(angle).max(axis=0)).mean()),
@@ -72,16 +67,16 @@ def yaw_of(ran: Ran, mismatch: Mismatch, size: float) -> Yaw:
 
 def symmetric_claim(ran: Ran) -> Claim:
     """Hypotheses 1 and 2 kept."""
-    turn = float(np.degrees(np.abs(ran.symmetric["angle/yaw_rad"]).max()))
+    turn = float(np.degrees(np.abs(trajectory_of(ran.symmetric)["angle/yaw_rad"]).max()))
     return Claim(
         place="Hypotheses 1 and 2",
         says="With symmetric gimbals, flywheels and commands no torque acts on body A: it stands still.",
         found=(
             f"With the thrust bearing free, a push and sensor noise, body A turns by at most {turn:.0e} deg in "
-            f"{DURATION_S:g} s over {ran.symmetric['x1_rad'].shape[1]} seeds: rounding."
+            f"{DURATION_S:g} s over {len(ran.symmetric.outcomes)} seeds: rounding."
         ),
-        verdict=verdict(turn < 1e-6),
-        why="" if turn < 1e-6 else "It turns.",
+        holds=turn < 1e-6,
+        otherwise="It turns.",
         figures={"largest_turn_deg": turn},
     )
 
@@ -95,7 +90,6 @@ def broken_claim(ran: Ran) -> Claim:
     tilt = max(abs(y.tilt.mean - 1.0) for y in found.values())
     balance = max(y.balance for y in found.values())
     listed = ", ".join(f"{found[key].drift_deg:.1f} deg for {_size(*key)}" for key in small)
-    reasonable = ran.fell == 0 and velocity < 0.1
     return Claim(
         place="After Hypothesis 3",
         says=(
@@ -109,21 +103,20 @@ def broken_claim(ran: Ran) -> Claim:
             f"{max(ratios):.2f} of what it is. The velocity RMS error changes by at most {velocity:.1%} and the tilt "
             f"RMS by at most {tilt:.0%}; {ran.fell} worlds fall."
         ),
-        verdict=verdict(reasonable, "yaw"),
-        why=(
+        holds=ran.fell == 0 and velocity < 0.1,
+        conditions=(
             "For the tilt and its estimate, up to the mismatches tried. Body A itself does not stay: on a bearing "
             "without friction it turns while the gimbals are out, and stays where it was left."
-            if reasonable
-            else "The estimate or the rig suffers."
         ),
+        otherwise="The estimate or the rig suffers.",
         figures={
             _size(m, size): {
                 "turn_deg": y.drift_deg,
                 "turn_foreseen_deg": None if math.isnan(y.foreseen_deg) else y.foreseen_deg,
                 "largest_rate_rad_s": y.rate_rad_s,
                 "conservation_miss": y.balance,
-                "velocity_rms_error_by_symmetric": list(y.velocity),
-                "tilt_rms_by_symmetric": list(y.tilt),
+                "velocity_rms_error_by_symmetric": y.velocity,
+                "tilt_rms_by_symmetric": y.tilt,
             }
             for (m, size), y in found.items()
         },
@@ -136,17 +129,16 @@ def _size(mismatch: Mismatch, size: float) -> str:
 
 
 def _picture(ran: Ran, found: dict[tuple[Mismatch, float], Yaw]) -> Picture:
-    t = ran.symmetric["time_s"]
-    pushed = t[ran.symmetric["push_n_m"][:, 0] != 0.0]
-    shaded = [(float(pushed[0]), float(pushed[-1]))]
+    symmetric = trajectory_of(ran.symmetric)
+    t, shaded = symmetric["time_s"], pushed(symmetric.world(0))
     rates, turns, sweep = [], [], []
     for i, mismatch in enumerate(MISMATCHES):
         size = mismatch.sizes[-2]
-        run = ran.broken[mismatch.kind, size]
+        run = trajectory_of(ran.broken[mismatch.kind, size])
         rates.append(Line(t, run["rate/yaw_rad_s"][:, 0], _size(mismatch, size), color=i))
         turns.append(Line(t, np.degrees(run["angle/yaw_rad"][:, 0]), color=i))
         if mismatch.foreseen:
-            foretold = foreseen_yaw_rate(mismatch.kind, size, ran.plant, ran.symmetric)[:, 0]
+            foretold = foreseen_yaw_rate(mismatch.kind, size, ran.plant, symmetric)[:, 0]
             rates.append(Line(t, foretold, "" if i else "foreseen", "k--", width=0.8))
             turns.append(Line(t, np.degrees(np.cumsum(foretold) * (t[1] - t[0])), style="k--", width=0.8))
         largest = mismatch.sizes[-1]
@@ -169,7 +161,7 @@ def _picture(ran: Ran, found: dict[tuple[Mismatch, float], Yaw]) -> Picture:
 
 def hypothesis_3(ran: Ran) -> Claim:
     """The flywheels' speed is constant."""
-    plant, run = ran.plant, ran.symmetric
+    plant, run = ran.plant, trajectory_of(ran.symmetric)
     names = plant.joint_names
     speeds = np.stack([np.abs(run[f"rate/{names[cube.flywheel]}_rad_s"]) for cube in plant.cubes])
     nominal = abs(plant.cubes[0].speed)
@@ -181,8 +173,7 @@ def hypothesis_3(ran: Ran) -> Claim:
     D = model.J1 + model.J2 * np.sin(run["x3_rad"]) ** 2
     left_out = model.J_d * np.sin(run["x3_rad"]) * spin_up / D
     acceleration = np.gradient(run["x2_rad_s"], run["time_s"], axis=0)
-    share = float(np.sqrt(np.mean(left_out**2)) / np.sqrt(np.mean(acceleration**2)))
-    holds = off / nominal < 0.01 and share < 0.01 and nominal > 10.0 * max(gimbal, tilt)
+    share = float(rms(left_out.ravel()) / rms(acceleration.ravel()))
     return Claim(
         place="Hypothesis 3",
         says="The flywheels' speed is held constant and far above the rates of tilt and gimbals.",
@@ -192,8 +183,8 @@ def hypothesis_3(ran: Ran) -> Claim:
             f"rate ({gimbal:.2f} rad/s) and {nominal / tilt:.0f} times the fastest tilt rate. The term with omega_d' "
             f"that (3) leaves out is {share:.2%} of the tilt acceleration (RMS)."
         ),
-        verdict=verdict(holds),
-        why="" if holds else "The speed strays too far.",
+        holds=off / nominal < 0.01 and share < 0.01 and nominal > 10.0 * max(gimbal, tilt),
+        otherwise="The speed strays too far.",
         figures={
             "largest_speed_error_rad_s": off,
             "speed_by_fastest_gimbal_rate": nominal / gimbal,
@@ -203,8 +194,8 @@ def hypothesis_3(ran: Ran) -> Claim:
     )
 
 
-def run(on_share: OnShare) -> list[Claim]:
-    """All claims of this module."""
+def claims(on_share: OnShare) -> list[Claim]:
+    """Hypotheses 1 and 2 kept, then broken, and Hypothesis 3."""
     on_share(0.0)
     ran = run_all(MISMATCHES, WORLDS, SEED, DURATION_S)
     on_share(0.9)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.observers import make_observer
-from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
-from cmg_mj.papers.aranovskiy2020.riccati import DT
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.aranovskiy2020.paper import printed_model
+from cmg_mj.papers.aranovskiy2020.rig import DT
+from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
 from cmg_mj.trajectory import Trajectory
@@ -63,7 +63,6 @@ def lag_claim(seed: int = SEED) -> Claim:
     lag_off = max(abs(t.lag_s / foreseen(tau).lag_s - 1.0) for tau, t in found.items())
     noise_off = max(abs(t.noise_gain_1_s / foreseen(tau).noise_gain_1_s - 1.0) for tau, t in found.items())
     gains = [t.noise_gain_1_s for t in found.values()]
-    holds = lag_off < 0.01 and noise_off < 0.05 and gains == sorted(gains, reverse=True)
     listed = "; ".join(f"{tau:g} s: {t.lag_s * 1e3:.1f} ms, {t.noise_gain_1_s:.2f} 1/s" for tau, t in found.items())
     return Claim(
         place="(9), lag and noise",
@@ -73,8 +72,8 @@ def lag_claim(seed: int = SEED) -> Claim:
             f"in y1 at 200 Hz): {listed}. The lag is 2 tau to {lag_off:.1g}, the noise gain that of "
             f"the transfer function to {noise_off:.1%}; for a long tau it falls as sqrt(dt/(4 tau^3))."
         ),
-        verdict=verdict(holds),
-        why="" if holds else "Lag or noise is not what the transfer function says.",
+        holds=lag_off < 0.01 and noise_off < 0.05 and gains == sorted(gains, reverse=True),
+        otherwise="Lag or noise is not what the transfer function says.",
         figures={
             "tau_s": list(TAUS_S),
             "lag_s": [t.lag_s for t in found.values()],
@@ -102,6 +101,6 @@ def _picture(found: dict[float, Trade]) -> Picture:
     )
 
 
-def run(on_share: OnShare) -> list[Claim]:
-    """All claims of this module."""
+def claims(on_share: OnShare) -> list[Claim]:
+    """The trade."""
     return [lag_claim()]

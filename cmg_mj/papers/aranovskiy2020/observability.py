@@ -6,25 +6,27 @@ import math
 
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.linearisation import printed_model, rank_margin
-from cmg_mj.papers.aranovskiy2020.riccati import DT, SEED, C, closed_loop
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.law import Law
+from cmg_mj.papers.aranovskiy2020.paper import A_prime, C, damping
+from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.linear_check import rank_margin
 
 
 def observability_margin(a: float, outputs: np.ndarray = C) -> float:
-    """Rank margin of [C; C A'; C A'^2] for A' = [[0, 1, 0], [0, a, 0], [0, 0, 0]]."""
-    A = np.array([[0.0, 1.0, 0.0], [0.0, a, 0.0], [0.0, 0.0, 0.0]])
+    """Rank margin of [C; C A'; C A'^2], for the outputs C."""
+    A = A_prime(a)
     return rank_margin(np.vstack([outputs, outputs @ A, outputs @ A @ A]))
 
 
-def gramian_bounds(damping: np.ndarray, dt: float, span_s: float) -> tuple[float, float]:
+def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, float]:
     """Least and largest eigenvalue of the observability Gramian over every span of a run.
 
     Phi(t, s) of A' has the first row [1, phi, 0] with phi' = exp(integral of a): Simpson's rule over the span, a held
     between ticks.
 
     Args:
-        damping: The entry a of A' tick by tick, (n_ticks,) [1/s].
+        a: The entry of A' tick by tick, (n_ticks,) [1/s].
         dt: Between ticks [s].
         span_s: T_0 [s], an even number of ticks.
 
@@ -36,9 +38,9 @@ def gramian_bounds(damping: np.ndarray, dt: float, span_s: float) -> tuple[float
     weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
     weights *= dt / 3.0
     least, largest = math.inf, 0.0
-    for start in range(len(damping) - n):
-        growth = np.exp(np.concatenate([[0.0], np.cumsum(damping[start : start + n] * dt)]))
-        held = damping[start : start + n]
+    for start in range(len(a) - n):
+        held = a[start : start + n]
+        growth = np.exp(np.concatenate([[0.0], np.cumsum(held * dt)]))
         with np.errstate(invalid="ignore", divide="ignore"):
             step = np.where(np.abs(held) < 1e-9, dt, np.expm1(held * dt) / held)
         phi = np.concatenate([[0.0], np.cumsum(growth[:-1] * step)])
@@ -48,19 +50,18 @@ def gramian_bounds(damping: np.ndarray, dt: float, span_s: float) -> tuple[float
     return least, largest
 
 
-def observability(seed: int = SEED, span_s: float = 0.5) -> Claim:
+def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
     """The uniform observability that (10) needs."""
-    model = printed_model()
-    grid = [(u, y2) for u in np.linspace(-4.7, 4.7, 21) for y2 in np.linspace(-math.pi, math.pi, 41)]
-    dampings = [-u * float(model.terms(0.0, float(y2))[2]) for u, y2 in grid]
+    grid = [
+        (u, y2) for u in np.linspace(-Law.rate_limit, Law.rate_limit, 21) for y2 in np.linspace(-math.pi, math.pi, 41)
+    ]
+    dampings = [float(damping(u, float(y2))) for u, y2 in grid]
     margin = min(observability_margin(a) for a in dampings)
     without = max(observability_margin(a, C[1:]) for a in dampings)
-    run = closed_loop(seed)
-    along = -run["u_rad_s"] * model.terms(0.0, run["y2_rad"])[2]
-    least, largest = gramian_bounds(along, DT, span_s)
+    run = run_of_10(seed)
+    least, largest = gramian_bounds(np.asarray(damping(run["u_rad_s"], run["y2_rad"])), DT, span_s)
     worst = [gramian_bounds(np.full(round(span_s / DT) + 1, a), DT, span_s) for a in (min(dampings), max(dampings))]
     bound = min(pair[0] for pair in worst), max(pair[1] for pair in worst)
-    holds = margin > 0.1 and without < 1e-12 and bound[0] > 0.0 and math.isfinite(bound[1])
     return Claim(
         place="After (10)",
         says="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
@@ -72,8 +73,11 @@ def observability(seed: int = SEED, span_s: float = 0.5) -> Claim:
             f"eigenvalues lie between {least:.5f} and {largest:.5f}; for any a within the bound, between "
             f"{bound[0]:.5f} and {bound[1]:.5f}."
         ),
-        verdict=verdict(holds, "a bounded u"),
-        why="Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap.",
+        holds=margin > 0.1 and without < 1e-12 and bound[0] > 0.0 and math.isfinite(bound[1]),
+        conditions=(
+            "Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap."
+        ),
+        otherwise="The pair is not observable for some u and y2, or not uniformly.",
         figures={
             "rank_margin": margin,
             "rank_margin_without_tilt": without,
@@ -85,6 +89,6 @@ def observability(seed: int = SEED, span_s: float = 0.5) -> Claim:
     )
 
 
-def run(on_share: OnShare) -> list[Claim]:
-    """All claims of this module."""
+def claims(on_share: OnShare) -> list[Claim]:
+    """The uniform observability that (10) needs."""
     return [observability()]

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.law import TABLE_2_GAINS
-from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.aranovskiy2020.paper import K_E, printed_model
+from cmg_mj.papers.claim import Claim, OnShare
 
 
 class Inverse(NamedTuple):
@@ -77,7 +76,7 @@ def _squared(polynomial: np.ndarray) -> np.ndarray:
 def lqr_gains() -> Claim:
     """Whether Table 2's K_e is an LQR gain."""
     model = printed_model()
-    found = inverse_optimality(model.A_e, model.B_e, np.array(TABLE_2_GAINS))
+    found = inverse_optimality(model.A_e, model.B_e, np.array(K_E))
     negative = [f"q{i + 1} = {q:.3g}" for i, q in enumerate(found.diagonal) if q < 0.0]
     diagonal = (
         f"No diagonal Q does it: the only candidate has {', '.join(negative)}."
@@ -96,8 +95,11 @@ def lqr_gains() -> Claim:
             f"The return difference |1 + K_e (jw - A_e)^-1 B_e| is nowhere below {found.least:.6f}: K_e "
             f"{'is' if found.optimal else 'is not'} optimal for some quadratic cost, {some}. {diagonal}"
         ),
-        verdict=verdict(found.optimal and found.recovered < 1e-6, "weights"),
-        why="The cost is not a weighted sum of squares of the single states, so the paper's weights remain unknown.",
+        holds=found.optimal and found.recovered < 1e-6,
+        conditions=(
+            "The cost is not a weighted sum of squares of the single states, so the paper's weights remain unknown."
+        ),
+        otherwise="They are no LQR gains.",
         figures={
             "least_return_difference": found.least,
             "recovered_gain_relative_error": found.recovered if found.optimal else None,
@@ -107,6 +109,6 @@ def lqr_gains() -> Claim:
     )
 
 
-def run(on_share: OnShare) -> list[Claim]:
-    """All claims of this module."""
+def claims(on_share: OnShare) -> list[Claim]:
+    """The gains of (8)."""
     return [lqr_gains()]

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval, mean_interval
-from cmg_mj.law import TABLE_2_GAINS
 from cmg_mj.observers import make_observer
-from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.aranovskiy2020.paper import K_E, gimbal_rest, integrator_rest, printed_model
+from cmg_mj.papers.aranovskiy2020.rig import DT, push_recovery
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.recorded import trajectory_of
+from cmg_mj.papers.words import plus_minus
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
-from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
 
 SEED = 73_000
@@ -25,14 +25,25 @@ DURATION_S = 26.0
 AVERAGED_S = 6.0
 """The last so many seconds are averaged [s]; the slowest poles, -0.2 +- 0.29j 1/s, have then faded to 2 %."""
 BIAS_DEG = 0.5
-DT = 0.005
 
+TRUE_RATE = "the true rate, (8)"
+
+
+class Case(NamedTuple):
+    """What the law is fed with."""
+
+    observer: str
+    settings: Sequence[str]
+    true_rate: bool = False
+    estimated_angles: bool = False
+
+
+ESTIMATED = ['controller.angles="estimated"']
 CASES = {
-    "the true rate, (8)": ("homogeneous", ['controller.feedback="truth"']),
-    "(10), estimated angles": ("ltv", ['controller.angles="estimated"']),
-    "(11), estimated angles": ("homogeneous", ['controller.angles="estimated"']),
+    TRUE_RATE: Case("homogeneous", ['controller.feedback="truth"'], true_rate=True),
+    "(10), estimated angles": Case("ltv", ESTIMATED, estimated_angles=True),
+    "(11), estimated angles": Case("homogeneous", ESTIMATED, estimated_angles=True),
 }
-"""What the law is fed with -> observer and settings."""
 
 
 class Rest(NamedTuple):
@@ -49,15 +60,17 @@ class Rest(NamedTuple):
     example: Trajectory
     """World 0."""
 
+    def at_zero(self, expected_x_e: float) -> bool:
+        """Whether x rests at zero and the integrator where it should, within a twentieth of e and of the offset."""
+        return abs(self.x1.mean) < BIAS_DEG / 20.0 and abs(self.x_e.mean / expected_x_e - 1.0) < 0.05
+
 
 def rest_of(case: str, worlds: int, seed: int, extra: Sequence[str] = ()) -> Rest:
     """Let the rig come to rest, without a push."""
-    observer, settings = CASES[case]
-    common = [f"seed={seed}", f"duration_s={DURATION_S}", "push=[]", "plant.initial_tilt_deg=0.0"]
-    common.append(f"plant.equilibrium_bias_deg={BIAS_DEG}")
-    result = prepare(load_scenario("push_recovery", [*common, *settings, *extra], observer)).run_many(worlds)
-    trajectory = result.trajectory
-    assert trajectory is not None
+    observer, settings, *_ = CASES[case]
+    still = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
+    experiment = push_recovery(observer, seed, [*still, *settings, *extra], DURATION_S)
+    trajectory = trajectory_of(experiment.run_many(worlds))
     late = trajectory["time_s"] >= DURATION_S - AVERAGED_S
 
     def mean(name: str, factor: float = 1.0) -> Interval:
@@ -92,79 +105,59 @@ def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple
 
 def expected_integrator(case: str, e_deg: float, sigma: float, seed: int = SEED) -> float:
     """x_e at which the law's command is zero [rad s]: 0 = k1 x1 + k2 x2 + k4 x_e, of what the law is fed with."""
-    k1, k2, _, k4 = TABLE_2_GAINS
-    observer, settings = CASES[case]
+    observer, _, true_rate, estimated_angles = CASES[case]
+    k1, k2, _, k4 = K_E
     x1, x2 = steady(observer, e_deg, sigma, seed)
-    if any("truth" in setting for setting in settings):
-        x2 = 0.0
-    if not any("estimated" in setting for setting in settings):
-        x1 = -math.radians(e_deg)
+    x1 = x1 if estimated_angles else -math.radians(e_deg)
+    x2 = 0.0 if true_rate else x2
     return -(k1 * x1 + k2 * x2) / k4
 
 
-def holds(rest: Rest, expected_x_e: float) -> bool:
-    """Whether x rests at zero and the integrator where it should, within a twentieth of e and of the offset."""
-    return abs(rest.x1.mean) < BIAS_DEG / 20.0 and abs(rest.x_e.mean / expected_x_e - 1.0) < 0.05
-
-
-def run(on_share: OnShare) -> list[Claim]:
-    """All claims of this module."""
-    rests: dict[str, Rest] = {}
-    for i, case in enumerate(CASES):
-        rests[case] = rest_of(case, WORLDS, SEED)
-        on_share((i + 1) / (len(CASES) + 1))
-    static = rest_of("the true rate, (8)", 2, SEED, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
-    on_share(1.0)
-    return [_of_8(rests["the true rate, (8)"], static), _after_10(rests)]
-
-
-def _of_8(rest: Rest, static: Rest) -> Claim:
-    k1, _, k3, k4 = TABLE_2_GAINS
-    x_e = k1 / k4 * math.radians(BIAS_DEG)
-    x3 = k1 / k3 * BIAS_DEG
-    off = abs(static.x3.mean / x3 - 1.0)
+def laws_claim(rest: Rest, static: Rest) -> Claim:
+    """(8), and (7), which has no integrator."""
+    x_e, x3 = integrator_rest(math.radians(BIAS_DEG)), gimbal_rest(BIAS_DEG)
     return Claim(
         place="(7), (8) on the rig",
         says="Without the integrator the gimbal rests away from zero; with it x converges to zero.",
         found=(
             f"Six bodies, e = {BIAS_DEG:g} deg, the true rate in the law. k4 = 0: x3 rests at {static.x3.mean:.2f} "
             f"deg (k1/k3 e = {x3:.2f}). With K_e, mean over the last {AVERAGED_S:g} s of {DURATION_S:g}, {WORLDS} "
-            f"seeds: tilt {rest.x1.mean:+.4f} +- {rest.x1.half:.4f} deg, gimbal {rest.x3.mean:+.2f} deg, x_e = "
+            f"seeds: tilt {plus_minus(rest.x1, signed=True)} deg, gimbal {rest.x3.mean:+.2f} deg, x_e = "
             f"{rest.x_e.mean:.3f} rad s (+k_e1/k_e4 e = {x_e:.3f})."
         ),
-        verdict=verdict(holds(rest, x_e) and off < 0.05, "sign"),
-        why="With the signs that follow from y1 = x1 - e: k1/k3 e and +k_e1/k_e4 e.",
+        holds=rest.at_zero(x_e) and abs(static.x3.mean / x3 - 1.0) < 0.05,
+        conditions="With the signs that follow from y1 = x1 - e: k1/k3 e and +k_e1/k_e4 e.",
+        otherwise="They rest elsewhere.",
         figures={
             "gimbal_rest_without_integrator_deg": static.x3.mean,
             "gimbal_rest_expected_deg": x3,
-            "tilt_rest_deg": list(rest.x1),
-            "gimbal_rest_deg": list(rest.x3),
-            "integrator_rest_rad_s": list(rest.x_e),
+            "tilt_rest_deg": rest.x1,
+            "gimbal_rest_deg": rest.x3,
+            "integrator_rest_rad_s": rest.x_e,
             "integrator_expected_rad_s": x_e,
         },
     )
 
 
-def _after_10(rests: dict[str, Rest]) -> Claim:
-    observed = {case: rest for case, rest in rests.items() if case.startswith("(")}
-    example = rests["the true rate, (8)"].example
+def observers_claim(rests: Mapping[str, Rest]) -> Claim:
+    """With an observer in the law, which the bias biases.
+
+    Args:
+        rests: By case, the true rate among them.
+
+    Returns:
+        The claim.
+    """
+    observed = {case: rest for case, rest in rests.items() if case != TRUE_RATE}
+    example = rests[TRUE_RATE].example
     sigma = float(np.std(example["y1_rad"] - example["x1_rad"]))
     expected = {case: expected_integrator(case, BIAS_DEG, sigma) for case in observed}
     quiet = steady("homogeneous", BIAS_DEG, 0.0)[1]
-    all_hold = all(holds(rest, expected[case]) for case, rest in observed.items())
     listed = "; ".join(
-        f"{case}: rate estimated {rest.x2_estimated.mean:+.4f} rad/s, tilt {rest.x1.mean:+.4f} +- {rest.x1.half:.4f} "
+        f"{case}: rate estimated {rest.x2_estimated.mean:+.4f} rad/s, tilt {plus_minus(rest.x1, signed=True)} "
         f"deg, x_e {rest.x_e.mean:.3f} rad s ({expected[case]:.3f} expected)"
         for case, rest in observed.items()
     )
-    lines = [
-        Line(rest.example["time_s"], rest.example["x_e_rad_times_s"], case, color=i)
-        for i, (case, rest) in enumerate(rests.items())
-    ]
-    tilts = [
-        Line(rest.example["time_s"], np.degrees(rest.example["x1_rad"]), color=i, width=0.5)
-        for i, rest in enumerate(rests.values())
-    ]
     return Claim(
         place="After (10), the equilibrium",
         says="The integral action makes x = 0 the equilibrium even with an observer whose estimate e biases.",
@@ -172,24 +165,40 @@ def _after_10(rests: dict[str, Rest]) -> Claim:
             f"The same rig with an observer in the law, {WORLDS} seeds. {listed}. Without noise (11) would estimate "
             f"{quiet:+.4f} rad/s: its gains fall with the size of its error, so noise adds to its bias."
         ),
-        verdict=verdict(all_hold),
-        why="" if all_hold else "The rest is not where it should be.",
+        holds=all(rest.at_zero(expected[case]) for case, rest in observed.items()),
+        otherwise="The rest is not where it should be.",
         figures={
             key: value
             for case, rest in observed.items()
             for key, value in (
-                (f"tilt_rest {case}_deg", list(rest.x1)),
-                (f"integrator_rest {case}_rad_s", list(rest.x_e)),
+                (f"tilt_rest {case}_deg", rest.x1),
+                (f"integrator_rest {case}_rad_s", rest.x_e),
                 (f"integrator_expected {case}_rad_s", expected[case]),
-                (f"rate_estimated {case}_rad_s", list(rest.x2_estimated)),
+                (f"rate_estimated {case}_rad_s", rest.x2_estimated),
             )
         },
-        pictures=[
-            Picture(
-                "aranovskiy2020-equilibrium",
-                f"aranovskiy2020, Section III and after (10): the way to rest from the upright, e = {BIAS_DEG:g} deg, "
-                "world 0",
-                [Panel("integrator x_e [rad s]", lines), Panel("tilt x1 [deg]", tilts)],
-            )
-        ],
+        pictures=[_picture(rests)],
     )
+
+
+def _picture(rests: Mapping[str, Rest]) -> Picture:
+    integrators, tilts = [], []
+    for i, (case, rest) in enumerate(rests.items()):
+        t = rest.example["time_s"]
+        integrators.append(Line(t, rest.example["x_e_rad_times_s"], case, color=i))
+        tilts.append(Line(t, np.degrees(rest.example["x1_rad"]), color=i, width=0.5))
+    return Picture(
+        "aranovskiy2020-equilibrium",
+        f"aranovskiy2020, Section III and after (10): the way to rest from the upright, e = {BIAS_DEG:g} deg, world 0",
+        [Panel("integrator x_e [rad s]", integrators), Panel("tilt x1 [deg]", tilts)],
+    )
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """The laws with the true rate, then with observers."""
+    rests: dict[str, Rest] = {}
+    for i, case in enumerate(CASES):
+        rests[case] = rest_of(case, WORLDS, SEED)
+        on_share((i + 1) / (len(CASES) + 1))
+    static = rest_of(TRUE_RATE, 2, SEED, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
+    return [laws_claim(rests[TRUE_RATE], static), observers_claim(rests)]

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.observers import Measurement, make_observer
-from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
-from cmg_mj.papers.aranovskiy2020.riccati import DT, Plain, euler, rk4
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain, euler, rk4
+from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model
+from cmg_mj.papers.aranovskiy2020.rig import DT
+from cmg_mj.papers.claim import Claim, OnShare
 
 
 def update_times(worlds: int | None, repeats: int, updates: int) -> dict[str, float]:
@@ -26,7 +27,7 @@ def update_times(worlds: int | None, repeats: int, updates: int) -> dict[str, fl
         Time by observer.
     """
     model = printed_model()
-    cases: dict[str, Any] = {name: make_observer(name, DT, model) for name in ("linear", "homogeneous", "ltv")}
+    cases: dict[str, Any] = {name: make_observer(name, DT, model) for name in OBSERVERS}
     if worlds is None:
         cases |= {"ltv, plain Euler": Plain(euler), "ltv, plain Runge-Kutta 4": Plain(rk4)}
     value: Any = 0.01 if worlds is None else np.full(worlds, 0.01)
@@ -51,7 +52,6 @@ def cost() -> Claim:
     many = update_times(worlds, repeats=5, updates=4)
     ratios = {name: one[name] / one["linear"] for name in one}
     arithmetic = {name: many[name] / many["linear"] for name in many}
-    dearest = one["ltv"] > one["homogeneous"] > one["linear"] and arithmetic["ltv"] > 1.0
     return Claim(
         place="Remark 1, cost",
         says="The observer (10) is computationally heavy: its gain takes differential equations solved online.",
@@ -63,7 +63,8 @@ def cost() -> Claim:
             f"{arithmetic['homogeneous']:.1f}, (10) {arithmetic['ltv']:.1f}. (10) takes {one['ltv']:.0f} us of the "
             "5000 us of a control period here."
         ),
-        verdict=verdict(dearest),
+        holds=one["ltv"] > one["homogeneous"] > one["linear"] and arithmetic["ltv"] > 1.0,
+        otherwise="It is not the dearest of the three.",
         figures={
             "update_us": one,
             "update_by_linear": ratios,
@@ -72,6 +73,6 @@ def cost() -> Claim:
     )
 
 
-def run(on_share: OnShare) -> list[Claim]:
-    """All claims of this module."""
+def claims(on_share: OnShare) -> list[Claim]:
+    """The cost."""
     return [cost()]

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cmg_mj.observers import Measurement, make_observer
-from cmg_mj.papers.aranovskiy2020.linearisation import printed_model
-from cmg_mj.papers.aranovskiy2020.riccati import DT
-from cmg_mj.papers.claim import Claim, OnShare, verdict
+from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
+from cmg_mj.papers.aranovskiy2020.rig import DT
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.recorded import rms
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
 from cmg_mj.trajectory import Trajectory
 
 SEED = 77_000
 ALPHAS = (0.55, 0.7, 0.85, 1.0)
+SETTLING = ALPHAS[1:]
+"""Those without much chatter."""
 BIASES_DEG = (0.125, 0.25, 0.5, 1.0, 2.0)
 NOISES_RAD = (0.0005, 0.001, 0.002, 0.004, 0.008)
-K1, K2 = 20.0, 150.0
-"""Table 2."""
+TICKS = 2000
 VANISHED = 1e-3
 """Of the first error of the rate: what is left counts as none."""
 SEEN_RAD_S = 0.01
@@ -48,15 +51,14 @@ def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
     """
     columns = {"y1_rad": y1, "y2_rad": np.zeros_like(y1), "u_rad_s": np.zeros_like(y1)}
     observer = make_observer("homogeneous", DT, printed_model(), alpha=alpha)
-    x2 = replay(observer, Trajectory(columns)).x2[len(y1) // 2 :]
-    return np.sqrt(np.mean(x2**2, axis=0))
+    return rms(replay(observer, Trajectory(columns)).x2[len(y1) // 2 :])
 
 
 def bias_bound(alpha: float, e_rad: float) -> float:
     """k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), where (11) rests if y1 = -e [rad/s]."""
-    model = printed_model()
+    model, (k1, k2, _) = printed_model(), TABLE_2["homogeneous"].values()
     pull = model.gravity_torque * math.sin(e_rad) / model.J1
-    return K1 * (pull / K2) ** (alpha / (2.0 * alpha - 1.0))
+    return k1 * (pull / k2) ** (alpha / (2.0 * alpha - 1.0))
 
 
 def hurwitz(b: float, c: float) -> bool:
@@ -64,36 +66,57 @@ def hurwitz(b: float, c: float) -> bool:
     return bool(np.roots([1.0, b, c]).real.max() < 0.0)
 
 
-def _listed(by_alpha: Mapping[float, float], form: str) -> str:
-    return ", ".join(f"{alpha:g}: {value:{form}}" for alpha, value in by_alpha.items())
+class Vicinity(NamedTuple):
+    """How far from the true rate the estimate ends, at rest."""
+
+    by_bias: dict[float, np.ndarray]
+    """alpha -> error without noise, (n_biases,) [rad/s]."""
+    bound: dict[float, np.ndarray]
+    """alpha -> the same in closed form."""
+    by_noise: dict[float, np.ndarray]
+    """alpha -> RMS error without bias, (n_noises,) [rad/s]."""
+
+    @property
+    def relative_difference(self) -> float:
+        """Largest miss of the closed form where it is above `SEEN_RAD_S`, relative."""
+        return max(abs(x / b - 1.0) for x, b in self._pairs() if b > SEEN_RAD_S)
+
+    @property
+    def difference(self) -> float:
+        """Largest miss where it is not [rad/s]."""
+        return max(abs(x - b) for x, b in self._pairs() if b <= SEEN_RAD_S)
+
+    @property
+    def exponents(self) -> dict[float, float]:
+        """With which power of the noise the error rises, by alpha."""
+        sizes = np.log(NOISES_RAD)
+        return {alpha: float(np.polyfit(sizes, np.log(error), 1)[0]) for alpha, error in self.by_noise.items()}
+
+    def _pairs(self) -> list[tuple[float, float]]:
+        return [(float(x), float(b)) for a in self.by_bias for x, b in zip(self.by_bias[a], self.bound[a], strict=True)]
+
+
+def vicinity(rng: np.random.Generator) -> Vicinity:
+    """Measure it over bias and noise."""
+    biased = np.tile(-np.radians(BIASES_DEG), (TICKS, 1))
+    noise = rng.normal(0.0, 1.0, (TICKS, 16))
+    return Vicinity(
+        {alpha: errors_at_rest(alpha, biased) for alpha in SETTLING},
+        {alpha: np.array([bias_bound(alpha, e) for e in np.radians(BIASES_DEG)]) for alpha in SETTLING},
+        {alpha: np.array([errors_at_rest(alpha, sigma * noise).mean() for sigma in NOISES_RAD]) for alpha in SETTLING},
+    )
 
 
 def vicinity_claim(seed: int = SEED) -> Claim:
     """Convergence to a vicinity of the origin, and how large it is."""
+    rng = np.random.default_rng(seed)
     left, often = ({alpha: left_of_an_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
     # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
     converges = all(left[a] < VANISHED or often[a] < left[a] / 10.0 for a in ALPHAS)
-    ticks = 2000
-    still = np.tile(-np.radians(BIASES_DEG), (ticks, 1))
-    by_bias = {alpha: errors_at_rest(alpha, still) for alpha in ALPHAS[1:]}
-    bound = {alpha: np.array([bias_bound(alpha, e) for e in np.radians(BIASES_DEG)]) for alpha in by_bias}
-    pairs_of = [(x, b) for alpha in by_bias for x, b in zip(by_bias[alpha], bound[alpha], strict=True)]
-    off = max(abs(x / b - 1.0) for x, b in pairs_of if b > SEEN_RAD_S)
-    apart = max(abs(x - b) for x, b in pairs_of if b <= SEEN_RAD_S)
-    rng = np.random.default_rng(seed)
-    noise = rng.normal(0.0, 1.0, (ticks, 16))
-    by_noise = {
-        alpha: np.array([errors_at_rest(alpha, sigma * noise).mean() for sigma in NOISES_RAD]) for alpha in by_bias
-    }
-    slopes = {a: float(np.polyfit(np.log(NOISES_RAD), np.log(rms), 1)[0]) for a, rms in by_noise.items()}
-    pairs = rng.normal(0.0, 100.0, (500, 2))
-    same = all(hurwitz(k1, k2) == hurwitz(k2, k1) for k1, k2 in pairs)
-    holds = converges and off < 0.01 and apart < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5
-    why = "With s^2 + k1 s + k2 Hurwitz; the printed s^2 + k2 s + k1 has k1 and k2 exchanged" + (
-        ", without consequence: either is Hurwitz just when both gains are positive."
-        if same
-        else ", and the two are not Hurwitz together."
-    )
+    found = vicinity(rng)
+    off, apart, slopes = found.relative_difference, found.difference, found.exponents
+    gains = rng.normal(0.0, 100.0, (500, 2))
+    same = all(hurwitz(k1, k2) == hurwitz(k2, k1) for k1, k2 in gains)
     return Claim(
         place="After (11), the vicinity",
         says="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
@@ -103,63 +126,63 @@ def vicinity_claim(seed: int = SEED) -> Claim:
             "what is left is chatter between samples. With a bias e the rate rests off by "
             f"k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), to {off:.0e} of it for e from {BIASES_DEG[0]:g} to "
             f"{BIASES_DEG[-1]:g} deg where that is above {SEEN_RAD_S:g} rad/s, else to {apart:.0e} rad/s; at 0.5 deg "
-            f"{_listed({a: values[2] for a, values in by_bias.items()}, '.4f')} rad/s. With noise in y1 and e = "
+            f"{_listed({a: values[2] for a, values in found.by_bias.items()}, '.4f')} rad/s. With noise in y1 and e = "
             "0 its RMS rises with the noise to the power "
             f"{_listed(slopes, '.2f')}: the vicinity shrinks to the origin "
-            f"with either. Of {len(pairs)} random pairs of gains, of any sign, the two polynomials are Hurwitz "
+            f"with either. Of {len(gains)} random pairs of gains, of any sign, the two polynomials are Hurwitz "
             f"together in {'all' if same else 'some'}."
         ),
-        verdict=verdict(holds, why),
-        why=why if holds else "The error does not converge, or not to the vicinity foreseen.",
-        figures={
-            "error_left_share": {str(alpha): value for alpha, value in left.items()},
-            "bias_deg": list(BIASES_DEG),
-            "rate_error_by_bias_rad_s": {str(alpha): values.tolist() for alpha, values in by_bias.items()},
-            "error_left_share_2000_hz": {str(alpha): value for alpha, value in often.items()},
-            "closed_form_relative_difference": float(off),
-            "closed_form_difference_where_small_rad_s": float(apart),
-            "noise_rad": list(NOISES_RAD),
-            "rate_error_by_noise_rad_s": {str(alpha): values.tolist() for alpha, values in by_noise.items()},
-            "exponent_of_noise": {str(alpha): value for alpha, value in slopes.items()},
-        },
-        pictures=[
-            Picture(
-                "aranovskiy2020-vicinity",
-                "aranovskiy2020, (11): how far from the true rate its estimate rests, k1 and k2 of Table 2",
-                [
-                    Panel(
-                        "rate error [rad/s]",
-                        [
-                            line
-                            for i, alpha in enumerate(by_bias)
-                            for line in (
-                                Line(BIASES_DEG, by_bias[alpha], f"alpha = {alpha:g}", "o", color=i + 1),
-                                Line(BIASES_DEG, bound[alpha], color=i + 1, width=0.8),
-                            )
-                        ],
-                        "no noise; lines: closed form; above: chatter",
-                        "equilibrium bias e [deg]",
-                        "log",
-                        "log",
-                    ),
-                    Panel(
-                        "RMS rate error\n[rad/s]",
-                        [
-                            Line(np.degrees(NOISES_RAD), by_noise[a], f"alpha = {a:g}", "o-", color=i + 1)
-                            for i, a in enumerate(by_noise)
-                        ],
-                        "with noise, no bias",
-                        "standard deviation of y1's noise [deg]",
-                        "log",
-                        "log",
-                    ),
-                ],
-                share_x=False,
+        holds=converges and off < 0.01 and apart < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5,
+        conditions=(
+            "With s^2 + k1 s + k2 Hurwitz; the printed s^2 + k2 s + k1 has k1 and k2 exchanged"
+            + (
+                ", without consequence: either is Hurwitz just when both gains are positive."
+                if same
+                else ", and the two are not Hurwitz together."
             )
-        ],
+        ),
+        otherwise="The error does not converge, or not to the vicinity foreseen.",
+        figures={
+            "error_left_share": _by_name(left),
+            "bias_deg": list(BIASES_DEG),
+            "rate_error_by_bias_rad_s": _by_name(found.by_bias),
+            "error_left_share_2000_hz": _by_name(often),
+            "closed_form_relative_difference": off,
+            "closed_form_difference_where_small_rad_s": apart,
+            "noise_rad": list(NOISES_RAD),
+            "rate_error_by_noise_rad_s": _by_name(found.by_noise),
+            "exponent_of_noise": _by_name(slopes),
+        },
+        pictures=[_picture(found)],
     )
 
 
-def run(on_share: OnShare) -> list[Claim]:
-    """All claims of this module."""
+def _listed(by_alpha: Mapping[float, float], form: str) -> str:
+    return ", ".join(f"{alpha:g}: {value:{form}}" for alpha, value in by_alpha.items())
+
+
+def _by_name(by_alpha: Mapping[float, Any]) -> dict[str, Any]:
+    return {str(alpha): np.asarray(value).tolist() for alpha, value in by_alpha.items()}
+
+
+def _picture(found: Vicinity) -> Picture:
+    biased, noisy = [], []
+    for i, alpha in enumerate(SETTLING):
+        biased.append(Line(BIASES_DEG, found.by_bias[alpha], f"alpha = {alpha:g}", "o", color=i + 1))
+        biased.append(Line(BIASES_DEG, found.bound[alpha], color=i + 1, width=0.8))
+        noisy.append(Line(np.degrees(NOISES_RAD), found.by_noise[alpha], f"alpha = {alpha:g}", "o-", color=i + 1))
+    e, sigma = "equilibrium bias e [deg]", "standard deviation of y1's noise [deg]"
+    return Picture(
+        "aranovskiy2020-vicinity",
+        "aranovskiy2020, (11): how far from the true rate its estimate rests, k1 and k2 of Table 2",
+        [
+            Panel("rate error [rad/s]", biased, "no noise; lines: closed form; above: chatter", e, "log", "log"),
+            Panel("RMS rate error\n[rad/s]", noisy, "with noise, no bias", sigma, "log", "log"),
+        ],
+        share_x=False,
+    )
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """The vicinity."""
     return [vicinity_claim()]

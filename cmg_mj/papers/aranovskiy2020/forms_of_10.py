@@ -1,0 +1,116 @@
+"""The observer (10) of aranovskiy2020 in several forms: written out with several methods for H, and ours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cmg_mj.observers import Measurement, Observer
+from cmg_mj.observers.ltv import LinearTimeVarying, State
+from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, printed_model, riccati_slope
+from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
+from cmg_mj.papers.recorded import rms
+from cmg_mj.replay import replay
+
+Method = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
+"""(H, A', step) -> H one step later."""
+
+# --- methods for the Riccati equation ---------------------------------------------------------------------------
+
+
+def euler(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
+    """One explicit Euler step."""
+    return H + H.dtype.type(h) * riccati_slope(H, A)
+
+
+def rk4(H: np.ndarray, A: np.ndarray, h: float, first: np.ndarray | None = None) -> np.ndarray:
+    """One classical Runge-Kutta step."""
+    t = H.dtype.type(h)
+    k1 = riccati_slope(H, A, first)
+    k2 = riccati_slope(H + t / 2 * k1, A, first)
+    k3 = riccati_slope(H + t / 2 * k2, A, first)
+    return H + t / 6 * (k1 + 2 * k2 + 2 * k3 + riccati_slope(H + t * k3, A, first))
+
+
+def rk4_as_printed(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
+    """The same with the printed first term, H A^T with A of (6)."""
+    return rk4(H, A, h, printed_model().A)
+
+
+def exact_step(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
+    """One sample of this package's observer at rest, where A is that of `A_prime()`."""
+    observer = ours(h)
+    still = Measurement(0.0, 0.0)
+    entries = {"h11": H[0, 0], "h12": H[0, 1], "h22": H[1, 1], "h33": H[2, 2]}
+    state = observer.init(still)._replace(**{name: float(value) for name, value in entries.items()})
+    return matrix_of(observer.step(state, still, 0.0)[0])
+
+
+METHODS: dict[str, Method] = {
+    "explicit Euler": euler,
+    "Runge-Kutta 4": rk4,
+    "exact step (ours)": exact_step,
+}
+
+
+# --- the observer -----------------------------------------------------------------------------------------------
+
+
+@cache
+def ours(dt: float = DT) -> LinearTimeVarying:
+    """This package's (10)."""
+    return LinearTimeVarying(dt=dt, model=printed_model())
+
+
+def matrix_of(state: State) -> np.ndarray:
+    """H of this package's observer, (3, 3)."""
+    return np.array([[state.h11, state.h12, 0.0], [state.h12, state.h22, 0.0], [0.0, 0.0, state.h33]], dtype=float)
+
+
+class Plain:
+    """(10) as it is printed: one step of twelve equations a sample, matrices of NumPy."""
+
+    def __init__(self, method: Method, dt: float = DT) -> None:
+        self.method, self.dt = method, dt
+        self.model = printed_model()
+
+    def init(self, y: Measurement) -> tuple[np.ndarray, np.ndarray]:
+        """Start at rest, with H = H_0."""
+        return np.array([y.y1, 0.0, y.y2]), H_0
+
+    def step(self, state: tuple[np.ndarray, np.ndarray], y: Measurement, u: float) -> tuple[Any, Any]:
+        """Advance by one sample period: H by the method, the estimate by Euler."""
+        x, H = state
+        drift, gain, damping = self.model.terms(y.y1, y.y2)
+        A = A_prime(-u * damping)
+        b = np.array([0.0, drift + u * gain, u])
+        x = x + self.dt * (A @ x + b - H @ C.T @ (C @ x - np.array(y)))
+        return (x, self.method(H, A, self.dt)), x
+
+
+class Compared(NamedTuple):
+    """Two forms of (10) along a closed-loop run, from 0.2 s on."""
+
+    difference: float
+    """RMS of the rate estimated by the other less that by the one [rad/s]."""
+    error: float
+    """RMS error of the one [rad/s]."""
+    other_error: float
+    """RMS error of the other [rad/s]."""
+
+
+def compared(one: Observer, other: Observer, seed: int) -> Compared:
+    """Replay both on a run with (10) in the loop."""
+    run = run_of_10(seed)
+    later = run["time_s"] > 0.2
+    truth = run["x2_rad_s"][later]
+    rate, other_rate = (replay(form, run).x2[later] for form in (one, other))
+    return Compared(*(float(rms(off)) for off in (other_rate - rate, rate - truth, other_rate - truth)))
+
+
+def euler_against_exact(seed: int) -> Compared:
+    """What all twelve equations by explicit Euler change."""
+    return compared(ours(), Plain(euler), seed)

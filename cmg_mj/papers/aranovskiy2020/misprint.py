@@ -1,0 +1,76 @@
+"""The Riccati equation of (10) as aranovskiy2020 prints it: with A^T of (6) where A'^T belongs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import Compared, Method, Plain, compared, rk4, rk4_as_printed
+from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime
+from cmg_mj.papers.aranovskiy2020.rig import SEED_OF_10
+from cmg_mj.papers.claim import Claim, OnShare
+
+SETTLING_S = 8.0
+"""The slowest entry, H33, takes 1 s to fall by e^2 [s]."""
+
+
+class Misprint(NamedTuple):
+    """What the printed Riccati equation changes."""
+
+    corrected: np.ndarray
+    """H where the corrected equation settles at rest, (3, 3)."""
+    printed: np.ndarray
+    """H where the printed one does, (3, 3)."""
+    rate: Compared
+    """The corrected form and the printed one along a closed-loop run."""
+
+
+def settled(method: Method, h: float = 1e-3) -> np.ndarray:
+    """H where a method settles at rest, (3, 3)."""
+    H = H_0
+    for _ in range(round(SETTLING_S / h)):
+        H = method(H, A_prime(), h)
+    return H
+
+
+def misprint(seed: int = SEED_OF_10) -> Misprint:
+    """Integrate both equations, at rest and along a run, with Runge-Kutta 4."""
+    along = compared(Plain(rk4), Plain(rk4_as_printed), seed)
+    return Misprint(settled(rk4), settled(rk4_as_printed), along)
+
+
+def misprint_claim(seed: int = SEED_OF_10) -> Claim:
+    """The Riccati equation as printed."""
+    H, printed, rate = misprint(seed)
+    asymmetry = float(abs(printed[0, 1] - printed[1, 0]) / printed[1, 0])
+    gain = float(np.abs(printed[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
+    return Claim(
+        place="After (10), the Riccati equation",
+        says="H' = H A^T + A' H - H C^T C H + Q keeps the gain matrix symmetric.",
+        found=(
+            f"With A of (6) as printed, H settles at rest with H12 = {printed[0, 1]:.1f} and H21 = "
+            f"{printed[1, 0]:.1f}: not symmetric, by {asymmetry:.1%}. With A'^T in A^T's place both are "
+            f"{H[1, 0]:.1f}. The observer uses H C^T alone, of which the largest change is {gain:.2%} of its largest "
+            f"entry (H11 {H[0, 0]:.2f}, printed {printed[0, 0]:.2f}). Along a closed-loop run the rate changes by "
+            f"{rate.difference:.4f} rad/s RMS (H by Runge-Kutta 4, the estimate by "
+            f"Euler), its error from {rate.error:.4f} to {rate.other_error:.4f} rad/s."
+        ),
+        holds=float(np.abs(H - H.T).max()) < 1e-6 * float(np.abs(H).max()),
+        conditions="With A'^T for the printed A^T, which is that of (6): a misprint.",
+        otherwise="Not even with A'^T.",
+        figures={
+            "H12_printed": float(printed[0, 1]),
+            "H21_printed": float(printed[1, 0]),
+            "H12": float(H[0, 1]),
+            "largest_change_of_gain_share": gain,
+            "rate_changed_rad_s": rate.difference,
+            "rate_error_rad_s": rate.error,
+            "rate_error_printed_rad_s": rate.other_error,
+        },
+    )
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """The misprint."""
+    return [misprint_claim()]

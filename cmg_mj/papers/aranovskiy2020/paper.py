@@ -1,0 +1,104 @@
+"""What aranovskiy2020 prints: Tables 1 and 2, the reduced model, where the law rests, the observer (10)."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.reduced import ReducedModel
+
+TABLE_1 = {
+    "m": 2.62,
+    "l": 0.19,
+    "J_b": 13e-3,
+    "J_c": 2.6e-4,
+    "K_c": 9.9e-4,
+    "I_d": 5.6e-4,
+    "J_d": 11e-4,
+    "omega_d": 314.0,
+    "g": 9.81,
+}
+"""Table 1 [kg, m, kg m^2, rad/s], and the standard gravity that it does not give [m/s^2]."""
+
+K_E = (35.0, 4.0, -1.0, 0.3)
+"""Table 2: the gains of (8) on [x1, x2, x3, x_e]; the first three of them in (7)."""
+
+TABLE_2: dict[str, dict[str, Any]] = {
+    "linear": {"tau": 0.02},
+    "ltv": {"Q": (1.0, 5e6, 1.0), "H0": (1.0, 1.0, 1.0)},
+    "homogeneous": {"k1": 20.0, "k2": 150.0, "alpha": 0.85},
+}
+"""Table 2: observer -> its parameters."""
+
+OBSERVERS = {"linear": "(9)", "ltv": "(10)", "homogeneous": "(11)"}
+"""The paper's three by the bench's names, and their equations."""
+
+Q, H_0 = np.diag(TABLE_2["ltv"]["Q"]), np.diag(TABLE_2["ltv"]["H0"])
+"""Of (10), (3, 3)."""
+
+C = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""After (10): tilt and gimbal angle are measured."""
+
+
+@cache
+def printed_model() -> ReducedModel:
+    """J1, J2, J_d omega_d and m g l/sqrt(2) by the closed forms below (2), from Table 1's numbers alone."""
+    t = TABLE_1
+    return ReducedModel(
+        J1=t["I_d"] + t["J_b"] + t["K_c"] + t["m"] * t["l"] ** 2 / 2.0,
+        J2=t["J_c"] - t["I_d"] + t["J_d"] - t["K_c"],
+        J_d=t["J_d"],
+        omega_d=t["omega_d"],
+        gravity_torque=t["m"] * t["g"] * t["l"] / math.sqrt(2.0),
+    )
+
+
+def gimbal_rest(e: float) -> float:
+    """x3 at which (7) rests: k1/k3 e, in the unit of e. After (7) it is printed with a minus."""
+    k1, _, k3, _ = K_E
+    return k1 / k3 * e
+
+
+def integrator_rest(e: float) -> float:
+    """x_e at which (8) rests: k_e1/k_e4 e, for e in rad [rad s]. After (8) it is printed with a minus."""
+    k1, _, _, k4 = K_E
+    return k1 / k4 * e
+
+
+def damping(u: float | np.ndarray, y2: float | np.ndarray) -> float | np.ndarray:
+    """A = -u J2 sin(2 y2)/(J1 + J2 sin(y2)^2), the one entry of A' in (10) that varies [1/s]."""
+    return -u * printed_model().terms(0.0, y2)[2]
+
+
+def A_prime(a: float = 0.0) -> np.ndarray:
+    """A'(y, u) of (10), by its entry a [1/s]; at rest, where a = 0, a double integrator. (3, 3)."""
+    return np.array([[0.0, 1.0, 0.0], [0.0, a, 0.0], [0.0, 0.0, 0.0]])
+
+
+def riccati_slope(H: np.ndarray, A: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
+    """H' of (10): H A'^T + A' H - H C^T C H + Q, in the precision of H, (3, 3).
+
+    Args:
+        H: The gain matrix, (3, 3).
+        A: A', (3, 3).
+        first: What stands transposed in the first term instead: A of (6) is printed there. (3, 3).
+
+    Returns:
+        The slope.
+    """
+    kind = H.dtype
+    return (
+        H @ (A if first is None else first).T.astype(kind)
+        + A.astype(kind) @ H
+        - H @ (C.T @ C).astype(kind) @ H
+        + Q.astype(kind)
+    )
+
+
+def settled_gains() -> tuple[float, float]:
+    """H11 and H12 at which the Riccati equation of (10) settles at rest, Q of Table 2 [1/s], [1/s^2]."""
+    q1, q2 = Q[0, 0], Q[1, 1]
+    return math.sqrt(q1 + 2.0 * math.sqrt(q2)), math.sqrt(q2)
