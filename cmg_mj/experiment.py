@@ -157,6 +157,18 @@ class Experiment:
             temporary.write_text(tomli_w.dumps(self.resolved()))
 
 
+def load_rig(scenario: Scenario) -> Plant:
+    """Load a scenario's rig.
+
+    Raises:
+        InputError: `load_plant` refuses it; the scenario is named.
+    """
+    try:
+        return load_plant(scenario.plant)
+    except InputError as error:
+        raise InputError(located(scenario._where, str(error))) from error
+
+
 def prepare(scenario: Scenario, plant: Plant | None = None) -> Experiment:
     """Load the plant, construct everything and try the observers once, so that what does not fit is found before a run.
 
@@ -170,9 +182,5 @@ def prepare(scenario: Scenario, plant: Plant | None = None) -> Experiment:
     Raises:
         InputError: Something in the scenario does not fit.
     """
-    if plant is None:
-        try:
-            plant = load_plant(scenario.plant)
-        except InputError as error:
-            raise InputError(located(scenario._where, str(error))) from error
+    plant = load_rig(scenario) if plant is None else plant
     return Experiment(scenario, plant, design(scenario, plant.reduced))

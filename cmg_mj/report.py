@@ -84,7 +84,8 @@ def summary_table(summary: Mapping[str, Any]) -> Table:
             table.add_row(_capitalised(heading(key)), written(key, summary[key]))
     error = "velocity_rms_error_rad_s"
     for name, figures in summary.get("companions", {}).items():
-        table.add_row(f"{_capitalised(heading(error))} of {name}", written(error, figures[error]))
+        of = KEYS[error]._replace(label=f"{KEYS[error].label} of {name}")
+        table.add_row(_capitalised(of.heading), written(error, figures[error]))
     return table
 
 

@@ -16,9 +16,9 @@ import tomli_w
 
 from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError
-from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.experiment import Experiment, load_rig, prepare
 from cmg_mj.observers.protocol import BIAS, extra_signals
-from cmg_mj.plant import Plant, load_plant
+from cmg_mj.plant import Plant
 from cmg_mj.plots import plot_run
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Outcome, Result
@@ -101,7 +101,7 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
     Raises:
         InputError: An observer does not exist, or something does not fit.
     """
-    plant = load_plant(scenario.plant)
+    plant = load_rig(scenario)
     experiments = [prepare(_untrimmed(scenario.with_observer(kind), plant), plant) for kind in observers]
     for experiment in experiments:
         experiment.rehearse(worlds=2)

@@ -16,43 +16,13 @@ from tests.observers.reference import PAPER
 
 PACKAGE = Path(cmg_mj.__file__).parent
 
-UPPER = [
-    "errors",
-    "timing",
-    "elementwise",
-    "resources",
-    "push",
-    "reduced",
-    "tilt",
-    "sensors",
-    "observers",
-    "controller",
-    "trajectory",
-    "replay",
-    "metrics",
-    "intervals",
-    "picture",
-]
-LOWER = [
-    "engine",
-    "mjcf",
-    "plant",
-    "callback",
-    "worlds",
-    "rows",
-    "simulate",
-    "schema",
-    "scenario",
-    "recording",
-    "report",
-    "plots",
-    "runs",
-    "bench",
-    "tuning",
-    "reproduce",
-]
-LAST = ["cli"]
-"""The rooms from top to bottom. One that is not named here lies between the lower rooms and the last."""
+HOUSE = (PACKAGE.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+ABOVE, BELOW = (
+    re.findall(r"^\| `(\w+)(?:\.py|/)` \|", part, re.MULTILINE)
+    for part in HOUSE.split("nothing above this line imports MuJoCo")
+)
+"""The rooms from top to bottom, as docs/architecture.md lists them."""
+ORDER = [*ABOVE, *BELOW]
 
 HEAVY = {"rerun": "recording", "matplotlib": "plots"}
 """Imported by one room each, because it costs time."""
@@ -67,8 +37,7 @@ def rooms() -> list[str]:
 
 
 def depth(room: str) -> int:
-    order = [*UPPER, *LOWER]
-    return order.index(room) if room in order else len(order) + LAST.count(room)
+    return ORDER.index(room)
 
 
 def files(room: str) -> list[Path]:
@@ -99,8 +68,8 @@ def in_a_fresh_interpreter(code: str) -> list[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
 
 
-def test_rooms_are_all_there() -> None:
-    assert not set(UPPER + LAST) - set(rooms())
+def test_every_room_is_in_the_list_once() -> None:
+    assert sorted(ORDER) == rooms()
 
 
 @pytest.mark.parametrize("room", rooms())
@@ -113,18 +82,25 @@ def test_a_downward_import_would_be_seen() -> None:
     """The order is not trivially held: the loop does use the controller, the command line the scenario."""
     assert "controller" in {other for _, other in used_rooms("simulate")}
     assert "scenario" in {other for _, other in used_rooms("cli")}
-    assert depth("controller") < depth("simulate") < depth("scenario") < depth("cli")
+    assert depth("controller") < depth("scenario") < depth("simulate") < depth("cli")
 
 
 def test_nothing_above_the_line_imports_mujoco() -> None:
     """One room after the other: the first that brings MuJoCo, or what is as heavy, is named."""
     code = "import importlib, sys\n"
-    for room in UPPER:
+    for room in ABOVE:
         code += f"importlib.import_module('cmg_mj.{room}')\n"
         for heavy in ("mujoco", "control", "pyarrow", *HEAVY):
             code += f"if {heavy!r} in sys.modules: print('{room}:{heavy}')\n"
     code += "print('done')"
     assert in_a_fresh_interpreter(code) == ["done"]
+
+
+def test_a_bundled_scenario_is_checked_without_mujoco() -> None:
+    code = "import sys; import cmg_mj.scenario; print('mujoco' in sys.modules); "
+    code += "from cmg_mj.cli import main; main(['check', 'push_recovery']); print('mujoco' in sys.modules)"
+    first, *_, last = in_a_fresh_interpreter(code)
+    assert (first, last) == ("False", "False")
 
 
 def test_every_observer_works_without_mujoco() -> None:
@@ -159,7 +135,7 @@ def test_only_one_room_knows_a_heavy_package(package: str) -> None:
     assert users <= {HEAVY[package]}
 
 
-@pytest.mark.parametrize("room", UPPER)
+@pytest.mark.parametrize("room", ABOVE)
 def test_upper_rooms_do_not_name_mujoco(room: str) -> None:
     """Not even inside a function."""
     named = [f"{path.name}:{line}" for path in files(room) for line, name in imports(path) if name.startswith("mujoco")]

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +102,7 @@ def test_a_run_folder() -> None:
     trajectory = assert_whole("deep/er")
     assert Path("deep/er/summary.json").read_text() == said.out
     assert len(trajectory) == 100
-    assert trajectory.observers == ["homogeneous", "ltv"]
+    assert trajectory.observers == ("homogeneous", "ltv")
     assert trajectory.metadata["outcome"] == {"kind": "done", "time_s": 0.5, "reason": ""}
     assert trajectory.metadata["scenario"] == tomllib.loads(Path("deep/er/scenario.toml").read_text())
 
@@ -137,7 +138,7 @@ def test_a_run_without_a_tick_can_be_written() -> None:
     experiment = prepare(load_scenario(write("duration_s = 0.1")))
     result = experiment.run()
     assert result.trajectory is not None
-    none = Trajectory({name: column[:0] for name, column in result.trajectory.columns.items()})
+    none = replace(result.trajectory, columns={name: column[:0] for name, column in result.trajectory.columns.items()})
     empty = dataclasses.replace(result, trajectory=none, outcomes=[Outcome("interrupted", 0.0)])
     runs.save_run(runs.output_folder(Path("it")), experiment, empty, plot=True)
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 0

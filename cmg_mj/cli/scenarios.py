@@ -160,7 +160,7 @@ def check(file: str) -> None:
     scenario = load_scenario(file)
     rig = known_rig(scenario.plant)
     if rig is None:
-        from cmg_mj.plant import load_plant  # MuJoCo, which a bundled rig does without
+        from cmg_mj.experiment import load_rig  # MuJoCo, which a bundled rig does without
 
-        rig = load_plant(scenario.plant).facts
+        rig = load_rig(scenario).facts
     click.echo(description(file, scenario, design(scenario, rig.reduced), rig))

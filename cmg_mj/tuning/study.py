@@ -252,6 +252,10 @@ def _level(noise: float, fitter: _Fitter, numbers: Sequence[Number], held_out: R
     )
 
 
+def _at_a_limit(number: Number, size: float) -> bool:
+    return not number.low * AT_A_LIMIT < size < number.high / AT_A_LIMIT
+
+
 def _get(value: Any, place: tuple[int, ...]) -> float:
     for i in place:
         value = value[i]

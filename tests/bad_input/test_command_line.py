@@ -63,7 +63,7 @@ def test_options(command: str, given: list[str], fragments: list[str]) -> None:
     ("list", ["list", "observer"], "'observer' is not one of 'scenarios', 'observers'"),
 )
 def test_commands(given: list[str], fragments: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmg_mj.scenario.simulate", pytest.fail)  # all this is found before anything is run
+    monkeypatch.setattr("cmg_mj.experiment.simulate", pytest.fail)  # all this is found before anything is run
     assert_in_order(fragments, cmg_mj(*given).complaint)
     assert list(Path().iterdir()) == []
 
@@ -78,7 +78,7 @@ def test_commands(given: list[str], fragments: list[str], monkeypatch: pytest.Mo
 def test_an_output_folder_that_cannot_be_written(
     command: str, given: str, fragments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cmg_mj.scenario.simulate", pytest.fail)
+    monkeypatch.setattr("cmg_mj.experiment.simulate", pytest.fail)
     Path("taken").write_text("mine")
     assert_in_order(fragments, cmg_mj(command, "push_recovery", "--out", given).complaint)
     assert Path("taken").read_text() == "mine"
