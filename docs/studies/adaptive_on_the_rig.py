@@ -1,10 +1,11 @@
 """The bias that `adaptive` finds and its velocity error against (9), (10), (11): 100 seeds, no push.
 
-python docs/studies/adaptive_on_the_rig.py
+Run it (about a minute and a half): python docs/studies/adaptive_on_the_rig.py
 """
 
 import numpy as np
 
+from cmg_mj import markdown
 from cmg_mj.intervals import mean_interval
 from cmg_mj.papers.dao2023.adaptive_rig import bias_errors, signed_biases, velocity_errors
 
@@ -17,14 +18,11 @@ print(f"e between 0.3 and 1.5 deg, either sign, {WORLDS} seeds: RMS error of the
 print(f"mean {found.mean():.4f}, largest {found.max():.4f} deg; at most 0.15 deg in {np.mean(found <= 0.15):.0%}\n")
 
 errors = velocity_errors(SEED, WORLDS, ("adaptive", *OTHERS), BIASES_DEG)
-print(
-    "| e [deg] | " + " | ".join(f"`{name}` [1e-3 rad/s]" for name in errors) + " | worlds in which adaptive is least |"
-)
-print("|---|" + "---:|" * (len(errors) + 1))
+headings = ("e [deg]", *(f"`{name}` [1e-3 rad/s]" for name in errors), "worlds in which adaptive is least")
+rows = []
 for i, bias in enumerate(BIASES_DEG):
-    cells = []
-    for values in errors.values():
-        interval = mean_interval(values[i])
-        cells.append(f"{1e3 * interval.mean:.1f} ± {1e3 * interval.half:.1f}")
-    least = np.mean([errors["adaptive"][i] < errors[name][i] for name in OTHERS], axis=1).min()
-    print(f"| {bias:g} | " + " | ".join(cells) + f" | {least:.0%} |", flush=True)
+    intervals = [mean_interval(1e3 * values[i]) for values in errors.values()]
+    cells = [f"{interval.mean:.1f} ± {interval.half:.1f}" for interval in intervals]
+    least = min(np.mean(errors["adaptive"][i] < errors[name][i]) for name in OTHERS)
+    rows.append((f"{bias:g}", *cells, f"{least:.0%}"))
+print(markdown.table(headings, rows))

@@ -1,4 +1,7 @@
-"""Picture of a recording without a screen: picture.py RECORDING PICTURE [SECONDS]"""
+"""Picture of a recording without a screen, at a time of the run.
+
+Run it: python docs/studies/picture.py runs/push_recovery-homogeneous-0/recording.rrd picture.png 2.5
+"""
 
 import io
 import os
@@ -22,6 +25,8 @@ try:
             break
         except ConnectionError:
             time.sleep(0.2)
+    else:
+        sys.exit("the viewer does not answer")
     client.open(os.path.abspath(recording))
     while client.get_state().loading:
         time.sleep(0.1)
