@@ -134,9 +134,19 @@ class FriedlandTacker:
 
     @cached_property
     def _turn(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """F = exp(Am h), its inverse, and (F + I)/2, all (nm, nm)."""
+        """F = exp(Am h) and its inverse, (nm, nm), and Cm (F + I)/2, (r, nm)."""
         F = expm(self.Am * self.dt)
-        return F, expm(-self.Am * self.dt), (F + np.eye(len(F))) / 2.0
+        return F, expm(-self.Am * self.dt), self.Cm @ ((F + np.eye(len(F))) / 2.0)
+
+    @cached_property
+    def _fitting(self) -> set[tuple[tuple[int, ...], ...]]:
+        """Shapes of a step's arguments that have been found to fit."""
+        return set()
+
+    @cached_property
+    def _identities(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the dimensions n and p."""
+        return np.eye(self.L.shape[-2]), np.eye(self.L.shape[-1])
 
     def init(
         self,
@@ -204,23 +214,24 @@ class FriedlandTacker:
         D20 = system.D20 if D20 is None else real("D20", D20)
         self._check(system, u, y, L, C2, D20)
         h = self.dt
-        F, F_back, F_middle = self._turn
+        F, F_back, Cm_middle = self._turn
+        I_n, I_p = self._identities
         x, xm, T, P, y_before = state
 
         half = h / 2.0 * (system.A + L @ system.C2)
-        W = (system.B0 + L @ system.D20) @ (self.Cm @ F_middle)
+        W = (system.B0 + L @ system.D20) @ Cm_middle
         known = times(system.B2, u) - times(L, (y_before + y) / 2.0)
         right_x = x + times(half, x) + h * (times(W, xm) + known)
         right_T = T + half @ T + h * W
-        left = np.eye(half.shape[-1]) - half
-        x = solve(left, right_x)
-        T = np.linalg.solve(left, right_T) @ F_back
+        x = solve(I_n - half, right_x)
+        T = np.linalg.solve(I_n - half, right_T) @ F_back
         xm = times(F, xm)
         P = F @ P @ F.T
 
-        G = C2 @ T + D20 @ self.Cm
+        D20_Cm = D20 @ self.Cm
+        G = C2 @ T + D20_Cm
         gain = P @ np.swapaxes(G, -1, -2) @ self.Sigma  # -Lm
-        nu = solve(np.eye(y.shape[-1]) + h * (G @ gain), times(C2, x) + times(D20 @ self.Cm, xm) - y)
+        nu = solve(I_p + h * (G @ gain), times(C2, x) + times(D20_Cm, xm) - y)
         step = -h * times(gain, nu)
         return State(x + times(T, step), xm + step, T, P, y)
 
@@ -283,6 +294,10 @@ class FriedlandTacker:
         C2: np.ndarray,
         D20: np.ndarray,
     ) -> None:
+        """Refuse what does not fit; shapes that have been found to fit are not looked at again."""
+        shapes = tuple(a.shape for a in (system.A, system.B0, system.B2, system.C2, system.D20, u, y, L, C2, D20))
+        if shapes in self._fitting:
+            return
         n, p, r, _ = self.sizes.values()
         require_shape("A", system.A, (n, n), "(n, n), n the rows of L")
         require_shape("B0", system.B0, (n, r), "(n, r), n the rows of L, r those of Cm")
@@ -295,3 +310,4 @@ class FriedlandTacker:
         for matrix in (system.D20, D20):
             require_shape("D20", matrix, (p, r), "(p, r), p the columns of L, r the rows of Cm")
         require_shape("L", L, (n, p), "(n, p), as the L of the construction")
+        self._fitting.add(shapes)
