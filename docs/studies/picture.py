@@ -1,6 +1,7 @@
 """Picture of a recording without a screen, at a time of the run.
 
 Run it: python docs/studies/picture.py runs/push_recovery-homogeneous-0/recording.rrd picture.png 2.5
+The viewer draws with Vulkan; on a machine without a graphics card, Debian's mesa-vulkan-drivers has one in software.
 """
 
 import io
