@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.integrate import solve_ivp
 from sympy.diffgeom import CoordSystem, Manifold, Patch, TensorProduct, metric_to_Riemann_components
 
 from cmg_mj.papers import plvcc, plvcc_geometry
-from cmg_mj.papers.plvcc_geometry import UndecidedError, coordinates, decide
+from cmg_mj.papers.plvcc_geometry import Decision, UndecidedError, coordinates, decide
 
 q1, q2 = coordinates()
 
@@ -34,6 +35,12 @@ NOT_PLVCC = {
 }
 
 
+@cache
+def decision_on(name: str) -> Decision:
+    """Of one of `PLVCC`."""
+    return decide(PLVCC[name])
+
+
 def gaussian_curvature(m1: Any) -> Any:
     """By sympy's own differential geometry: R_1212 of the metric m1 dq1^2 + dq2^2 over its determinant."""
     chart = CoordSystem("q", Patch("P", Manifold("M", 2)), sp.symbols("q1 q2", real=True))
@@ -46,10 +53,8 @@ def gaussian_curvature(m1: Any) -> Any:
 
 @pytest.mark.parametrize("name", PLVCC)
 def test_says_yes_where_the_curvature_is_constant(name: str) -> None:
-    m1 = PLVCC[name]
-    decision = decide(m1)
-    assert decision.plvcc
-    curvature = sp.lambdify(q2, gaussian_curvature(m1))
+    assert decision_on(name).plvcc
+    curvature = sp.lambdify(q2, gaussian_curvature(PLVCC[name]))
     at = [float(curvature(angle)) for angle in (-0.7, 0.1, 0.4, 1.1)]
     assert at == pytest.approx([at[0]] * 4, rel=1e-9, abs=1e-12)
 
@@ -86,7 +91,7 @@ def momenta(m1: Any, Psi: Any, duration: float = 1.0) -> np.ndarray:
 @pytest.mark.parametrize("name", PLVCC)
 def test_momenta_of_an_explicit_psi_do_not_change(name: str) -> None:
     """What PLvCC is for: without forces the new momenta are constant. B_(i) is not used here."""
-    found = momenta(PLVCC[name], decide(PLVCC[name]).Psi)
+    found = momenta(PLVCC[name], decision_on(name).Psi)
     np.testing.assert_allclose(found, np.broadcast_to(found[0], found.shape), rtol=1e-7, atol=1e-9)
 
 
@@ -98,8 +103,8 @@ def test_momenta_change_where_a_column_is_no_killing_field() -> None:
 
 
 def test_full_rank_everywhere_or_on_strips() -> None:
-    assert decide(PLVCC["cosh squared"]).everywhere
-    on_the_sphere = decide(PLVCC["sphere"])
+    assert decision_on("cosh squared").everywhere
+    on_the_sphere = decision_on("sphere")
     assert not on_the_sphere.everywhere
     assert on_the_sphere.Psi.det().subs(q1, sp.pi / 2) == 0
 
@@ -127,8 +132,10 @@ def test_undecided_is_said() -> None:
         decide((sp.exp(q2) + k * sp.exp(-q2)) ** 2)
 
 
-def test_symmetric_part_is_the_lie_derivative_for_any_inertia() -> None:
-    u, v, w = (plvcc.jet(name) for name in "uvw")
+def test_symmetric_part_is_the_lie_derivative_for_a_full_inertia() -> None:
+    """Step 1 does not need M = diag(m1(q2), 1): any Psi, and an M(q) drawn at random, to first order at q = 0."""
+    drawn = np.random.default_rng(0).integers(1, 100, (3, 3)).tolist()
+    u, v, w = (value + first * q1 + second * q2 for value, first, second in drawn)
     assert plvcc.symmetric_part_is_lie_derivative(1, sp.Matrix([[u, v], [v, w]]))
 
 
