@@ -236,7 +236,7 @@ def save_comparison(folder: Path, compared: Sequence[Compared]) -> None:
         {
             **trajectories,
             "summary.json": lambda path: _write_json(path, [entry.summary for entry in compared]),
-            "scenario.toml": asked_for([entry.experiment for entry in compared]).save,
+            "scenario.toml": with_own_observer([entry.experiment for entry in compared]).save,
             "recording.rrd": lambda path: _record(path, [(entry.experiment, entry.example) for entry in compared]),
         },
     )
@@ -262,7 +262,7 @@ def _write(folder: Path, files: Mapping[str, Callable[[Path], None]]) -> None:
         raise InputError(why)
 
 
-def asked_for(experiments: Sequence[Experiment]) -> Experiment:
+def with_own_observer(experiments: Sequence[Experiment]) -> Experiment:
     """Of those that are compared, the one with the scenario's own observer and its parameters, if it is there."""
     return next((experiment for experiment in experiments if experiment.scenario.observer.parameters), experiments[0])
 

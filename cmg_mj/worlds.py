@@ -91,7 +91,7 @@ class ManyWorlds:
         self._all_run = False
 
     def advance(self, steps: int) -> None:
-        """Take physics steps. A world in which MuJoCo raises keeps its state and is found not to move on."""
+        """Take physics steps. A world in which MuJoCo raises is given a tilt that is NaN: it has diverged."""
         try:
             self.batch.step(None if self._all_run else self.running, nstep=steps)
         except SimulationError as error:

@@ -12,7 +12,7 @@ import click
 
 from cmg_mj.cli import scenarios, studies
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, say
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, RunStopped
 
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, real sensors, velocity observers.
 
@@ -26,7 +26,7 @@ A scenario is named by a bundled one's name (cmg-mj list scenarios) or by the pa
 
 Ctrl-C ends a run early and keeps what was recorded; a second one ends it at once.
 
-Exit status: 0 done (a fall is a result), 2 the input is wrong, 130 interrupted.
+Exit status: 0 done (a fall is a result), 2 the input is wrong or a run could not go on, 130 interrupted.
 """
 
 
@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message(), err=True)
         sys.exit(WRONG_INPUT)
-    except (InputError, click.ClickException) as error:
+    except (InputError, RunStopped, click.ClickException) as error:
         say(error.format_message() if isinstance(error, click.ClickException) else str(error))
         sys.exit(WRONG_INPUT)
     except (KeyboardInterrupt, click.Abort):  # before or after a command

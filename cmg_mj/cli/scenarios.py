@@ -9,7 +9,7 @@ import click
 
 from cmg_mj.cli.arguments import check_observer, folder_of, names_of, of_a_run, of_observers, scenario_of
 from cmg_mj.cli.terminal import INTERRUPTED, WRONG_INPUT, CtrlC, progress, say, say_written, show
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, RunStopped
 
 
 @click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
@@ -59,7 +59,7 @@ def run(
         say_written(folder)
     outcome = result.outcomes[0]
     if outcome.kind == "stopped":
-        raise InputError(f"{outcome.reason}; what was recorded until then is in {folder}")
+        raise RunStopped(f"{outcome.reason}; what was recorded until then is in {folder}")
     if outcome.kind == "interrupted":
         say(f"interrupted at {outcome.time_s:g} s; what was recorded until then is in {folder}")
         sys.exit(INTERRUPTED)
@@ -105,7 +105,7 @@ def compare(
                 f"--observers {observers}; the others are compared with their default parameters"
             )
     experiments = runs.prepare_comparison(chosen, names)
-    folder = folder_of(out, f"{Path(scenario).stem}-compare-{chosen.seed}", runs.asked_for(experiments))
+    folder = folder_of(out, f"{Path(scenario).stem}-compare-{chosen.seed}", runs.with_own_observer(experiments))
     with CtrlC() as ctrl_c:
         with progress(f"{chosen.title or scenario}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
             compared = runs.compare(experiments, worlds, on_progress)

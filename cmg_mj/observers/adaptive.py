@@ -132,12 +132,12 @@ class Adaptive:
     def _unknowns(self) -> list[tuple[str, list[float]]]:
         """Name of each unknown, and its weights in Gamma: one for a constant, two for a sinusoid."""
         bias, torque, sinusoid = self.Gamma
-        asked = (
+        known = (
             (self.bias, BIAS, [bias]),
             (self.torque, TORQUE, [torque]),
             (self.sinusoid_hz, SINUSOID, [sinusoid, sinusoid]),
         )
-        return [(name, weights) for wanted, name, weights in asked if wanted]
+        return [(name, weights) for wanted, name, weights in known if wanted]
 
     @cached_property
     def extra_signals(self) -> tuple[str, ...]:

@@ -237,11 +237,7 @@ def _level(noise: float, fitter: _Fitter, numbers: Sequence[Number], held_out: R
         noise_ug_rthz=noise,
         parameters=tuned,
         sizes={n.name: size for n, size in zip(numbers, sizes, strict=True)},
-        edges=[
-            n.name
-            for n, size in zip(numbers, sizes, strict=True)
-            if not n.low * AT_A_LIMIT < size < n.high / AT_A_LIMIT
-        ],
+        edges=[n.name for n, size in zip(numbers, sizes, strict=True) if _at_a_limit(n, size)],
         fit_rms=fitter._mean(tuned),
         fit_given_rms=fitter.given_loss,
         rms=fitter.errors(tuned, held_out),

@@ -1,0 +1,24 @@
+"""Speed limits of the closed loop: `cmg-mj bench --observers homogeneous --json | python .ci/speed.py`.
+
+Beyond a limit is said; beyond it by more than a shared machine's noise fails.
+"""
+
+import json
+import sys
+
+LIMITS = {200.0: (1.5, 0.9), 1000.0: (3.0, 0.75)}
+"""Control rate -> at most so many times bare mj_step (one world), at least this share of Batch (many worlds)."""
+NOISE = 1.25
+
+failed = False
+for row in json.load(sys.stdin)["figures"]:
+    most, least = LIMITS[row["control_rate_hz"]]
+    over, share = row["closed_loop_over_bare"], row["closed_loop_share_of_batch"]
+    beyond = max(over / most, least / share)
+    failed |= beyond > NOISE
+    word = "FAILED" if beyond > NOISE else "beyond its limit" if beyond > 1.0 else "kept"
+    print(
+        f"{row['observer']} at {row['control_rate_hz']:g} Hz: {over:.2f} times bare (limit {most:g}), "
+        f"{share:.2f} of Batch (limit {least:g}): {word}"
+    )
+sys.exit(failed)
