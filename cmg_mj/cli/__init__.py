@@ -66,12 +66,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point of `cmg-mj`: wrong input ends in one line on standard error and exit status 2."""
     if "" not in sys.path:
         sys.path.append("")  # a user's own observer in the current folder; last, so that it can hide nothing
+    if not (sys.argv[1:] if arguments is None else arguments):
+        click.echo(cli.make_context("cmg-mj", [], resilient_parsing=True).get_help(), err=True)
+        sys.exit(WRONG_INPUT)
     try:
         cli.main(args=arguments, prog_name="cmg-mj", standalone_mode=False)
         sys.stdout.flush()
-    except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message(), err=True)
-        sys.exit(WRONG_INPUT)
     except (InputError, RunStopped, click.ClickException) as error:
         say(error.format_message() if isinstance(error, click.ClickException) else str(error))
         sys.exit(WRONG_INPUT)

@@ -6,7 +6,7 @@ import json
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -104,12 +104,13 @@ def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[
         TaskProgressColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task(label, total=total)
+    bar = Progress(*columns, console=console, transient=True)
+    task = bar.add_task(label, total=total)
 
-        def on_progress(done: float, now: str | None = None) -> None:
-            if ctrl_c is not None:
-                ctrl_c.check()
-            progress.update(task, completed=done, description=now)  # None leaves the description as it is
+    def on_progress(done: float, now: str | None = None) -> None:
+        if ctrl_c is not None:
+            ctrl_c.check()
+        bar.update(task, completed=done, description=now)  # None leaves the description as it is
 
+    with bar if console.is_terminal else nullcontext():  # below rich 15, a disabled bar leaves an empty line
         yield on_progress
