@@ -220,10 +220,6 @@ def test_an_estimate_that_is_not_finite_gives_none_not_nan() -> None:
     assert found["tilt_rms_deg"] == pytest.approx(1.0)
 
 
-def test_settings_are_those_of_the_documentation() -> None:
-    assert (MetricsSettings().settle_band_deg, MetricsSettings().fall_angle_deg) == (1.0, 30.0)
-
-
 # --- the bias estimate ---------------------------------------------------------------------------------------
 
 

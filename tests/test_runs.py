@@ -128,6 +128,12 @@ def test_a_fall_is_a_result() -> None:
     assert len(assert_whole("it")) == pytest.approx(summary["end_time_s"] * 200, abs=1)
 
 
+@pytest.mark.parametrize(("tilt_deg", "outcome"), [(29.9, "done"), (30.1, "fell"), (-30.1, "fell")])
+def test_a_fall_is_beyond_30_degrees(tilt_deg: float, outcome: str) -> None:
+    plant = {"equilibrium_bias_deg": 0.0, "initial_tilt_deg": tilt_deg}
+    assert prepare(parse_scenario({"duration_s": 0.001, "plant": plant})).run().outcomes[0].kind == outcome
+
+
 def test_a_run_shorter_than_a_tick_has_one() -> None:
     assert cmg_mj("run", write("duration_s = 0.001"), "--out", "it").status == 0
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 1
