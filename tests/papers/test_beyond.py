@@ -15,7 +15,7 @@ from cmg_mj.papers.beyond.character import Motion, character, push_lag, record_m
 from cmg_mj.papers.beyond.fed_bias import fed_bias, fed_bias_claim
 from cmg_mj.papers.beyond.friction import friction, friction_claim
 from cmg_mj.papers.beyond.league import league
-from cmg_mj.papers.beyond.push_recovery import ERROR, gain
+from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from tests.observers.reference import DT, PAPER
 
 SEED = 410_000
@@ -170,6 +170,14 @@ def test_the_bias_fed_in_helps_where_it_is_large() -> None:
     worse = large | {"gain_rad_s": Interval(-0.01, -0.02, -0.005)}
     assert fed_bias_claim([worse, larger]).why == "It helps at e = 1.5 deg of those tried."
     assert fed_bias_claim([worse]).verdict == "not reproduced"
+
+
+def test_every_rig_has_the_same_worlds() -> None:
+    experiment = push_recovery("linear", SEED + 4, ["duration_s=0.5", "push=[]"])
+    first, other, again = (r.values(ERROR) for r in on_rigs(experiment, 3, "equilibrium_bias_deg", (0.0, 0.5, 0.0)))
+    assert first == pytest.approx(again, rel=1e-12)
+    assert len(set(first)) == 3
+    assert (other != first).all()
 
 
 def test_a_gain_of_worlds_that_fell_is_none() -> None:
