@@ -9,30 +9,15 @@ example.
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from cmg_mj.elementwise import Scalar, signed_power
-from cmg_mj.errors import InputError, shown
-
-
-def require_number(name: str, value: Any) -> float:
-    """Refuse a parameter that is not a real number; NaN and infinity pass."""
-    if not isinstance(value, numbers.Real):
-        raise InputError(f"{name} = {shown(value)}: must be a number")
-    return float(value)
-
-
-def require_positive(name: str, value: Any) -> float:
-    """Refuse a parameter that is not a positive, finite number."""
-    if not (isinstance(value, numbers.Real) and 0.0 < float(value) < math.inf):
-        raise InputError(f"{name} = {shown(value)}: must be a number greater than 0")
-    return float(value)
+from cmg_mj.errors import InputError
+from cmg_mj.papers.require import require_number, require_positive
 
 
 def weights(n: int, d_inf: float) -> list[float]:
@@ -55,7 +40,7 @@ class BiLimitCorrection:
     Choosing l: any l_n > 0, then l_n-1, and so on to l_1, each large enough for the part of the system below it.
     For n up to 2 all positive numbers do. From n = 3 on, a linear part that is Hurwitz, which is checked, is not enough
     for d_inf > 0. l_i = 2^(n-i) converges for n up to 4 and every d_inf tried, from errors of 1e-3 to 1e3
-    (`tests/observers/test_bi_limit.py`).
+    (`tests/papers/test_bi_limit.py`).
 
     Attributes:
         l: l_1 to l_n, whose number is the dimension n. Positive, and such that the linear part of K is Hurwitz.

@@ -8,16 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.papers.andrieu2009.paper import U_MAX, U_MIN
+
 # Normalised variables: no units; time is the paper's, in its normalised seconds.
 Array = Any
 """A float or an array; everything here is elementwise."""
-
-U_MIN, U_MAX = 0.01, 0.7
-
-
-def dilution(t: float) -> float:
-    """The input u of section 3.1."""
-    return 0.410 if t < 10.0 else 0.02 if t < 20.0 else 0.6 if t < 35.0 else 0.1
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The bioreactor of andrieu2009 section 3 before it is simulated: its set, coordinates, bounds on its increments."""
+"""Section 3, the bioreactor before it is simulated: its set, coordinates, bounds on its increments."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.papers.andrieu2009.bioreactor import U_MAX, Bioreactor
-from cmg_mj.papers.andrieu2009.bioreactor_study import HBAR, HBAR_OF_OBSERVERS, NOISE, P
+from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor
+from cmg_mj.papers.andrieu2009.paper import HBAR, HBAR_OF_OBSERVERS, NOISE, U_MAX, P
 from cmg_mj.papers.claim import Claim, OnShare
 
 ROUNDING = 1e-9
@@ -48,7 +48,7 @@ def invariance() -> Claim:
         f"{inflow[HBAR]:.1g} and {inflow[HBAR_OF_OBSERVERS]:.1g}, zero up to rounding at the corners for which eps1, "
         f"eps2 are made). Inputs 10 % above u_max lead out: {too_strong:.2g}. With u_min = 0.01, u_max = 0.7: eps1 = "
         f"{reactor.eps1:.5f}, eps2 = {reactor.eps2:.5f}.",
-        verdict=verdict(min(inflow.values()) > -ROUNDING),
+        holds=min(inflow.values()) > -ROUNDING,
         figures={
             "least_inflow_per_time": {str(hbar): value for hbar, value in inflow.items()},
             "least_inflow_too_large_input_per_time": too_strong,
@@ -84,7 +84,7 @@ def coordinates() -> Claim:
         "cubic in x2.",
         found=f"At 2000 random states and inputs x2' along (14) equals (15) to {slope:.1e} of its largest value "
         f"(central differences), for hbar = 1 and 0.8; F's inverse returns eta2 to {inverse:.1e}.",
-        verdict=verdict(slope < 1e-6 and inverse < 1e-9),
+        holds=slope < 1e-6 and inverse < 1e-9,
         figures={"largest_f2_error_ratio": slope, "largest_inverse_error_ratio": inverse},
     )
 
@@ -151,11 +151,9 @@ def increments() -> Claim:
     found = increments_over_domain(HBAR_OF_OBSERVERS)
     holds = max(found.by_Omega1, found.by_Omega2, found.by_Omega2_local) <= 1.0 + ROUNDING
     misprint = found.by_Omega2_local_printed > 1.0 + ROUNDING or found.slope_over_Omega2_printed > 1.0 + ROUNDING
-    why = (
+    corrected = (
         "With m3, not m2, in the last term of Omega_2: only then is it the first of the two terms into which the "
         "secant's slope is parted."
-        if misprint
-        else ""
     )
     return Claim(
         place="Section 3, Omega_1, Omega_2, c_inf",
@@ -168,8 +166,9 @@ def increments() -> Claim:
         f"({found.by_Omega2_local_printed:.3f}) and holds corrected ({found.by_Omega2_local:.4f}); and as printed, "
         f"Omega_2 does not bound |df2/dx2| (factor {found.slope_over_Omega2_printed:.3f}; corrected "
         f"{found.slope_over_Omega2:.4f}).",
-        verdict=verdict(holds, why),
-        why=why,
+        holds=holds,
+        conditions=corrected if misprint else "",
+        otherwise=corrected,
         figures={f"{name}_ratio" if name != "c_inf" else name: value for name, value in found._asdict().items()},
     )
 
@@ -181,20 +180,19 @@ def order_of_bounds() -> Claim:
     df2_max = Bioreactor(HBAR_OF_OBSERVERS).df2_max
     excess = found.Omega2_over_Omega1 - 1.0
     others = max(found.slope_over_Omega2, found.Omega1_over_largest) <= 1.0 + ROUNDING
-    why = ""
-    if excess > ROUNDING:
-        why = (
-            f"Omega_2 <= Omega_1 fails at {1e2 * found.share_Omega2_above_Omega1:.2g} % of the points for hbar = 0.8, "
-            f"by at most {1e2 * excess:.2g} %; the largest quotient for hbar = 1 is {exact.Omega2_over_Omega1:.6f}."
-        )
+    exceeded = (
+        f"Omega_2 <= Omega_1 fails at {1e2 * found.share_Omega2_above_Omega1:.2g} % of the points for hbar = 0.8, "
+        f"by at most {1e2 * excess:.2g} %; the largest quotient for hbar = 1 is {exact.Omega2_over_Omega1:.6f}."
+    )
     return Claim(
         place="Section 3, order of the bounds",
         says="df2/dx2 <= Omega_2 <= Omega_1 <= df2_max over the whole domain.",
         found=f"df2_max = {df2_max:.2f}. Largest quotients on the grid: |df2/dx2|/Omega_2 "
         f"{found.slope_over_Omega2:.6f}, Omega_2/Omega_1 {found.Omega2_over_Omega1:.6f}, Omega_1/df2_max "
         f"{found.Omega1_over_largest:.4f}.",
-        verdict=verdict(others and excess < 0.01, why),
-        why=why,
+        holds=others and excess < 0.01,
+        conditions=exceeded if excess > ROUNDING else "",
+        otherwise=exceeded,
         figures={
             "df2_max_per_time": df2_max,
             "slope_over_Omega2_ratio": found.slope_over_Omega2,
@@ -209,15 +207,12 @@ def noise_level() -> Claim:
     """10 % of the domain."""
     reactor = Bioreactor(HBAR)
     tenth = 0.1 * (1.0 - reactor.eps2 - reactor.eps1)
-    holds = abs(tenth - NOISE) < 0.005
     return Claim(
         place="Section 3.1, the noise",
         says=f"The noise on eta1 has the standard deviation {NOISE}, said to be a tenth of the range of eta1.",
         found=f"With eps1, eps2 from the paper's own formulas 10 % of [eps1, 1 - eps2] is {tenth:.4f}; {NOISE} is "
         f"{100.0 * 0.1 * NOISE / tenth:.1f} % of it.",
-        verdict=verdict(holds),
-        why=""
-        if holds
-        else f"The two figures do not agree. All else here uses {NOISE}; Fig. 2's order holds with either.",
+        holds=abs(tenth - NOISE) < 0.005,
+        otherwise=f"The two figures do not agree. All else here uses {NOISE}; Fig. 2's order holds with either.",
         figures={"tenth_of_domain": tenth, "noise_used": NOISE},
     )

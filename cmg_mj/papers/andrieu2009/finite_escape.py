@@ -1,4 +1,4 @@
-"""System (1) of andrieu2009 beyond p = 1: solutions that end before an observer has found them."""
+"""Section 2.1, system (1) beyond p = 1: solutions that end before an observer has found them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from cmg_mj.elementwise import signed_power
+from cmg_mj.papers.andrieu2009 import paper
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b
 from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
 from cmg_mj.papers.claim import Claim
@@ -57,9 +57,9 @@ def observer(p: float) -> UpdatedHighGain:
     """(7), (8) for (1) with g = 0, u = 0, in continuous time; d_inf = 0.5 whatever p is, as Theorem 1 wants it."""
     return UpdatedHighGain(
         1e-3,
-        (lambda u, y, x: 0.0 * y[0], lambda u, y, x: signed_power(x[0], 1.0 + p)),
+        (lambda u, y, x: 0.0 * y[0], lambda u, y, x: paper.f2(0.0, x[0], 0.0, p)),
         BiLimitCorrection((2.0, 1.0), D_INF),
-        lambda u, y, x: (1.0 + p) * (1.0 + abs(x[0]) ** p),
+        lambda u, y, x: paper.Omega(0.0, x[0], p),
         0.5 * largest_b(2, D_INF),
         0.5,
         2.0,
@@ -106,8 +106,7 @@ def no_observer_beyond_1() -> Claim:
     moved = [run.moved for run in runs[BEYOND]]
     missed = [error > MISSED for error in ends[BEYOND]]
     count = sum(missed)
-    holds = max(ends[INSIDE]) < FOUND and missed[-1]
-    why = (
+    one_observer = (
         "One observer, (7) and (8) with d_inf = 0.5, l = (2, 1), phi1 = 0.5, phi2 = 2, phi3 = 1, g = 0, without input, "
         "started at the measured x1 and x2_hat = 0. The statement is one about all observers, proved elsewhere "
         "(Astolfi and Praly 2006); this shows what stands in their way, it is no proof."
@@ -123,8 +122,9 @@ def no_observer_beyond_1() -> Claim:
         f"above {MISSED} in {count} of {len(STARTS)}, {max(ends[BEYOND]):.2f} at worst.{first} With p = {INSIDE} "
         "solutions escape as well, but y with them: the same observer then finds x2 from every start, to "
         f"{max(ends[INSIDE]):.0e}.",
-        verdict=verdict(holds, why),
-        why=why,
+        holds=max(ends[INSIDE]) < FOUND and missed[-1],
+        conditions=one_observer,
+        otherwise=one_observer,
         figures={
             "x2_at_start": list(STARTS),
             "relative_error_of_x2_at_the_end_by_p": {str(p): values for p, values in ends.items()},
@@ -132,25 +132,25 @@ def no_observer_beyond_1() -> Claim:
             "output_moves_by_p_1_5": moved,
             "missed_count": count,
         },
-        pictures=[
-            Picture(
-                "andrieu2009-escape",
-                "andrieu2009, section 2.1: relative error of x2 along solutions of (1) that escape",
-                [
-                    Panel(
-                        "|error of x2|/x2 [-]",
-                        [
-                            Line(1.0 / run.left, run.error, f"x2(0) = {start:g}", color=i)
-                            for i, (start, run) in enumerate(zip(STARTS, runs[p], strict=True))
-                        ],
-                        f"({letter}) p = {p}",
-                        "time of existence over what is left of it [-]",
-                        x_scale="log",
-                        y_scale="log",
-                        y_range=(1e-9, 10.0),
-                    )
-                    for letter, p in zip("ab", (INSIDE, BEYOND), strict=True)
-                ],
-            )
-        ],
+        pictures=[_picture(runs)],
     )
+
+
+def _picture(runs: dict[float, list[Escape]]) -> Picture:
+    panels = [
+        Panel(
+            "|error of x2|/x2 [-]",
+            [
+                Line(1.0 / run.left, run.error, f"x2(0) = {start:g}", color=i)
+                for i, (start, run) in enumerate(zip(STARTS, runs[p], strict=True))
+            ],
+            f"({letter}) p = {p}",
+            "time of existence over what is left of it [-]",
+            x_scale="log",
+            y_scale="log",
+            y_range=(1e-9, 10.0),
+        )
+        for letter, p in zip("ab", (INSIDE, BEYOND), strict=True)
+    ]
+    title = "andrieu2009, section 2.1: relative error of x2 along solutions of (1) that escape"
+    return Picture("andrieu2009-escape", title, panels)

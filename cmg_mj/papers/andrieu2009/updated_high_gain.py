@@ -16,13 +16,8 @@ from cmg_mj.elementwise import Scalar, signed_power
 from cmg_mj.errors import InputError, shown
 from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.observers.model_copy import require_stable_step
-from cmg_mj.papers.andrieu2009.bi_limit import (
-    BiLimitCorrection,
-    largest_b,
-    require_number,
-    require_positive,
-    violated_conditions,
-)
+from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, violated_conditions
+from cmg_mj.papers.require import require_number, require_positive
 
 Signals = tuple[Scalar, ...]
 """Some signals: floats for one world, arrays (n_worlds,) for many."""

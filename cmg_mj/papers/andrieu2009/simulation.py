@@ -1,4 +1,4 @@
-"""The simulations of andrieu2009 section 3.1: the bioreactor, three observers, many seeds at once."""
+"""Section 3.1: the bioreactor simulated, and three observers that follow it, a column a seed."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ import numpy as np
 from scipy.signal import detrend
 
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection
-from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor, dilution
+from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor
+from cmg_mj.papers.andrieu2009.paper import HBAR, L1, L2, NOISE, PHI1, PHI2, PHI3, B, P, dilution
 from cmg_mj.papers.andrieu2009.updated_high_gain import Signals, UpdatedHighGain
 
-HBAR, HBAR_OF_OBSERVERS = 1.0, 0.8
-NOISE, NOISE_PERIOD = 0.05, 0.01
+NOISE_PERIOD = 0.01
 DURATION = 50.0
-P, B = 0.9, 0.410
-PHI1, PHI2, PHI3 = 0.03, 1.0, 3.0
-L1, L2 = 0.01, 0.01
 
 CONSTANT, UPDATED, HOMOGENEOUS = "constant gain", "updated gain", "updated gain, homogeneous"
+KINDS = (CONSTANT, UPDATED, HOMOGENEOUS)
+TIME = "time [normalised]"
 WINDOWS = ((5.0, 10.0), (15.0, 20.0), (28.0, 35.0), (42.0, 50.0))
 """The later part of each of the four inputs."""
 
@@ -190,7 +189,7 @@ def of_seeds(part: Run | Replay, columns: slice) -> Any:
 
 def replays(run: Run, model: Bioreactor) -> dict[str, Replay]:
     """All three observers on one run."""
-    return {kind: replay(kind, run, model) for kind in (CONSTANT, UPDATED, HOMOGENEOUS)}
+    return {kind: replay(kind, run, model) for kind in KINDS}
 
 
 def incremental_rate(run: Run, model: Bioreactor) -> np.ndarray:

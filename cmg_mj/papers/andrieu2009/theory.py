@@ -1,0 +1,108 @@
+"""Sections 1, 2 and 4: inequalities, theorems and remarks, checked by numbers."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from cmg_mj.elementwise import signed_power
+from cmg_mj.observers.high_gain import updated_gain
+from cmg_mj.papers.andrieu2009.bi_limit import largest_b, violated_conditions
+from cmg_mj.papers.andrieu2009.chain_of_integrators import theorem_2
+from cmg_mj.papers.andrieu2009.finite_escape import no_observer_beyond_1
+from cmg_mj.papers.andrieu2009.paper import B, P
+from cmg_mj.papers.andrieu2009.theorem_1 import theorem_1
+from cmg_mj.papers.claim import Claim, OnShare
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """Sections 1, 2 and 4."""
+    parts = [increments, no_observer_beyond_1, scaling_conditions, gain_tracking, theorem_2, theorem_1]
+    found = []
+    for i, part in enumerate(parts):
+        on_share(i / len(parts))
+        found.append(part())
+    return found
+
+
+def largest_increment(p: float) -> float:
+    """Worst quotient of the two sides of (3) for g = 0, over both signs and sizes from 1e-4 to 1e4.
+
+    g adds |g| |x2 - x2_hat| to both sides at most.
+    """
+    positive = np.geomspace(1e-4, 1e4, 161)
+    x2 = np.concatenate([-positive, [0.0], positive])
+    x2, x2_hat = np.meshgrid(x2, x2)
+    d = np.abs(x2 - x2_hat)
+    left = np.abs(signed_power(x2, 1.0 + p) - signed_power(x2_hat, 1.0 + p))
+    right = (1.0 + p) * np.abs(x2_hat) ** p * d + d ** (1.0 + p)
+    apart = d > 1e-6 * np.maximum(np.abs(x2), np.abs(x2_hat))  # nearer, the left side is rounding errors
+    return float((left[apart] / right[apart]).max())
+
+
+def increments() -> Claim:
+    """(2), (3)."""
+    worst = {p: largest_increment(p) for p in (0.1, 0.5, 0.9, 1.0, 1.5, 2.0)}
+    inside = max(quotient for p, quotient in worst.items() if p < 1.0)
+    return Claim(
+        place="Section 1, (3)",
+        says="For 0 < p < 1 the increments of f2 = g(x1) x2 + x2^(1+p) + u are bounded by (|g| + (1+p) |x2_hat|^p) "
+        "|x2 - x2_hat| + |x2 - x2_hat|^(1+p).",
+        found=f"Over both signs and sizes from 1e-4 to 1e4 the left side is at most {inside:.6f} of the right side "
+        f"for p = 0.1, 0.5, 0.9. The check can fail: for p = 1.5 and 2 the quotient is {worst[1.5]:.3f} and "
+        f"{worst[2.0]:.3f}.",
+        holds=inside <= 1.0 + 1e-9,
+        figures={"worst_quotient_by_p": {str(p): quotient for p, quotient in worst.items()}},
+    )
+
+
+def scaling_conditions() -> Claim:
+    """(21), (22) and the parameters of section 3.1."""
+    lines = violated_conditions(2, P, B, (P,))
+    bound = largest_b(2, P, (P,))
+    return Claim(
+        place="Section 4.3, (21), (22)",
+        says=f"b satisfies (21), (22), and section 3.1 uses b = {B} with p = {P}.",
+        found=f"For n = 2 both ask for b < (1 - p)/p = {bound:.4f}. With the printed values {len(lines)} inequalities "
+        f"do not hold: {'; '.join(lines)}.",
+        holds=not lines,
+        otherwise="The parameters of the simulation are outside the theorem's proof. It does no harm there: the "
+        "argument of the correction is so small that b and p have no effect (see the claim on the correction). With "
+        "the limited x2_hat Omega_2 is bounded, so that (22) could be dropped, but not (21).",
+        figures={"b": B, "largest_b": bound, "violated_count": len(lines)},
+    )
+
+
+def tracking_error(rate: float, phi1: float = 0.5, phi2: float = 1.0, phi3: float = 1.0) -> tuple[float, float]:
+    """L behind phi2 + phi3/phi1 Omega for Omega = 2 + sin(rate t): the largest error, and the least L - phi2."""
+    dt = 0.01
+    t = np.arange(0.0, 20.0 + 4.0 * math.pi / rate, dt)
+    Omega = 2.0 + np.sin(rate * t)
+    L, gains = phi2, []
+    for value in Omega.tolist():
+        gains.append(L)
+        L = updated_gain(L, value, dt, phi1, phi2, phi3)
+    L = np.array(gains)
+    late = t > 20.0
+    return float(np.abs(L - phi2 - phi3 / phi1 * Omega)[late].max()), float((L - phi2).min())
+
+
+def gain_tracking() -> Claim:
+    """(13) and the remark that L does not fall below phi2."""
+    rates = (0.4, 0.2, 0.1, 0.05)
+    errors, least = zip(*(tracking_error(rate) for rate in rates), strict=True)
+    quotients = [a / b for a, b in itertools.pairwise(errors)]
+    proportional = all(1.6 < quotient < 2.4 for quotient in quotients)
+    above = min(least) >= 0.0
+    return Claim(
+        place="Section 2.2, (13)",
+        says="L tracks phi2 + (phi3/phi1) Omega up to an error proportional to |Omega'|, and from L(0) >= phi2 stays "
+        "at or above phi2.",
+        found=f"For Omega = 2 + sin(w t) the largest error falls from {errors[0]:.3f} at w = {rates[0]} by factors "
+        f"{', '.join(f'{quotient:.2f}' for quotient in quotients)} as w is halved; the least L - phi2 is "
+        f"{min(least):.2g}.",
+        holds=proportional and above,
+        figures={"omega_rate_rad_per_time": list(rates), "largest_error_of_L": list(errors)},
+    )
