@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from cmg_mj.papers.aranovskiy2020.paper import printed_model, settled_gains
-from cmg_mj.papers.aranovskiy2020.rig import push_recovery
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.summary_keys import written
@@ -48,12 +48,14 @@ Fates = Mapping[str, Mapping[float, Fate]]
 """Label -> bias [deg] -> fate."""
 
 
-def fates_of(label: str, biases_deg: Sequence[float], worlds: int, seed: int) -> dict[float, Fate]:
+def fates_of(
+    label: str, biases_deg: Sequence[float], worlds: int, seed: int, duration_s: float = DURATION_S
+) -> dict[float, Fate]:
     """Run one of `CASES` at several biases, in the same worlds each, with the push of Figs 5 to 7."""
     observer, settings, _ = CASES[label]
     biases = [e for e in biases_deg for _ in range(worlds)]
     numbers = [*range(worlds)] * len(biases_deg)
-    experiment = push_recovery(observer, seed, settings)
+    experiment = push_recovery(observer, seed, settings, duration_s)
     result = experiment.run_many(numbers, vary={"equilibrium_bias_deg": biases}, keep_trajectory=False)
     return {
         e: Fate(float(group.fell.mean()), group.mean("velocity_rms_error_rad_s"))

@@ -98,12 +98,13 @@ class Vicinity(NamedTuple):
 
 def vicinity(rng: np.random.Generator) -> Vicinity:
     """Measure it over bias and noise."""
-    biased = np.tile(-np.radians(BIASES_DEG), (TICKS, 1))
+    biases = np.radians(BIASES_DEG)
     noise = rng.normal(0.0, 1.0, (TICKS, 16))
+    biased, noisy = np.tile(-biases, (TICKS, 1)), np.hstack([sigma * noise for sigma in NOISES_RAD])
     return Vicinity(
         {alpha: errors_at_rest(alpha, biased) for alpha in SETTLING},
-        {alpha: np.array([bias_bound(alpha, e) for e in np.radians(BIASES_DEG)]) for alpha in SETTLING},
-        {alpha: np.array([errors_at_rest(alpha, sigma * noise).mean() for sigma in NOISES_RAD]) for alpha in SETTLING},
+        {alpha: np.array([bias_bound(alpha, e) for e in biases]) for alpha in SETTLING},
+        {alpha: errors_at_rest(alpha, noisy).reshape(len(NOISES_RAD), -1).mean(axis=1) for alpha in SETTLING},
     )
 
 

@@ -1,0 +1,85 @@
+"""Remark 1 of aranovskiy2020: the Riccati equation of (10) by several methods, and as it is printed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_continuous_are
+
+from cmg_mj.observers import Estimate, Measurement
+from cmg_mj.papers.aranovskiy2020 import delicacy, forms_of_10, misprint
+from cmg_mj.papers.aranovskiy2020.delicacy import transient
+from cmg_mj.papers.aranovskiy2020.paper import A_prime, C, Q, printed_model, settled_gains
+
+SEED = 910_000
+
+
+def test_methods_converge_with_their_orders_and_ours_is_exact() -> None:
+    for method, order in (("explicit Euler", 1.0), ("Runge-Kutta 4", 4.0)):
+        errors = [transient(method, rate).error for rate in (1000.0, 2000.0)]
+        assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+    assert transient("exact step (ours)", 37.0).error < 1e-10
+
+
+def test_definiteness_is_lost_at_low_rates() -> None:
+    assert transient("explicit Euler", 150.0).least < 0.0
+    assert transient("explicit Euler", 190.0).least > 0.0
+    assert transient("Runge-Kutta 4", 31.0).least < 0.0
+    assert transient("Runge-Kutta 4", 40.0).least > 0.0
+    assert transient("exact step (ours)", 5.0).least > 0.0
+
+
+def test_the_lowest_rate_lies_between_one_that_fails_and_one_that_does_not() -> None:
+    swept = {rate: transient("explicit Euler", rate) for rate in (100.0, 150.0, 190.0, 400.0)}
+    found = delicacy.lowest_rate("explicit Euler", swept, lambda t: t.least > 0.0)
+    assert found is not None
+    assert transient("explicit Euler", found).least > 0.0 >= transient("explicit Euler", found - 0.1).least
+    assert delicacy.lowest_rate("explicit Euler", swept, lambda t: True) is None
+
+
+def test_single_precision_does_no_harm_to_runge_kutta() -> None:
+    double, single = (transient("Runge-Kutta 4", 200.0, single=s) for s in (False, True))
+    assert single.error == pytest.approx(double.error, rel=0.2)
+    assert single.error != double.error
+    assert single.least > 0.0
+
+
+def test_plain_form_agrees_with_ours_at_a_small_step() -> None:
+    """(10) written out with 3x3 matrices is the same observer: the difference fades with the step."""
+    differences = []
+    for dt in (1e-3, 5e-4):
+        plain, ours = forms_of_10.Plain(forms_of_10.euler, dt), forms_of_10.ours(dt)
+        y = Measurement(0.01, 0.2)
+        a, b = plain.init(y), ours.init(y)
+        x, estimate = a[0], Estimate(0.0, 0.0, 0.0)
+        for k in range(round(0.3 / dt)):
+            y = Measurement(0.01 + 0.03 * math.sin(9.0 * k * dt), 0.2)
+            a, x = plain.step(a, y, 0.3)
+            b, estimate = ours.step(b, y, 0.3)
+        differences.append(abs(x[1] - estimate.x2))
+    assert differences[1] < 0.65 * differences[0]
+    assert differences[1] < 0.02
+
+
+def test_euler_makes_the_estimate_worse() -> None:
+    found = forms_of_10.euler_against_exact(SEED)
+    assert found.other_error > 1.1 * found.error
+
+
+def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matters() -> None:
+    """Where it settles, by a root of the nine equations."""
+    corrected, printed, rate = misprint.misprint(SEED)
+    A, lost = A_prime(), C.T @ C
+    for H, first in ((corrected, A), (printed, printed_model().A)):
+        slope = H @ first.T + A @ H - H @ lost @ H + Q
+        assert np.abs(slope).max() < 1e-6 * np.abs(H @ lost @ H).max()
+    assert abs(corrected[0, 1] / corrected[1, 0] - 1.0) < 1e-9
+    assert abs(printed[0, 1] / printed[1, 0] - 1.0) > 0.02
+    assert 0.0 < rate.difference < 0.02 * rate.error
+
+
+def test_settled_gains_solve_the_algebraic_riccati_equation() -> None:
+    H = solve_continuous_are(A_prime().T, C.T, Q, np.eye(2))
+    assert settled_gains() == pytest.approx((H[0, 0], H[0, 1]), rel=1e-9)
