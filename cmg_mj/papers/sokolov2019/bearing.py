@@ -15,7 +15,7 @@ import numpy as np
 from cmg_mj.intervals import mean_interval
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import poles_as_pairs
-from cmg_mj.papers.recorded import pushed, trajectory_of
+from cmg_mj.papers.recorded import pushed, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.papers.sokolov2019.vertical_torque import Locked, locked_run, vertical_torque
 from cmg_mj.papers.words import plus_minus
@@ -106,7 +106,7 @@ def claim(found: Study) -> Claim:
     """The thrust bearing, which the model of one tilt angle leaves out."""
     worlds, error, k = len(found.locked), found.closed_form_error, stiffness()
     peak = mean_interval([float(np.abs(run.within(1.0, 1.6)).max()) for run in found.locked])
-    rest = mean_interval([float(np.sqrt(np.mean(run.within(0.5, 1.0) ** 2))) for run in found.locked])
+    rest = mean_interval([float(rms(run.within(0.5, 1.0))) for run in found.locked])
     of_mean, pair = float(np.abs(found.mean_torque).max()), float(np.abs(found.pair.torque).max())
     falls = {case: float(result.fell.mean()) for case, result in found.free.items()}
     ends = {

@@ -12,7 +12,7 @@ from cmg_mj.experiment import Experiment
 from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.observers import Observer
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import pushed, trajectory_of
+from cmg_mj.papers.recorded import pushed, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS, TABLE_II
 from cmg_mj.papers.sokolov2019.rig import estimator, experiment
 from cmg_mj.papers.words import plus_minus
@@ -66,7 +66,7 @@ class Tuning(NamedTuple):
         return (self.rates["luenberger"] - self.trajectory["x2_rad_s"]).mean(axis=1)
 
 
-def tuning_experiment(worlds: int, seed: int) -> Tuning:
+def tuning_experiment(worlds: int = WORLDS, seed: int = SEED) -> Tuning:
     """Close the loop on the gyro and replay the estimators on it."""
     prepared = experiment([f"seed={seed}", "duration_s=5.0"], feedback="fog")
     trajectory = trajectory_of(prepared.run_many(worlds))
@@ -80,11 +80,7 @@ def tuning_experiment(worlds: int, seed: int) -> Tuning:
 def relative_errors(tuning: Tuning) -> dict[str, Interval]:
     """RMS of estimate less gyro over the push's window, by the gyro's own RMS there; an estimate of zero has 1."""
     gyro = tuning.trajectory["fog_rad_s"][tuning.window]
-    size = np.sqrt(np.mean(gyro**2, axis=0))
-    return {
-        name: mean_interval(np.sqrt(np.mean((rates[tuning.window] - gyro) ** 2, axis=0)) / size)
-        for name, rates in tuning.rates.items()
-    }
+    return {name: mean_interval(rms(rates[tuning.window] - gyro) / rms(gyro)) for name, rates in tuning.rates.items()}
 
 
 def predicted_error(tuning: Tuning) -> np.ndarray:
@@ -197,9 +193,9 @@ def _picture(tuning: Tuning) -> Picture:
     return Picture("sokolov2019-fig-3", title, panels)
 
 
-def claims(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> list[Claim]:
+def claims(on_share: OnShare) -> list[Claim]:
     """Fig. 3, and what Section V says of (9) there."""
-    tuning = tuning_experiment(worlds, seed)
+    tuning = tuning_experiment()
     on_share(0.8)
     relative = relative_errors(tuning)
     return [misses_the_push(tuning, relative), ignores_y2(tuning, relative)]

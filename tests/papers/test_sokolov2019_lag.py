@@ -1,0 +1,133 @@
+"""sokolov2019, Section V: the lags that MuJoCo oscillates at against the sampled loop's eigenvalues."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from cmg_mj.papers.sokolov2019 import lag, paper, release
+from cmg_mj.papers.sokolov2019.rig import experiment, servo_of
+from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, rig_matrices
+from cmg_mj.trajectory import Trajectory
+from tests import paper_model
+
+
+def synthetic(rates: list[np.ndarray], t: np.ndarray) -> Trajectory:
+    return Trajectory({"time_s": t, "x2_rad_s": np.array(rates).T})
+
+
+def test_what_counts_as_sustained() -> None:
+    t = np.arange(0.0, 6.0, 0.005)
+    wave = np.sin(24.0 * t)
+    fallen = np.where(t > 5.0, np.nan, wave)
+    rates = [np.exp(-0.05 * t) * wave, np.exp(0.05 * t) * wave, wave, 1e-4 * wave, fallen]
+    assert release.is_sustained(synthetic(rates, t)).tolist() == [False, True, True, False, True]
+
+
+def servo() -> Servo:
+    return servo_of(experiment().plant)
+
+
+def test_servo_is_the_models() -> None:
+    found = servo()
+    assert (found.kp, found.kv) == (85.6, 0.731)
+    assert found.inertia == pytest.approx(paper_model.I_c + paper_model.I_d, rel=1e-12)
+    assert found.damped(0.02).lag_s == found.softened(0.02).lag_s == pytest.approx(0.02)
+    soft = found.softened(0.02)
+    assert soft.kv == pytest.approx(2.0 * math.sqrt(soft.kp * soft.inertia))
+
+
+def test_a_servo_too_fast_for_the_integrator_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"kv h/I = 3\.\d+ must be at most 2\.7"):
+        release.release("linear", [servo().damped(0.06)])
+
+
+@pytest.mark.parametrize("lag_ms", [8.5, 15.0, 22.0])
+def test_pole_of_the_sampled_loop_is_mujocos(lag_ms: float) -> None:
+    """Decay and frequency of a small release of the compiled bodies, against the eigenvalue."""
+    loop, own, dt = lag.linearised("linear")
+    varied = own.damped(1e-3 * lag_ms)
+    pole = oscillation(loop(varied), dt)
+    settings = ["plant.initial_tilt_deg=0.02", "duration_s=3.0"]
+    trajectory = release.release("linear", [varied], settings)
+    t, x2 = trajectory["time_s"], trajectory["x2_rad_s"][:, 0]
+    kept = (t > 0.8) & (t < 1.6)  # when the faster poles have faded
+    # A free oscillation obeys x[k+2] = 2 r cos(w) x[k+1] - r^2 x[k], here for steps of eight ticks.
+    x = [x2[kept][8 * i :] for i in range(3)]
+    n = len(x[2])
+    (a, b), *_ = np.linalg.lstsq(np.column_stack([x[1][:n], x[0][:n]]), x[2], rcond=None)
+    measured = np.log(np.roots([1.0, -a, -b]).astype(complex)[0]) / (8.0 * dt)
+    assert abs(measured.imag) == pytest.approx(pole.imag, rel=0.02)
+    assert measured.real == pytest.approx(pole.real, abs=0.15)
+
+
+def test_modes_of_a_known_system() -> None:
+    """Without observer, gravity or spin the servo's own poles come out."""
+    still = paper.printed_model()
+    A, B = rig_matrices(still, servo())
+    assert B[4, 0] == 1.0
+    s = servo()
+    np.testing.assert_allclose(A[3, 2:], [-s.kp / s.inertia, -s.kv / s.inertia, s.kp / s.inertia])
+    matrix = np.diag(np.exp(0.005 * np.array([-3.0, -7.0])))
+    np.testing.assert_allclose(modes(matrix, 0.005), [-3.0, -7.0])
+
+
+def test_first_crossing() -> None:
+    assert first_crossing(lambda x: x**2 - 2.0, 0.0, 3.0) == pytest.approx(math.sqrt(2.0), abs=1e-6)
+    assert first_crossing(lambda x: -1.0 - x, 0.0, 3.0) is None
+    assert first_crossing(math.sin, 4.0, 9.0) == pytest.approx(2.0 * math.pi, abs=1e-6)
+
+
+@pytest.fixture(scope="module")
+def lags() -> lag.Lags:
+    return lag.lags(lambda share: None)
+
+
+def test_thresholds_on_mujoco_are_the_predicted_ones(lags: lag.Lags) -> None:
+    linear = lags.predictions["linear"]
+    assert lags.thresholds["linear"].middle == pytest.approx(linear.servo_lag_s, abs=2e-4)
+    for name in ("linear", "luenberger"):
+        assert lags.latencies[name].high == pytest.approx(lags.predictions[name].latency_s, abs=1.1e-3)
+    sweep = lags.sweeps["linear"]
+    assert sweep.sustained.tolist() == (sweep.lags_s > linear.servo_lag_s).tolist()
+    assert not sweep.sustained[0]
+    for name in ("luenberger", "homogeneous"):
+        assert not lags.sweeps[name].sustained.any()
+
+
+def test_the_flywheels_torque_on_the_gimbal_counts(lags: lag.Lags, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A loop model without it predicts another threshold, and MuJoCo tells the two apart."""
+    from cmg_mj.papers.sokolov2019 import sampled_loop
+
+    def without(model, servo):
+        A, B = rig_matrices(model, servo)
+        A[3, 1] = 0.0
+        return A, B
+
+    monkeypatch.setattr(sampled_loop, "rig_matrices", without)
+    predicted = lag.predicted("linear").servo_lag_s
+    assert predicted is not None
+    assert abs(predicted - (lags.thresholds["linear"].middle or 0.0)) > 1e-3
+
+
+def test_claim_of_the_lag(lags: lag.Lags) -> None:
+    claim = lag.claim(lags)
+    assert claim.verdict == "reproduced within stated conditions"
+    assert claim.figures["predicted"]["linear"]["damping_ratio"] == pytest.approx(0.10, abs=0.01)
+    slower = lags._replace(thresholds=lags.thresholds | {"homogeneous": release.Threshold(0.01, 0.011)})
+    assert lag.claim(slower).verdict == "not reproduced"
+
+
+def test_a_soft_servo_does_not_make_it_oscillate() -> None:
+    """As the linearised loop says: on MuJoCo, up to 100 ms."""
+    servos = [servo().softened(lag_s) for lag_s in (0.02, 0.04, 0.07, 0.1)]
+    assert not release.is_sustained(release.release("linear", servos)).any()
+
+
+def test_luenberger_oscillates_from_64_ms_on() -> None:
+    """Beyond what RK4 takes at 1 ms."""
+    settings = ["plant.timestep_s=0.0005"]
+    servos = [servo().damped(lag_s) for lag_s in (0.060, 0.069)]
+    assert release.is_sustained(release.release("luenberger", servos, settings)).tolist() == [False, True]
