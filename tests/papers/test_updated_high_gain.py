@@ -11,8 +11,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from cmg_mj.errors import InputError
+from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection
-from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain, updated_gain
+from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
 
 PHI: dict[str, Any] = {"phi1": 0.4, "phi2": 1.5, "phi3": 0.8}
 

@@ -1,4 +1,4 @@
-"""The bioreactor of andrieu2009 section 3: Contois model (14), observability form (15), bounds on its increments."""
+"""The bioreactor of section 3: Contois model (14), observability form (15), bounds on its increments."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ class Bioreactor:
 
     def x2_bounds(self, x1: Array) -> tuple[Array, Array]:
         """Least and largest x2 of M_x at an x1 that lies in [eps1, 1 - eps2]."""
-        return x1 * self.eps2 / (self.hbar * x1 + self.eps2), x1 * (1.0 - x1) / (1.0 - x1 + self.hbar * x1)
+        part, rest = self.hbar * x1, 1.0 - x1
+        return x1 * self.eps2 / (part + self.eps2), x1 * rest / (rest + part)
 
     def limit_x1(self, x1: Array) -> Array:
         """x_1s."""
@@ -68,11 +69,12 @@ class Bioreactor:
     def coefficients(self, x1: Array, u: Array) -> tuple[Array, Array, Array, Array]:
         """m0 to m3 of (15)."""
         hbar = self.hbar
+        first, second = hbar * x1, hbar * x1**2
         return (
             u / hbar,
-            -u - 1.0 / hbar - 2.0 * u / (hbar * x1),
-            2.0 / (hbar * x1) + u / (hbar * x1**2),
-            (hbar - 1.0) / (hbar * x1**2),
+            -u - 1.0 / hbar - 2.0 * u / first,
+            2.0 / first + u / second,
+            (hbar - 1.0) / second,
         )
 
     def f2(self, x1: Array, x2: Array, u: Array) -> Array:
