@@ -24,7 +24,10 @@ from cmg_mj.schema import Scenario
 
 @dataclass(frozen=True)
 class Design:
-    """The law and the observers of a scenario. They are values: one design serves any number of runs and worlds.
+    """The law and the observers of a scenario, tried.
+
+    The bench's own observers are values. A user's may remember more than its state holds, so a run takes
+    `fresh_observers`, not these, which have been tried.
 
     Attributes:
         law: The control law.
@@ -57,6 +60,12 @@ class Design:
                     raise InputError(f"{field} {name!r}: {error}") from error
 
 
+def fresh_observers(scenario: Scenario, law: Law, model: ReducedModel) -> tuple[Observer, dict[str, Observer]]:
+    """Construct the observer in the loop, and the companions by name."""
+    observer = scenario.observer.make(law.dt, model)
+    return observer, {name: make_observer(name, law.dt, model) for name in scenario.companion_names()}
+
+
 def design(scenario: Scenario, model: ReducedModel) -> Design:
     """Check what pydantic could not, construct the law and the observers, and try them once.
 
@@ -74,8 +83,7 @@ def design(scenario: Scenario, model: ReducedModel) -> Design:
         check_times(scenario)
         _check_observers(scenario)
         law = scenario.controller.law(model)
-        observer = scenario.observer.make(law.dt, model)
-        companions = {name: make_observer(name, law.dt, model) for name in scenario.companion_names()}
+        observer, companions = fresh_observers(scenario, law, model)
         made = Design(law, observer, companions, scenario.observer.kind)
         made.rehearse()
         trim_of(scenario.controller.trim_s, law, extra_signals(observer))

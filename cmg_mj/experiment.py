@@ -10,7 +10,7 @@ from typing import Any
 import tomli_w
 
 from cmg_mj.controller import Controller
-from cmg_mj.design import Design, design
+from cmg_mj.design import Design, design, fresh_observers
 from cmg_mj.errors import InputError
 from cmg_mj.law import Law
 from cmg_mj.plant import Plant, load_plant
@@ -55,8 +55,9 @@ class Experiment:
             The controller.
         """
         settings = self.scenario.controller
+        observer, companions = fresh_observers(self.scenario, self.law, self.plant.reduced)
         return self.plant.controller(
-            self.design.observer,
+            observer,
             law=self.law,
             sensors=self.scenario.sensors,
             seed=self.scenario.seed,
@@ -64,7 +65,7 @@ class Experiment:
             feedback=settings.feedback,
             angles=settings.angles,
             trim_s=settings.trim_s,
-            companions=self.design.companions,
+            companions=companions,
         )
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -93,7 +94,7 @@ BIASES = (-10.0, -1.0, 0.0, 0.5, 1.5, 8.0)
 def with_bias(of: Experiment, bias_deg: float) -> Experiment:
     plant = of.scenario.plant
     fields = {name: getattr(plant, name) for name in plant.__dataclass_fields__}  # type: ignore[attr-defined]
-    return Experiment(of.scenario, load_plant(**{**fields, "equilibrium_bias_deg": bias_deg}), of.law)
+    return replace(of, plant=load_plant(**{**fields, "equilibrium_bias_deg": bias_deg}))
 
 
 @pytest.mark.parametrize("kind", ["homogeneous", "ltv"])

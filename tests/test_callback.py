@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -202,7 +203,9 @@ def assert_restarts(integrator: str, steps: int) -> None:
     whole = native(settings)
     taken = len(loop.rows)
     assert taken >= len(whole) - 1
-    assert_same_run(loop.rows, Trajectory({name: values[-taken:] for name, values in whole.columns.items()}))
+    assert_same_run(
+        loop.rows, replace(whole, columns={name: values[-taken:] for name, values in whole.columns.items()})
+    )
 
 
 # --- how often -----------------------------------------------------------------------------------------
