@@ -17,5 +17,6 @@ while data.time < 5.0:
 
 tick = controller.tick
 assert tick is not None
-print(f"estimated tilt rate {tick.estimates[0].x2:+.4f} rad/s, true one {data.qvel[rig.tilt]:+.4f} rad/s")
+_, estimated_rate, _ = tick.estimates[0]
+print(f"estimated tilt rate {estimated_rate:+.4f} rad/s, true one {data.qvel[rig.tilt]:+.4f} rad/s")
 print(f"tilt {math.degrees(data.qpos[rig.tilt] - rig.tilt_zero):+.2f} deg, command {tick.u:+.3f} rad/s")

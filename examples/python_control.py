@@ -1,5 +1,8 @@
 """The rig's reduced model in python-control: poles, an initial response, and LQR gains beside those of Table 2."""
 
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
+# (python-control has no types)
+
 from __future__ import annotations
 
 import control
