@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from cmg_mj.experiment import prepare
+from cmg_mj.observers import make_observer
 from cmg_mj.papers.sokolov2019 import equations, paper
+from cmg_mj.papers.sokolov2019.rig import estimator, experiment
+from cmg_mj.scenario import load_scenario
 from tests import paper_model
 
 SEED = 5_000
@@ -25,6 +29,14 @@ def test_table_i() -> None:
 def test_table_i_with_another_number_is_not_reproduced(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(paper.TABLE_I, "l", 0.19)
     assert equations.table_i().verdict == "not reproduced"
+
+
+def test_table_ii_is_what_the_bench_comes_with() -> None:
+    """Its defaults were written down apart from the folder's constants."""
+    prepared = experiment()
+    for name in paper.TABLE_II:
+        assert estimator(name, prepared) == make_observer(name, prepared.law.dt, prepared.plant.reduced)
+    assert prepared.law == prepare(load_scenario("single_gimbal")).law
 
 
 def test_equations_of_motion() -> None:
