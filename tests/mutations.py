@@ -146,7 +146,7 @@ def main() -> None:
     parameters = [name for name in parameters if wanted in name]
     with ThreadPoolExecutor(2) as pool:
         found = {(p, f): pool.submit(caught_by, p, f) for p in parameters for f in FACTORS}
-        rows = [f"| {p} | " + " | ".join(found[p, f].result() for f in FACTORS) + " |" for p in parameters]
+        rows = [f"| `{p}` | " + " | ".join(found[p, f].result() for f in FACTORS) + " |" for p in parameters]
     lines = [
         "# Which test catches which wrong parameter",
         "",
