@@ -32,7 +32,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
     settings = scenario.plant
     steps = f"{round(scenario.duration_s / settings.timestep_s)} physics steps of {settings.timestep_s:g} s"
     poles = closed_loop_poles(rig.reduced, law.gains)
-    slowest = float(np.max(poles.real))
+    slowest = float(np.max(np.real(poles)))
     stability = "stable" if is_hurwitz(poles) else "MARGINAL" if slowest < MARGIN else "UNSTABLE"
     observer = {key: value for key, value in fields["observer"].items() if key != "kind"}
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}

@@ -16,39 +16,24 @@ from cmg_mj.description import assignments
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.resources import bundled
 from cmg_mj.scenario import load_scenario
-from cmg_mj.summary_keys import BIAS_KEYS, KEYS, heading, written
-
-COMPARED = (
-    "velocity_rms_error_rad_s",
-    "velocity_rms_error_fog_rad_s",
-    "tilt_rms_deg",
-    "settle_time_s",
-    "gimbal_peak_deg",
-    "command_rms_rad_s",
-    "command_saturated_fraction",
-    "fell_fraction",
-    "stopped_fraction",
-)
-"""Summary keys that are columns of a comparison."""
-
-OF_A_RUN = (*(key for key in COMPARED if not key.endswith(("fell_fraction", "stopped_fraction"))), *BIAS_KEYS)
-"""Summary keys that are rows of a run's table."""
+from cmg_mj.summary_keys import KEYS, heading, written
 
 WIDEST = 9
 """Characters of a heading before it is broken."""
 
 
-def _columns(summaries: Sequence[Mapping[str, Any]]) -> list[str]:
-    """All columns, but that of stopped worlds only if there are any."""
+def columns_of(summaries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Summary keys that all have, but that of stopped worlds only if there are any."""
     stopped = any(summary["stopped_fraction"] for summary in summaries)
-    return [key for key in COMPARED if stopped or key != "stopped_fraction"]
+    common = [key for key in KEYS if all(key in summary for summary in summaries)]
+    return [key for key in common if stopped or key != "stopped_fraction"]
 
 
 def comparison_table(summaries: Sequence[Mapping[str, Any]], title: str) -> Table:
     """The table that `cmg-mj compare` prints."""
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0))
     table.add_column("observer", vertical="bottom", overflow="fold")
-    columns = _columns(summaries)
+    columns = columns_of(summaries)
     for key in columns:
         unit = [f"[{KEYS[key].unit}]"] if KEYS[key].unit else []
         lines = [*textwrap.wrap(KEYS[key].label, WIDEST), *unit]
@@ -60,7 +45,7 @@ def comparison_table(summaries: Sequence[Mapping[str, Any]], title: str) -> Tabl
 
 def comparison_markdown(summaries: Sequence[Mapping[str, Any]]) -> str:
     """The same table in Markdown."""
-    columns = _columns(summaries)
+    columns = columns_of(summaries)
     rows = [(f"`{s['observer']}`", *(written(key, s[key]) for key in columns)) for s in summaries]
     return markdown.table(["observer", *map(heading, columns)], rows)
 
@@ -79,7 +64,7 @@ def summary_table(summary: Mapping[str, Any]) -> Table:
     table.add_column()
     table.add_column(justify="right")
     table.add_row("Outcome", end)
-    for key in OF_A_RUN:
+    for key in KEYS:
         if key in summary:
             table.add_row(_capitalised(heading(key)), written(key, summary[key]))
     error = "velocity_rms_error_rad_s"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 MARGIN = 1e-6
@@ -11,7 +13,7 @@ Rounding moves a pole at zero by about 1e-16 times the largest entry, to either 
 """
 
 
-def is_hurwitz(poles: np.ndarray) -> bool:
+def is_hurwitz(poles: Any) -> bool:
     """Whether every mode fades.
 
     Args:

@@ -40,10 +40,6 @@ KEYS = {
 """Summary key -> what it is. In this order they stand in every table."""
 
 
-BIAS_KEYS = ("bias_estimate_deg", "bias_rms_error_deg")
-"""Those that only a run with an observer of the bias has."""
-
-
 def heading(key: str) -> str:
     """A summary key in words, with its unit."""
     return KEYS[key].heading

@@ -9,19 +9,7 @@ from cmg_mj import markdown
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
 from cmg_mj.recording.run import Run
-from cmg_mj.summary_keys import BIAS_KEYS, heading, written
-
-NUMBERS = (
-    "settle_time_s",
-    "velocity_rms_error_rad_s",
-    "velocity_rms_error_fog_rad_s",
-    "tilt_rms_deg",
-    "gimbal_peak_deg",
-    "command_rms_rad_s",
-    "command_saturated_fraction",
-    *BIAS_KEYS,
-)
-"""The summary's keys that are shown."""
+from cmg_mj.summary_keys import KEYS, heading, written
 
 FEWER = ("settle_time_s", "velocity_rms_error_rad_s", "tilt_rms_deg", "gimbal_peak_deg", "command_rms_rad_s")
 """Those that find room when each run is a row."""
@@ -65,8 +53,8 @@ def _by_column(runs: Sequence[Run]) -> str:
     rows = [("Outcome", *map(_outcome, runs))]
     rows += [
         (heading(key), *(written(key, run.summary.get(key)) for run in runs))
-        for key in NUMBERS
-        if key not in BIAS_KEYS or any(key in run.summary for run in runs)
+        for key in KEYS
+        if any(key in run.summary for run in runs)
     ]
     return markdown.table(("", *(run.name for run in runs)), rows)
 
