@@ -1,0 +1,120 @@
+"""This checkout's observers against another checkout's: the same recorded run, the closed loop, the time of an update.
+
+    python docs/studies/against.py OTHER_CHECKOUT [--python OTHER_PYTHON] [--worlds 20]
+
+A refactoring must leave the estimates on recorded signals as they were, to rounding. In the closed loop one last bit
+becomes another count after some seconds, so there only means over worlds can be compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from cmg_mj import OBSERVERS, load_scenario, prepare
+from cmg_mj.markdown import table
+
+HERE = Path(__file__).resolve().parents[2]
+
+REPLAY = """
+import sys, time
+import numpy as np
+import cmg_mj
+from cmg_mj import OBSERVERS, Measurement, make_observer
+
+signals, rig, found = np.load(sys.argv[1]), cmg_mj.load_plant(), {}
+floats = [signals[name][:, 0].tolist() for name in ("y1", "y2", "u")]
+arrays = [np.ascontiguousarray(signals[name][:300]) for name in ("y1", "y2", "u")]
+for kind in OBSERVERS:
+    observer = make_observer(kind, 0.005, rig.reduced)
+    for name, (y1, y2, u), repeats in (("one", floats, 9), ("many", arrays, 5)):
+        times = []
+        for _ in range(repeats):
+            state, estimates = observer.init(Measurement(y1[0], y2[0])), []
+            start = time.perf_counter()
+            for k in range(1, len(y1)):
+                state, estimate = observer.step(state, Measurement(y1[k], y2[k]), u[k - 1])
+                estimates.append(estimate)
+            times.append((time.perf_counter() - start) / (len(y1) - 1) * 1e6)
+        found[f"{kind}/{name}"] = np.array(estimates)
+        found[f"{kind}/{name}_us"] = min(times)
+np.savez(sys.argv[2], **found)
+"""
+
+COMPARE = """
+import json, sys
+import cmg_mj
+from cmg_mj.runs import compare, prepare_comparison
+scenario = cmg_mj.load_scenario("push_recovery")
+compared = compare(prepare_comparison(scenario, list(cmg_mj.OBSERVERS)), int(sys.argv[1]))
+print(json.dumps([entry.summary for entry in compared]))
+"""
+
+
+def run(checkout: Path, python: str, code: str, *arguments: object) -> str:
+    """Run code on a checkout's package."""
+    environment = {**os.environ, "PYTHONPATH": str(checkout), "OPENBLAS_NUM_THREADS": "1"}
+    command = [python, "-W", "ignore", "-c", code, *map(str, arguments)]
+    with tempfile.TemporaryDirectory() as elsewhere:
+        done = subprocess.run(command, cwd=elsewhere, env=environment, stdout=subprocess.PIPE, text=True, check=True)
+    return done.stdout
+
+
+def recorded(path: Path) -> None:
+    """What 256 worlds of `push_recovery` measured and commanded."""
+    trajectory = prepare(load_scenario("push_recovery")).run_many(256).trajectory
+    assert trajectory is not None
+    np.savez(
+        path, **{name: trajectory[f"{name}_{unit}"] for name, unit in (("y1", "rad"), ("y2", "rad"), ("u", "rad_s"))}
+    )
+
+
+def largest(a: np.ndarray, b: np.ndarray) -> str:
+    """The largest difference of the estimates, by the largest estimate."""
+    if np.array_equal(a, b, equal_nan=True):
+        return "bit for bit"
+    return f"{np.nanmax(np.abs(a - b)) / np.nanmax(np.abs(a)):.1e}"
+
+
+def main() -> None:
+    """Print the two tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("other", type=Path)
+    parser.add_argument("--python", default=sys.executable)
+    parser.add_argument("--worlds", type=int, default=20)
+    options = parser.parse_args()
+    checkouts = {"before": (options.other.resolve(), options.python), "after": (HERE, sys.executable)}
+    with tempfile.TemporaryDirectory() as folder:
+        signals = Path(folder) / "signals.npz"
+        recorded(signals)
+        found = {}
+        for name, (checkout, python) in checkouts.items():
+            run(checkout, python, REPLAY, signals, Path(folder) / f"{name}.npz")
+            found[name] = np.load(Path(folder) / f"{name}.npz")
+        before, after = found["before"], found["after"]
+        rows = []
+        for kind in OBSERVERS:
+            times = [f"{of[f'{kind}/{part}_us'].item():.1f}" for part in ("one", "many") for of in (before, after)]
+            gaps = [largest(before[f"{kind}/{part}"], after[f"{kind}/{part}"]) for part in ("one", "many")]
+            rows.append((f"`{kind}`", *gaps, *times))
+    headings = ("observer", "estimates, one world", "256 worlds", "us before", "after", "256 worlds: before", "after")
+    print(table(headings, rows, text_columns=3), "\n")
+
+    keys = ("velocity_rms_error_rad_s", "tilt_rms_deg", "settle_time_s", "fell_fraction")
+    means = {name: json.loads(run(*at, COMPARE, options.worlds)) for name, at in checkouts.items()}
+    rows = [
+        (f"`{old['observer']}`", *("-" if s[key] is None else f"{s[key]:.4f}" for key in keys for s in (old, new)))
+        for old, new in zip(means["before"], means["after"], strict=True)
+    ]
+    print(table(("observer", *(f"{key} {name}" for key in keys for name in ("before", "after"))), rows))
+
+
+if __name__ == "__main__":
+    main()
