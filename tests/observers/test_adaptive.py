@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import solve_continuous_lyapunov
+from scipy.linalg import expm, solve_continuous_lyapunov
 
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Measurement, make_observer
@@ -168,6 +168,17 @@ def test_learning_rate_is_the_stiffness_that_a_quiet_rig_comes_to(hertz: float) 
 @pytest.mark.parametrize("mode", MODES)
 def test_defaults_are_taken_at_every_sample_rate(mode: str, rate_hz: float) -> None:
     adaptive(dt=1.0 / rate_hz, **MODES[mode])
+
+
+def test_an_error_decays_as_the_gains_say() -> None:
+    """Without learning: (A + L C2) with the defaults, poles of 25 rad/s and damping ratio 0.7."""
+    dt, n = 5e-4, 80
+    of = adaptive(dt=dt, Gamma=(1e-12, 1e-12, 1e-12))
+    state, still = of.init(Measurement(0.0, 0.0))._replace(x1=0.02, x2=-0.3), Measurement(0.0, 0.0)
+    for _ in range(n):
+        state, _ = of.step(state, still, 0.0)
+    matrix = np.array([[-2.0 * 0.7 * 25.0, 1.0], [-(25.0**2), 0.0]])
+    assert (state.x1, state.x2) == pytest.approx(tuple(expm(matrix * n * dt) @ [0.02, -0.3]), rel=1e-3)
 
 
 # --- what is refused -----------------------------------------------------------------------------------

@@ -46,6 +46,16 @@ def printed_slope(m: ReducedModel, **parameters: float) -> Slope:
     return slope
 
 
+@pytest.mark.parametrize("L", [1.0, 2.5, 7.0])
+def test_correction_is_the_printed_one_at_any_gain(L: float) -> None:
+    """What (7) takes from the copy of the model; b matters where L is not 1, which it hardly leaves on this rig."""
+    slope, of = printed_slope(PAPER), high_gain()
+    for e in (-0.2, -0.01, 0.003, 0.1):
+        copy = slope(np.array([0.0, 0.0, L]), 0.0, 0.0, 0.0)[:2]
+        printed = copy - slope(np.array([e, 0.0, L]), 0.0, 0.0, 0.0)[:2]
+        assert of.correction(e, L) == pytest.approx(tuple(printed), rel=1e-12)
+
+
 CASES = [
     pytest.param({}, PAPER, id="defaults"),
     pytest.param({"l1": 45.0}, PAPER, id="l1"),
