@@ -9,6 +9,7 @@ from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.observers import make_observer
 from cmg_mj.observers.high_gain import HighGain, updated_gain
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.scenario import load_scenario
@@ -105,12 +106,12 @@ def _picture(errors: dict[str, np.ndarray]) -> Picture:
 
 def idle(result: Result) -> Claim:
     """The update of the gain has nothing to do."""
-    assert result.trajectory is not None
+    recorded = trajectory_of(result)
     rig = experiment("high_gain", SEED)
     observer = make_observer("high_gain", rig.law.dt, rig.plant.reduced)
     assert isinstance(observer, HighGain)
-    _, _, damping = rig.plant.reduced.terms(result.trajectory["y1_rad"], result.trajectory["y2_rad"])
-    Omega = np.abs(result.trajectory["u_rad_s"] * damping)
+    _, _, damping = rig.plant.reduced.terms(recorded["y1_rad"], recorded["y2_rad"])
+    Omega = np.abs(recorded["u_rad_s"] * damping)
     largest, typical = float(np.nanmax(Omega)), float(np.sqrt(np.nanmean(Omega**2)))
     gain = largest_gain(np.nan_to_num(Omega), observer, rig.law.dt)
     fastest = float(np.abs(np.roots([1.0, observer.l1, observer.l1 * observer.l2])).max())

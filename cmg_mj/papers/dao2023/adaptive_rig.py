@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.experiment import prepare
+from cmg_mj.papers.recorded import rms, trajectory_of
 from cmg_mj.push import Push
 from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
@@ -31,9 +32,7 @@ def run(scenario: Scenario, biases_deg: Sequence[float], **options: Any) -> Resu
 
 def record(scenario: Scenario, biases_deg: Sequence[float]) -> Trajectory:
     """What was recorded of one world a bias over seconds 5 to 10, (n_ticks, n_worlds)."""
-    trajectory = run(scenario, biases_deg).trajectory
-    assert trajectory is not None
-    return trajectory.between(LATE_S, DURATION_S)
+    return trajectory_of(run(scenario, biases_deg)).between(LATE_S, DURATION_S)
 
 
 def errors(result: Result, key: str) -> np.ndarray:
@@ -44,7 +43,7 @@ def errors(result: Result, key: str) -> np.ndarray:
 def rms_in_time(error: np.ndarray) -> np.ndarray:
     """RMS over the ticks, (n_ticks, n_worlds) -> (n_worlds,); infinite for a world that ended early."""
     ended = np.isnan(error).any(axis=0)
-    return np.where(ended, np.inf, np.sqrt(np.mean(np.where(ended, 0.0, error) ** 2, axis=0)))
+    return np.where(ended, np.inf, rms(np.where(ended, 0.0, error)))
 
 
 def signed_biases(seed: int, worlds: int, low_deg: float = 0.3, high_deg: float = 1.5) -> list[float]:

@@ -7,6 +7,7 @@ import numpy as np
 from cmg_mj.intervals import mean_interval
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.dao2023 import adaptive_rig as rig
+from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.trajectory import Trajectory
 
@@ -34,7 +35,6 @@ def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
     """What it finds of the equilibrium bias."""
     biases = rig.signed_biases(seed, worlds)
     result = rig.learnt_bias(seed, biases, keep_trajectory=True)
-    assert result.trajectory is not None
     rms = rig.errors(result, "bias_rms_error_deg")
     offset_mg = (5.0, -3.0)
     off = rig.learnt_bias(seed + 1, biases[:6], offset_mg)
@@ -63,7 +63,7 @@ def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
             "found_less_e_deg": found.tolist(),
             "expected_less_e_deg": expected.tolist(),
         },
-        pictures=[_picture_of_bias(result.trajectory.between(0.0, 5.0), biases)],
+        pictures=[_picture_of_bias(trajectory_of(result).between(0.0, 5.0), biases)],
         ours=True,
     )
 

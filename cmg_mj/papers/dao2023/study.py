@@ -51,18 +51,20 @@ def study(
         seed: Of the initial values.
         motions: How many.
         duration_s: How long [s].
-        rates_hz: Sample rates of the proposed and of the conventional observer [Hz].
+        rates_hz: Sample rates of the proposed and of the conventional observer, the former a multiple of the latter
+            [Hz].
         on_share: Called with the share done.
 
     Returns:
         All errors.
     """
-    start = robot.starts(seed, motions)
-    t = [np.arange(round(duration_s * rate) + 1) / rate for rate in rates_hz]
-    x = [robot.motion(start, times) for times in t]
-    proposed = robot.follow(robot.proposed(1.0 / rates_hz[0], SIGMAS), t[0], x[0], lambda s: on_share(0.1 + 0.65 * s))
-    plain = robot.follow(robot.conventional(1.0 / rates_hz[1]), t[1], x[1], lambda s: on_share(0.75 + 0.25 * s))
-    return Study(proposed, plain, float(np.abs(x[0][..., 0]).max()))
+    rate, every = rates_hz[0], round(rates_hz[0] / rates_hz[1])
+    t = np.arange(round(duration_s * rate) + 1) / rate
+    x = robot.motion(robot.starts(seed, motions), t)
+    proposed = robot.follow(robot.proposed(1.0 / rate, SIGMAS), t, x, lambda s: on_share(0.1 + 0.65 * s))
+    t_plain, x_plain = t[::every], x[::every]
+    plain = robot.follow(robot.conventional(every / rate), t_plain, x_plain, lambda s: on_share(0.75 + 0.25 * s))
+    return Study(proposed, plain, float(np.abs(x[..., 0]).max()))
 
 
 def exogenous_settle_times(errors: robot.Errors, band: float = SETTLED) -> np.ndarray:
