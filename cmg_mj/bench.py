@@ -15,7 +15,7 @@ from rich import box
 from rich.table import Table
 
 from cmg_mj.experiment import Experiment, prepare
-from cmg_mj.observers import Measurement
+from cmg_mj.observers import Measurement, Observer
 from cmg_mj.scenario import parse_scenario
 from cmg_mj.schema import Scenario
 
@@ -116,14 +116,29 @@ def update_us(experiment: Experiment, worlds: int | None) -> float:
     columns = [result.trajectory[name][:UPDATES] for name in ("y1_rad", "y2_rad", "u_rad_s")]
     if worlds is None:
         columns = [column.tolist() for column in columns]
-    samples = [(Measurement(y1, y2), u) for y1, y2, u in zip(*columns, strict=True)]
-    observer, times = experiment.design.observer, []
+    return time_of_update(experiment.design.observer, *columns)
+
+
+def time_of_update(observer: Observer, y1: Sequence[Any], y2: Sequence[Any], u: Sequence[Any]) -> float:
+    """Microseconds of one update along given signals, the median of some repeats.
+
+    Args:
+        observer: The observer.
+        y1: Measured tilt, (n_ticks,) floats or (n_ticks, n_worlds) [rad].
+        y2: Measured gimbal angle, the same [rad].
+        u: Gimbal rate, the same [rad/s].
+
+    Returns:
+        The time [us].
+    """
+    samples = [(Measurement(a, b), held) for a, b, held in zip(y1, y2, u, strict=True)]
+    times = []
     with np.errstate(all="ignore"):  # worlds that have fallen are NaN
         for _ in range(REPEATS):
             state = observer.init(samples[0][0])
             start = time.perf_counter()
-            for y, u in samples:
-                state, _ = observer.step(state, y, u)
+            for y, held in samples:
+                state, _ = observer.step(state, y, held)
             times.append((time.perf_counter() - start) / len(samples) * 1e6)
     return statistics.median(times)
 

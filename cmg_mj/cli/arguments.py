@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,8 +17,45 @@ if TYPE_CHECKING:
     from cmg_mj.schema import Scenario
 
 
+@dataclass(frozen=True)
+class Chosen:
+    """What the arguments of every command that runs a scenario say.
+
+    Attributes:
+        name: The scenario, as the user named it.
+        settings: `--set`, each FIELD=VALUE.
+        seed: `--seed`.
+        out: `--out`.
+        as_json: `--json`.
+    """
+
+    name: str
+    settings: tuple[str, ...]
+    seed: int | None
+    out: str | None
+    as_json: bool
+
+    def scenario(self, observer: str | None = None) -> Scenario:
+        """The scenario with what the options change."""
+        from cmg_mj.scenario import load_scenario
+
+        scenario = load_scenario(self.name, self.settings, observer)
+        return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
+
+    def folder(self, default: str, experiment: Experiment) -> Path:
+        """The folder to write to."""
+        from cmg_mj.runs import output_folder, unused_folder
+
+        return output_folder(unused_folder(Path("runs"), default, experiment) if self.out is None else named(self.out))
+
+
 def of_a_run(command: Callable) -> Callable:
-    """Arguments of every command that runs a scenario."""
+    """Arguments of every command that runs a scenario, which it takes as one `Chosen`."""
+
+    @functools.wraps(command)
+    def chosen(scenario: str, settings: tuple, seed: int | None, out: str | None, as_json: bool, **others: Any) -> Any:
+        return command(Chosen(scenario, settings, seed, out, as_json), **others)
+
     for decorate in reversed(
         (
             click.argument("scenario"),
@@ -34,8 +73,8 @@ def of_a_run(command: Callable) -> Callable:
             ),
         )
     ):
-        command = decorate(command)
-    return command
+        chosen = decorate(chosen)
+    return chosen
 
 
 of_observers = click.option(
@@ -47,21 +86,11 @@ of_observers = click.option(
 )
 
 
-def scenario_of(name: str, settings: Sequence[str], seed: int | None, observer: str | None) -> Scenario:
-    """The scenario with what the options change."""
-    from cmg_mj.scenario import load_scenario
-
-    scenario = load_scenario(name, settings, observer)
-    return scenario if seed is None else scenario.model_copy(update={"seed": seed})
-
-
-def folder_of(out: str | None, default: str, experiment: Experiment) -> Path:
-    """The folder to write to."""
-    from cmg_mj.runs import output_folder, unused_folder
-
+def named(out: str) -> Path:
+    """The folder that `--out` names."""
     if out == "":
         raise InputError("--out '': name a folder, . for the current one")
-    return output_folder(unused_folder(Path("runs"), default, experiment) if out is None else Path(out))
+    return Path(out)
 
 
 def names_of(observers: str) -> list[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from cmg_mj.cli.arguments import check_observer, folder_of, names_of, of_a_run, of_observers, scenario_of
+from cmg_mj.cli.arguments import Chosen, check_observer, names_of, of_a_run, of_observers
 from cmg_mj.cli.terminal import INTERRUPTED, WRONG_INPUT, CtrlC, progress, say, say_written, show
 from cmg_mj.errors import InputError, RunStopped
 
@@ -23,16 +23,7 @@ from cmg_mj.errors import InputError, RunStopped
     help="Who calls the controller: the runner, or MuJoCo through its control callback.",
 )
 @click.option("--plot", is_flag=True, help="Write plot.png as well.")
-def run(
-    scenario: str,
-    settings: tuple[str, ...],
-    seed: int | None,
-    out: str | None,
-    as_json: bool,
-    observer: str | None,
-    driver: str,
-    plot: bool,
-) -> None:
+def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
     """Run a scenario and write a folder.
 
     Its files: summary.json, trajectory.parquet, recording.rrd (a rerun recording), and scenario.toml, which has every
@@ -43,19 +34,19 @@ def run(
 
     if observer is not None:
         check_observer("--observer", observer)
-    chosen = scenario_of(scenario, settings, seed, observer)
-    experiment = prepare(chosen)
-    kind = runs.file_name(chosen.observer.kind)
-    folder = folder_of(out, f"{Path(scenario).stem}-{kind}-{chosen.seed}", experiment)
+    scenario = chosen.scenario(observer)
+    experiment = prepare(scenario)
+    kind = runs.file_name(scenario.observer.kind)
+    folder = chosen.folder(f"{Path(chosen.name).stem}-{kind}-{scenario.seed}", experiment)
     with CtrlC() as ctrl_c:
-        with progress(chosen.title or scenario, chosen.duration_s, ctrl_c) as on_progress:
+        with progress(scenario.title or chosen.name, scenario.duration_s, ctrl_c) as on_progress:
             result = experiment.run(driver=driver, on_progress=on_progress)  # type: ignore[arg-type]
         summary = runs.summary_of(experiment, result)
         try:
             runs.save_run(folder, experiment, result, plot=plot)
         finally:
-            show(summary, report.summary_table(summary), as_json)
-    if not as_json:
+            show(summary, report.summary_table(summary), chosen.as_json)
+    if not chosen.as_json:
         say_written(folder)
     outcome = result.outcomes[0]
     if outcome.kind == "stopped":
@@ -80,16 +71,7 @@ def run(
     help="Runs an observer, each with noise of its own; all observers get the same.",
 )
 @click.option("--markdown", is_flag=True, help="Print the table as Markdown.")
-def compare(
-    scenario: str,
-    settings: tuple[str, ...],
-    seed: int | None,
-    out: str | None,
-    as_json: bool,
-    observers: str,
-    worlds: int,
-    markdown: bool,
-) -> None:
+def compare(chosen: Chosen, observers: str, worlds: int, markdown: bool) -> None:
     """Run several observers on the same plant, pushes and noise: one table, one recording.
 
     The table has the means over the worlds that stood to the end; the recording has world 0 of every observer.
@@ -97,17 +79,18 @@ def compare(
     from cmg_mj import report, runs
 
     names = names_of(observers)
-    chosen = scenario_of(scenario, settings, seed, None)
-    for setting in settings:
-        if setting.startswith("observer.") and chosen.observer.kind not in names:
+    scenario = chosen.scenario()
+    for setting in chosen.settings:
+        if setting.startswith("observer.") and scenario.observer.kind not in names:
             raise InputError(
-                f"--set {setting}: is a setting of {chosen.observer.kind}, which is not among "
+                f"--set {setting}: is a setting of {scenario.observer.kind}, which is not among "
                 f"--observers {observers}; the others are compared with their default parameters"
             )
-    experiments = runs.prepare_comparison(chosen, names)
-    folder = folder_of(out, f"{Path(scenario).stem}-compare-{chosen.seed}", runs.with_own_observer(experiments))
+    experiments = runs.prepare_comparison(scenario, names)
+    own = runs.with_own_observer(experiments)
+    folder = chosen.folder(f"{Path(chosen.name).stem}-compare-{scenario.seed}", own)
     with CtrlC() as ctrl_c:
-        with progress(f"{chosen.title or scenario}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
+        with progress(f"{scenario.title or chosen.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
             compared = runs.compare(experiments, worlds, on_progress)
         if not compared:
             say("interrupted before the first observer was done; nothing was written")
@@ -116,10 +99,10 @@ def compare(
         try:
             runs.save_comparison(folder, compared)
         finally:
-            title = f"{chosen.title or scenario}: {worlds} worlds an observer, seed {chosen.seed}"
+            title = f"{scenario.title or chosen.name}: {worlds} worlds an observer, seed {scenario.seed}"
             table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
-            show(summaries, table, as_json)
-    if not as_json:
+            show(summaries, table, chosen.as_json)
+    if not chosen.as_json:
         say_written(folder)
     for entry in compared:
         if entry.stopped:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from cmg_mj.cli.arguments import check_observer, names_of, of_a_run, of_observers, scenario_of
+from cmg_mj.cli.arguments import Chosen, check_observer, named, names_of, of_a_run, of_observers
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, show
 from cmg_mj.errors import InputError, nearest
 
@@ -87,16 +87,7 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
 )
 @click.option("--noise", default="", metavar="LIST", help="Accelerometer noise densities to tune at [ug/rtHz].")
 def tune(
-    scenario: str,
-    settings: tuple[str, ...],
-    seed: int | None,
-    out: str | None,
-    as_json: bool,
-    observer: str | None,
-    worlds: int,
-    parameters: str,
-    ranges: tuple[str, ...],
-    noise: str,
+    chosen: Chosen, observer: str | None, worlds: int, parameters: str, ranges: tuple[str, ...], noise: str
 ) -> None:
     """Fit an observer's parameters to the gyro, as section V of aranovskiy2020 does; observer_tuning is its experiment.
 
@@ -113,27 +104,25 @@ def tune(
 
     if observer is not None:
         check_observer("--observer", observer)
-    if out == "":
-        raise InputError("--out '': name a folder, . for the current one")
-    chosen = scenario_of(scenario, settings, seed, observer)
-    default = Path("runs") / f"tune-{file_name(chosen.observer.kind)}-{chosen.seed}"
-    folder = output_folder(default if out is None else Path(out))
+    scenario = chosen.scenario(observer)
+    default = Path("runs") / f"tune-{file_name(scenario.observer.kind)}-{scenario.seed}"
+    folder = output_folder(default if chosen.out is None else named(chosen.out))
     densities = [_density(text) for text in noise.split(",") if text.strip()]
     if noise and not densities:
         raise InputError(f"--noise {noise!r}: give numbers with commas between")
     with CtrlC() as ctrl_c:
-        with progress(f"{chosen.title or scenario}: {chosen.observer.kind}", 1.0, ctrl_c) as on_progress:
+        with progress(f"{scenario.title or chosen.name}: {scenario.observer.kind}", 1.0, ctrl_c) as on_progress:
             study = fit(
-                chosen,
+                scenario,
                 worlds=worlds,
                 parameters=[name.strip() for name in parameters.split(",") if name.strip()],
                 ranges=dict(_range(text) for text in ranges),
                 noise_ug_rthz=densities,
                 on_share=on_progress,
             )
-        show(figures_of(study), tuning_table(study), as_json)
+        show(figures_of(study), tuning_table(study), chosen.as_json)
         files = save_study(folder, study)
-    if not as_json:
+    if not chosen.as_json:
         click.echo(f"Written to {folder}. Run with the tuned observer: cmg-mj run {files[1]}", err=True)
     if ctrl_c.noted:
         say(f"interrupted; {len(study.levels)} of {len(densities) or 1} noise densities are in {folder}")

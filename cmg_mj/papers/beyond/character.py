@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import statistics
-import time
 from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.bench import time_of_update
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import Measurement, Observer, make_observer
 from cmg_mj.reduced import ReducedModel
@@ -130,13 +129,12 @@ def _first_passing(time_s: np.ndarray, values: np.ndarray, level: float) -> floa
     return float(time_s[k - 1] + share * (time_s[k] - time_s[k - 1]))
 
 
-def update_us(kind: str, motion: Motion, repeats: int = 7) -> float:
-    """Microseconds of one update on floats, the median of some repeats.
+def update_us(kind: str, motion: Motion) -> float:
+    """Microseconds of one update on floats, along half a second of the motion.
 
     Args:
         kind: The observer.
         motion: What it is given.
-        repeats: How many times half a second of updates is timed.
 
     Returns:
         The time [us].
@@ -144,13 +142,4 @@ def update_us(kind: str, motion: Motion, repeats: int = 7) -> float:
     experiment = motion.experiment
     observer = make_observer(kind, experiment.law.dt, experiment.plant.reduced)
     short = motion.noisy.between(2.0, 2.5)
-    columns = (short[name][:, 0].tolist() for name in ("y1_rad", "y2_rad", "u_rad_s"))
-    samples = [(Measurement(y1, y2), u) for y1, y2, u in zip(*columns, strict=True)]
-    times = []
-    for _ in range(repeats):
-        state = observer.init(samples[0][0])
-        start = time.perf_counter()
-        for y, u in samples:
-            state, _ = observer.step(state, y, u)
-        times.append((time.perf_counter() - start) / len(samples) * 1e6)
-    return statistics.median(times)
+    return time_of_update(observer, *(short[name][:, 0].tolist() for name in ("y1_rad", "y2_rad", "u_rad_s")))
