@@ -1,6 +1,6 @@
 """The bias that `adaptive` finds and its velocity error against (9), (10), (11): 100 seeds, no push.
 
-Run it (about a minute and a half): python docs/studies/adaptive_on_the_rig.py
+Run it (about two minutes on a quiet core): python docs/studies/adaptive_on_the_rig.py
 """
 
 import numpy as np

@@ -8,7 +8,7 @@ Gains that let the rig fall in any world are out, and those whose bias RMS error
 that are asked for; of the rest, the least velocity RMS error wins, with the push and without weighing alike. The seed
 is used nowhere else.
 
-Run it (about ten minutes): python docs/studies/tune_adaptive.py
+Run it (about three minutes on a quiet core): python docs/studies/tune_adaptive.py
 """
 
 import itertools
