@@ -27,7 +27,7 @@ class Claim:
         otherwise: What to make of it where it does not hold, a whole sentence.
         figures: The numbers behind `found`, by names that end in their unit, as JSON can hold them.
         pictures: Plots.
-        ours: Whether the claim is not the paper's but ours, such as its observer on the rig; `says` is what was asked.
+        ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
     """
 
     place: str

@@ -54,7 +54,7 @@ def verdict_table(entries: Sequence[Reproduced]) -> str:
         for entry in entries
         for claim in entry.claims
     ]
-    return markdown.table(("paper", "place", "the paper says, or was asked", "verdict"), rows, text_columns=4)
+    return markdown.table(("paper", "place", "claim", "verdict"), rows, text_columns=4)
 
 
 OURS = {
@@ -91,7 +91,7 @@ def _parts_of_claim(claim: Claim) -> list[str]:
     """A claim's paragraphs."""
     parts = [
         f"### {claim.place}: {verdict_words(claim)}",
-        f"**{'Asked' if claim.ours else 'The paper'}:** {claim.says}",
+        f"**{'Ours' if claim.ours else 'The paper'}:** {claim.says}",
         f"**Here:** {claim.found}",
     ]
     if claim.why:

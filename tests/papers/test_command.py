@@ -76,7 +76,7 @@ def test_all_papers_make_one_report() -> None:
     assert "![a Fig. 1](a-fig-1.png)" in report
     assert "1 beside them, not the papers': 1 does not hold." in report
     assert "### On the rig: does not hold" in report
-    assert "**Asked:** it stands" in report
+    assert "**Ours:** it stands" in report
     assert (folder / "a-fig-1.png").read_bytes().startswith(b"\x89PNG")
     assert f"Read {folder / 'report.md'}" in said.err
 

@@ -13,7 +13,7 @@ from cmg_mj.trajectory import Trajectory
 
 OTHERS = ("linear", "ltv", "homogeneous")
 WITHIN_DEG = 0.15
-"""RMS error of the bias that is asked for."""
+"""The bias counts as found up to this RMS error [deg]."""
 
 
 def claims(on_share: OnShare) -> list[Claim]:
@@ -79,13 +79,13 @@ def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
     """The velocity's error beside that of observers that take e for zero."""
     biases = (0.0, 0.5, 1.0, 1.5)
     errors = rig.velocity_errors(seed, worlds, ("adaptive", *OTHERS), biases)
-    asked = [i for i, value in enumerate(biases) if value >= 0.5]
+    biased = [i for i, value in enumerate(biases) if value >= 0.5]
     intervals = {name: [mean_interval(row) for row in values] for name, values in errors.items()}
     means = {name: [interval.mean for interval in row] for name, row in intervals.items()}
     halves = {name: [interval.half for interval in row] for name, row in intervals.items()}
 
     def words(name: str) -> str:
-        return ", ".join(f"{means[name][i]:.3f}" for i in asked)
+        return ", ".join(f"{means[name][i]:.3f}" for i in biased)
 
     setup = (
         f"As above, {worlds} worlds a bias, the observer in the loop, no push. Without bias there "
@@ -110,7 +110,7 @@ def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
         found=f"Velocity RMS error with `adaptive` in the loop {words('adaptive')} rad/s at e = 0.5, 1.0, 1.5 deg; "
         + "; ".join(f"{name} {words(name)}" for name in OTHERS)
         + ".",
-        holds=all((errors["adaptive"] < errors[name])[asked].all() for name in OTHERS),
+        holds=all((errors["adaptive"] < errors[name])[biased].all() for name in OTHERS),
         conditions=setup,
         otherwise=setup,
         figures={"bias_deg": list(biases)}
