@@ -19,6 +19,10 @@ def test_lag_and_noise_of_the_linear_differentiator(tau: float) -> None:
     assert found.noise_gain_1_s == pytest.approx(expected.noise_gain_1_s, rel=0.04)
 
 
+def test_the_trade_is_reproduced() -> None:
+    assert lag.lag_claim(SEED).verdict == "reproduced"
+
+
 def test_noise_of_a_long_time_constant() -> None:
     assert lag.foreseen(1.0).noise_gain_1_s == pytest.approx(math.sqrt(DT / 4.0), rel=0.01)
 

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 from cmg_mj.observers import Estimate, Measurement
-from cmg_mj.papers.aranovskiy2020 import delicacy, forms_of_10, misprint
+from cmg_mj.papers.aranovskiy2020 import delicacy, forms_of_10, misprint, update_cost
 from cmg_mj.papers.aranovskiy2020.delicacy import transient
-from cmg_mj.papers.aranovskiy2020.paper import A_prime, C, Q, printed_model, settled_gains
+from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, printed_model, riccati_slope, settled_gains
 
 SEED = 910_000
 
@@ -21,6 +22,21 @@ def test_methods_converge_with_their_orders_and_ours_is_exact() -> None:
         errors = [transient(method, rate).error for rate in (1000.0, 2000.0)]
         assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
     assert transient("exact step (ours)", 37.0).error < 1e-10
+
+
+def test_error_of_the_gain_by_another_integration() -> None:
+    """H12 by scipy, where Euler at 200 Hz has it."""
+    euler = transient("explicit Euler", 200.0)
+    t = np.arange(1, len(euler.path) + 1) / 200.0
+    truth = solve_ivp(
+        lambda _, h: riccati_slope(h.reshape(3, 3), A_prime()).ravel(),
+        (0.0, t[-1]),
+        H_0.ravel(),
+        t_eval=t,
+        rtol=1e-10,
+        atol=1e-10,
+    ).y[1]
+    assert euler.error == pytest.approx(np.abs(euler.path - truth).max() / math.sqrt(5e6), rel=1e-6)
 
 
 def test_definiteness_is_lost_at_low_rates() -> None:
@@ -61,6 +77,7 @@ def test_plain_form_agrees_with_ours_at_a_small_step() -> None:
         differences.append(abs(x[1] - estimate.x2))
     assert differences[1] < 0.65 * differences[0]
     assert differences[1] < 0.02
+    assert abs(2.0 * differences[1] - differences[0]) < 0.05 * differences[1]  # in proportion to it, to nothing
 
 
 def test_euler_makes_the_estimate_worse() -> None:
@@ -78,6 +95,13 @@ def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matte
     assert abs(corrected[0, 1] / corrected[1, 0] - 1.0) < 1e-9
     assert abs(printed[0, 1] / printed[1, 0] - 1.0) > 0.02
     assert 0.0 < rate.difference < 0.02 * rate.error
+
+
+def test_what_an_update_costs() -> None:
+    """Four slopes of H a step take longer than one, and (10) longer than (11), that longer than (9)."""
+    times = update_cost.update_times(None, turns=1, updates=20)
+    assert times["ltv, plain Runge-Kutta 4"] > times["ltv, plain Euler"]
+    assert times["ltv"] > times["homogeneous"] > times["linear"] > 0.0
 
 
 def test_settled_gains_solve_the_algebraic_riccati_equation() -> None:

@@ -64,6 +64,15 @@ def test_noise_at_which_table_2s_homogeneous_gains_lose_least() -> None:
     assert "do not bracket" in claim.why
 
 
+def test_when_an_estimate_of_zero_is_closer() -> None:
+    level = retuned.at_default(study("homogeneous"))
+    tuned, given = level.rms.mean(), level.given_rms.mean()
+    assert tuned < given
+    below, between = (dataclasses.replace(level, zero_rms=zero) for zero in (0.9 * tuned, 0.5 * (tuned + given)))
+    assert retuned.zero_is_closer(below)
+    assert not retuned.zero_is_closer(between)
+
+
 def test_a_fit_that_does_not_carry_over_is_not_reproduced() -> None:
     (level,) = study("ltv").levels
     studies = dict.fromkeys(OBSERVERS, study("ltv"))

@@ -3,53 +3,43 @@
 from __future__ import annotations
 
 import statistics
-import time
 from typing import Any
 
 import numpy as np
 
-from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.bench import time_of_update
+from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain, euler, rk4
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim, OnShare
 
 
-def update_times(worlds: int | None, repeats: int, updates: int) -> dict[str, float]:
+def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, float]:
     """Median time of an update [us], the observers taking turns.
 
     Args:
         worlds: So many at once, on arrays; None for one, on floats, and then the plain forms of (10) too.
-        repeats: Turns.
-        updates: Updates a turn.
+        turns: How many.
+        updates: Updates in a row.
 
     Returns:
         Time by observer.
     """
-    model = printed_model()
-    cases: dict[str, Any] = {name: make_observer(name, DT, model) for name in OBSERVERS}
+    cases: dict[str, Any] = {name: make_observer(name, DT, printed_model()) for name in OBSERVERS}
     if worlds is None:
         cases |= {"ltv, plain Euler": Plain(euler), "ltv, plain Runge-Kutta 4": Plain(rk4)}
     value: Any = 0.01 if worlds is None else np.full(worlds, 0.01)
-    y, u = Measurement(value, 2.0 * value), 3.0 * value
-    states = {name: observer.init(y) for name, observer in cases.items()}
-    times: dict[str, list[float]] = {name: [] for name in cases}
-    for _ in range(repeats):
-        for name, observer in cases.items():
-            state, step = states[name], observer.step
-            start = time.perf_counter()
-            for _ in range(updates):
-                state, _ = step(state, y, u)
-            times[name].append((time.perf_counter() - start) / updates * 1e6)
-            states[name] = state
-    return {name: statistics.median(values) for name, values in times.items()}
+    y1, y2, u = ([factor * value] * updates for factor in (1.0, 2.0, 3.0))
+    times = [{name: time_of_update(observer, y1, y2, u) for name, observer in cases.items()} for _ in range(turns)]
+    return {name: statistics.median(turn[name] for turn in times) for name in cases}
 
 
 def cost() -> Claim:
     """Time of an update of (10) relative to (9) and (11)."""
-    one = update_times(None, repeats=15, updates=200)
+    one = update_times(None, turns=3, updates=200)
     worlds = 4096
-    many = update_times(worlds, repeats=5, updates=4)
+    many = update_times(worlds, turns=1, updates=4)
     ratios = {name: one[name] / one["linear"] for name in one}
     arithmetic = {name: many[name] / many["linear"] for name in many}
     return Claim(
