@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import ROOT, environment
+from tests.command import HANGS_AFTER_S, ROOT, environment
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
@@ -33,7 +33,7 @@ def test_there_is_an_example_for_each() -> None:
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_runs(path: Path, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, path], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=120
+        [sys.executable, path], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=HANGS_AFTER_S
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert SAYS[path.stem] in done.stdout
