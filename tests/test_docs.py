@@ -1,0 +1,87 @@
+"""The documents are complete, their links lead somewhere, their site builds, and what CONTRIBUTING adds works."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import re
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import cmg_mj
+from cmg_mj.observers import OBSERVERS
+from tests.command import ROOT, environment
+from tests.observers import test_contract
+
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+REFERENCE = "\n".join(path.read_text(encoding="utf-8") for path in sorted((DOCS / "api").glob("*.md")))
+
+
+@pytest.mark.parametrize("name", sorted(cmg_mj.__all__))
+def test_every_public_name_is_in_the_reference(name: str) -> None:
+    assert re.search(rf"^::: cmg_mj\.[\w.]+\.{name}$", REFERENCE, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("kind", OBSERVERS)
+def test_every_observer_is_in_the_reference(kind: str) -> None:
+    assert f"::: {OBSERVERS[kind].replace(':', '.')}\n" in REFERENCE
+
+
+@pytest.mark.parametrize("dotted", re.findall(r"^::: (.+)$", REFERENCE, flags=re.MULTILINE))
+def test_what_the_reference_names_exists(dotted: str) -> None:
+    home, _, name = dotted.rpartition(".")
+    assert hasattr(importlib.import_module(home), name) or importlib.util.find_spec(dotted)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(DOCS).as_posix())
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\((?!\w+:|#)([^)#]+)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
+
+
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs", reason="the extra [docs] is not installed")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", tmp_path / "site"],
+        cwd=ROOT,
+        env=environment(NO_MKDOCS_2_WARNING="1"),
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+    assert (tmp_path / "site" / "index.html").is_file()
+
+
+def module(name: str, code: str, folder: Path) -> ModuleType:
+    path = folder / f"{name}.py"
+    path.write_text(code, encoding="utf-8")
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec
+    assert spec.loader
+    made = importlib.util.module_from_spec(spec)
+    sys.modules[name] = made
+    spec.loader.exec_module(made)
+    return made
+
+
+def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("\n## Add an observer\n")[1].split("\n## ")[0]
+    observer, test = (textwrap.dedent(block) for block in re.findall(r" *```python\n(.*?)```", text, flags=re.DOTALL))
+    kind, path = re.findall(r'`"(\w+)": "([\w.:]+)",`', text)[0]
+    home, _, name = path.partition(":")
+    made = module("an_observer_of_contributing", observer, tmp_path)
+    monkeypatch.setitem(OBSERVERS, kind, f"an_observer_of_contributing:{name}")
+    assert home == f"cmg_mj.observers.{kind}"
+    assert f"`cmg_mj/observers/{kind}.py`" in text
+    assert made.__doc__
+    test_contract.test_every_parameter_is_documented(kind)
+    test_contract.test_step_has_no_memory_but_the_state(kind)
+    test_contract.test_arrays_equal_floats_bit_by_bit(kind, 5)
+    module("a_test_of_contributing", test, tmp_path).test_equals_the_continuous_observer()
