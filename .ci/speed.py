@@ -1,6 +1,6 @@
 """Speed limits of the closed loop: `cmg-mj bench --observers homogeneous --json | python .ci/speed.py`.
 
-Beyond a limit is said; beyond it by more than a shared machine's noise fails.
+Beyond a limit is said; beyond it by more than what other work on a shared machine does to these ratios fails.
 """
 
 import json
@@ -8,7 +8,7 @@ import sys
 
 LIMITS = {200.0: (1.5, 0.9), 1000.0: (3.0, 0.75)}
 """Control rate -> at most so many times bare mj_step (one world), at least this share of Batch (many worlds)."""
-NOISE = 1.25
+NOISE = 1.6
 
 failed = False
 for row in json.load(sys.stdin)["figures"]:
