@@ -66,9 +66,9 @@ class Law:
         """Command and the next integrator state.
 
         Args:
-            x1: Tilt [rad].
+            x1: Tilt, measured or estimated [rad].
             x2: Tilt rate [rad/s].
-            x3: Gimbal angle [rad].
+            x3: Gimbal angle, measured or estimated [rad].
             x_e: Integrator [rad s].
 
         Returns:

@@ -15,7 +15,7 @@ from cmg_mj.fields import STRICT, Positive
 
 @dataclass(frozen=True, config=STRICT)
 class MetricsSettings:
-    """What counts as settled and as fallen.
+    """What counts as settled and as fallen, and from when on a bias estimate is judged.
 
     Attributes:
         settle_band_deg: Settled is |x1| inside this band until the end [deg].
@@ -37,7 +37,7 @@ class Metrics:
         dt: Control period [s].
         push_end_s: End of the last push, 0 without one [s].
         rate_limit: Largest gimbal rate [rad/s].
-        settings: The settle band.
+        settings: The settle band, and from when on a bias estimate is judged.
         targets: Extra signal -> what an observer that estimates it should find in each world, (n_worlds,); in rad.
     """
 

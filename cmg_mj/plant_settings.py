@@ -14,11 +14,11 @@ Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
 
 @dataclass(frozen=True, config=STRICT)
 class PlantSettings:
-    """Which rig, and how it differs from its model file. What is left out is as the file says.
+    """Which rig, and how it differs from its model file. Where a field is None, the file decides.
 
     Attributes:
         model: A bundled MJCF by name, or a path.
-        equilibrium_bias_deg: e: the frame's centre of mass is turned about the pivot by this angle [deg].
+        equilibrium_bias_deg: e: the centre of mass of all that tilts is turned about the pivot by this angle [deg].
         initial_tilt_deg: x1(0), from the true equilibrium [deg].
         timestep_s: Physics step [s].
         integrator: MuJoCo's integrator. Fast flywheels need RK4.

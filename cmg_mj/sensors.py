@@ -25,7 +25,7 @@ STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
 class Ideal(NamedTuple):
     """What perfect sensors would show at one instant (floats, or arrays (n_worlds,))."""
 
-    accelerations: Sequence[Scalar]
+    accelerations: Any
     """Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
     gimbals: Sequence[Scalar]
     """Gimbal angles, one a gimbal [rad]."""
@@ -119,7 +119,7 @@ class Encoder:
 
 @dataclass(frozen=True, config=STRICT)
 class Fog:
-    """A fibre-optic gyro on the frame, along the tilt axis: the bench's ground truth.
+    """A fibre-optic gyro on the frame, along the tilt axis: what estimates are judged by on a real rig.
 
     The class of KVH's DSP-1750 (angle random walk 0.013 deg/rt(h), range 490 deg/s, bandwidth 440 Hz), with
     a margin on the noise.

@@ -111,7 +111,7 @@ class Result:
         ]
 
 
-def _stops(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, float]]:
+def _moments(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, float]]:
     """The moments at which the loop must look: (step, steps until the next moment, push torque)."""
     changes = {0: 0.0, steps: 0.0}
     for push in pushes:
@@ -188,7 +188,7 @@ def simulate(
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
     try:
         with drive:
-            for step, count, held in _stops(steps, controller.beat, pushes, timestep):
+            for step, count, held in _moments(steps, controller.beat, pushes, timestep):
                 if held != torque:
                     torque = held
                     worlds.push(torque)

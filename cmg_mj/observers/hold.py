@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from cmg_mj.elementwise import Scalar
 
-Rows = tuple[list[float], list[float]]
+Coefficients = tuple[list[float], list[float]]
 
 
 class FilterState(NamedTuple):
@@ -43,7 +43,7 @@ def hold_matrices(A: np.ndarray, B: np.ndarray, dt: float) -> tuple[np.ndarray, 
     return exponential[:n, :n], exponential[:n, n : n + m], exponential[:n, n + m :]
 
 
-def second_order_rows(A: np.ndarray, B: np.ndarray, dt: float) -> Rows:
+def second_order_rows(A: np.ndarray, B: np.ndarray, dt: float) -> Coefficients:
     """Exact step of z' = A z + B y for a y that runs straight between samples.
 
     Args:
@@ -59,7 +59,7 @@ def second_order_rows(A: np.ndarray, B: np.ndarray, dt: float) -> Rows:
     return row1, row2
 
 
-def second_order_step(rows: Rows, state: FilterState, y1: Scalar) -> FilterState:
+def second_order_step(rows: Coefficients, state: FilterState, y1: Scalar) -> FilterState:
     """Advance a second-order filter by one sample."""
     (a, b, c, d), (e, f, g, h) = rows
     z1, z2, last = state

@@ -9,7 +9,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
 from cmg_mj.fields import STRICT, Positive
-from cmg_mj.observers.hold import FilterState, Rows, second_order_rows, second_order_step
+from cmg_mj.observers.hold import Coefficients, FilterState, second_order_rows, second_order_step
 from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
 
@@ -32,7 +32,7 @@ class LinearDifferentiator:
     tau: Positive = 0.02
 
     @cached_property
-    def _rows(self) -> Rows:
+    def _rows(self) -> Coefficients:
         tau = self.tau
         A = np.array([[0.0, 1.0], [-1.0 / tau**2, -2.0 / tau]])
         return second_order_rows(A, np.array([[0.0], [1.0 / tau**2]]), self.dt)

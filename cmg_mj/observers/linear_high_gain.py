@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
 from cmg_mj.fields import STRICT, Positive
-from cmg_mj.observers.hold import FilterState, Rows, second_order_rows, second_order_step
+from cmg_mj.observers.hold import Coefficients, FilterState, second_order_rows, second_order_step
 from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
 
@@ -41,7 +41,7 @@ class LinearHighGain:
     a2: Positive = 1.0
 
     @cached_property
-    def _rows(self) -> Rows:
+    def _rows(self) -> Coefficients:
         g1, g2 = self.a1 / self.epsilon, self.a2 / self.epsilon**2
         return second_order_rows(np.array([[-g1, 1.0], [-g2, 0.0]]), np.array([[g1], [g2]]), self.dt)
 

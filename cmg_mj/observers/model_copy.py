@@ -2,7 +2,8 @@
 
 An observer of this kind is x1' = x2 - c1, x2' = f2(y, x2, u) - c2, with its paper's correction (c1, c2) of the error
 e = x1 - y1. f2 of (4) is affine in x2: f2 = known - loss x2. Between samples the measurement runs straight and the
-input is held; one classical Runge-Kutta step takes the copy from sample to sample.
+input is held; one classical Runge-Kutta step takes the copy from sample to sample. f2 takes the angles as they are measured:
+their noise reaches the rate through gravity as well, unfiltered.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ LARGEST_RATE = 2.5
 """Times the step: a rate at which the error fades that the Runge-Kutta step follows well. It is stable up to 2.78."""
 
 Correction = Callable[[Scalar, Any], tuple[Scalar, Scalar]]
-"""(e, gain) -> (c1, c2). What the gain is, if it varies in a sample, is the observer's affair."""
+"""(e, gain) -> (c1, c2). The gain is what varies within a sample, such as H of (10); None for an observer with none."""
 
 Stage = tuple[Scalar, Scalar, Scalar]
 """y1 [rad], known [rad/s^2] and loss [1/s] at one moment."""

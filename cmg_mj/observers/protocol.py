@@ -22,7 +22,7 @@ class Estimate(NamedTuple):
     """An observer's estimate of x at the sample it was given."""
 
     x1: Scalar
-    """Tilt [rad]."""
+    """Tilt as y1 measures it, less its noise: from y1 = 0, not from the true equilibrium [rad]."""
     x2: Scalar
     """Tilt rate [rad/s]."""
     x3: Scalar

@@ -23,7 +23,7 @@ LIMIT: Color = (120, 120, 120)
 CONTROLLER: Color = (204, 121, 167)
 CUBES: tuple[Color, ...] = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (204, 121, 167))
 
-OBSERVERS: dict[str, Color] = {
+OBSERVER_COLORS: dict[str, Color] = {
     "homogeneous": (230, 97, 0),
     "ltv": (86, 180, 233),
     "linear": (0, 170, 120),
@@ -91,8 +91,8 @@ class Branch:
 def colors_of(names: Iterable[str]) -> dict[str, Color]:
     """The colour of each observer."""
     names = list(dict.fromkeys(names))
-    strangers = [name for name in names if name not in OBSERVERS]
-    return {name: OBSERVERS.get(name) or OTHERS[strangers.index(name) % len(OTHERS)] for name in names}
+    strangers = [name for name in names if name not in OBSERVER_COLORS]
+    return {name: OBSERVER_COLORS.get(name) or OTHERS[strangers.index(name) % len(OTHERS)] for name in names}
 
 
 def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> list[Series]:

@@ -104,7 +104,15 @@ def test_estimate_uses_the_sample_it_is_given(kind: str) -> None:
     assert abs(turned.x3 - estimate.x3) > 1e-4
 
 
-@pytest.mark.parametrize("kind", ["ltv", "homogeneous", "luenberger", "high_gain", "adaptive"])
+MODELS = ("ltv", "homogeneous", "luenberger", "high_gain", "adaptive", "homogeneous_adaptive")
+DIFFERENTIATORS = ("linear", "linear_high_gain", "finite_difference", "super_twisting")
+
+
+def test_every_observer_is_a_model_or_a_differentiator() -> None:
+    assert sorted(MODELS + DIFFERENTIATORS) == sorted(EVERY)
+
+
+@pytest.mark.parametrize("kind", MODELS)
 def test_models_use_the_command_held_since_the_sample_before(kind: str) -> None:
     """J_d omega_d/J1 u dt = 5.585 rad/s^2 a rad/s: what one period of u adds to the rate, but for the correction."""
     of = observer(kind)
@@ -114,7 +122,7 @@ def test_models_use_the_command_held_since_the_sample_before(kind: str) -> None:
     assert driven.x2 - still.x2 == pytest.approx(paper.J_d * paper.omega_d / paper.J1 * 2.0 * DT, rel=0.1)
 
 
-@pytest.mark.parametrize("kind", ["linear", "linear_high_gain", "finite_difference", "super_twisting"])
+@pytest.mark.parametrize("kind", DIFFERENTIATORS)
 def test_differentiators_use_no_model(kind: str) -> None:
     """Neither the command nor the gimbal nor the rig's parameters reach the rate."""
     bent = dataclasses.replace(PAPER, J1=1.0, J2=0.3, J_d=0.1, omega_d=10.0, gravity_torque=9.0)
