@@ -2,8 +2,8 @@
 
 An observer of this kind is x1' = x2 - c1, x2' = f2(y, x2, u) - c2, with its paper's correction (c1, c2) of the error
 e = x1 - y1. f2 of (4) is affine in x2: f2 = known - loss x2. Between samples the measurement runs straight and the
-input is held; one classical Runge-Kutta step takes the copy from sample to sample. f2 takes the angles as they are measured:
-their noise reaches the rate through gravity as well, unfiltered.
+input is held; one classical Runge-Kutta step takes the copy from sample to sample. f2 takes the angles as they are
+measured: their noise reaches the rate through gravity as well, unfiltered.
 """
 
 from __future__ import annotations
