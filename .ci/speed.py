@@ -8,7 +8,7 @@ import sys
 
 LIMITS = {200.0: (1.5, 0.9), 1000.0: (3.0, 0.75)}
 """Control rate -> at most so many times bare mj_step (one world), at least this share of Batch (many worlds)."""
-NOISE = 1.6
+NOISE = 1.25
 
 failed = False
 for row in json.load(sys.stdin)["figures"]:

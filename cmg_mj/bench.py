@@ -97,11 +97,15 @@ def bench_table(figures: dict[str, Any]) -> Table:
     for heading in columns:
         table.add_column(heading.strip(" "), justify="right", vertical="bottom")
     for row in figures["figures"]:
-        table.add_row(row["observer"], *(pattern.format(row[key]) for key, pattern in columns.values()))
+        table.add_row(row["observer"], *(_cell(row[key], pattern) for key, pattern in columns.values()))
     return table
 
 
-def update_us(experiment: Experiment, worlds: int | None) -> float:
+def _cell(value: float | None, pattern: str) -> str:
+    return "-" if value is None else pattern.format(value)
+
+
+def update_us(experiment: Experiment, worlds: int | None) -> float | None:
     """Microseconds of one update of the observer, the median of some repeats along a recorded run.
 
     Args:
@@ -109,14 +113,17 @@ def update_us(experiment: Experiment, worlds: int | None) -> float:
         worlds: So many worlds at once, on arrays; None for one, on floats.
 
     Returns:
-        The time [us].
+        The time [us]; None for an observer that raises, or a rig that falls at once.
     """
     result = experiment.run() if worlds is None else experiment.run_many(worlds)
     assert result.trajectory is not None
     columns = [result.trajectory[name][:UPDATES] for name in ("y1_rad", "y2_rad", "u_rad_s")]
     if worlds is None:
         columns = [column.tolist() for column in columns]
-    return time_of_update(experiment.design.observer, *columns)
+    try:
+        return time_of_update(experiment.design.observer(), *columns)
+    except Exception:  # a user's observer may fail in any way; the figures of its run say how far it came
+        return None
 
 
 def time_of_update(observer: Observer, y1: Sequence[Any], y2: Sequence[Any], u: Sequence[Any]) -> float:

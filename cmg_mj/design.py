@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,22 +23,27 @@ from cmg_mj.schema import Scenario
 
 @dataclass(frozen=True)
 class Design:
-    """The law and the observers of a scenario, tried.
+    """The law of a scenario, and its observers.
 
-    The bench's own observers are values. A user's may remember more than its state holds, so a run takes
-    `fresh_observers`, not these, which have been tried.
+    Observers are made anew whenever they are asked for: a user's may remember more than its state holds.
 
     Attributes:
+        scenario: What it was made from.
+        model: The reduced model it was made for.
         law: The control law.
-        observer: The observer in the loop.
-        companions: Those that ride along, by name.
-        kind: The name of the one in the loop.
     """
 
+    scenario: Scenario
+    model: ReducedModel
     law: Law
-    observer: Observer
-    companions: Mapping[str, Observer]
-    kind: str
+
+    def observer(self) -> Observer:
+        """The observer in the loop, fresh."""
+        return self.scenario.observer.make(self.law.dt, self.model)
+
+    def companions(self) -> dict[str, Observer]:
+        """Those that ride along, by name, fresh."""
+        return {name: make_observer(name, self.law.dt, self.model) for name in self.scenario.companion_names()}
 
     def rehearse(self, worlds: int | None = None) -> None:
         """Try every observer once, so that one that cannot work is found before a run and not at its first sample.
@@ -50,20 +54,14 @@ class Design:
         Raises:
             InputError: An observer raised an exception or returned something else than a state and an estimate.
         """
-        tried = [("observer.kind =", self.kind, self.observer)]
-        tried += [("companions:", name, observer) for name, observer in self.companions.items()]
+        tried = [("observer.kind =", self.scenario.observer.kind, self.observer())]
+        tried += [("companions:", name, observer) for name, observer in self.companions().items()]
         with np.errstate(all="ignore"):
             for field, name, observer in tried:
                 try:
                     rehearse(observer, worlds)
                 except InputError as error:
                     raise InputError(f"{field} {name!r}: {error}") from error
-
-
-def fresh_observers(scenario: Scenario, law: Law, model: ReducedModel) -> tuple[Observer, dict[str, Observer]]:
-    """Construct the observer in the loop, and the companions by name."""
-    observer = scenario.observer.make(law.dt, model)
-    return observer, {name: make_observer(name, law.dt, model) for name in scenario.companion_names()}
 
 
 def design(scenario: Scenario, model: ReducedModel) -> Design:
@@ -82,11 +80,9 @@ def design(scenario: Scenario, model: ReducedModel) -> Design:
     try:
         check_times(scenario)
         _check_observers(scenario)
-        law = scenario.controller.law(model)
-        observer, companions = fresh_observers(scenario, law, model)
-        made = Design(law, observer, companions, scenario.observer.kind)
+        made = Design(scenario, model, scenario.controller.law(model))
         made.rehearse()
-        trim_of(scenario.controller.trim_s, law, extra_signals(observer))
+        trim_of(scenario.controller.trim_s, made.law, extra_signals(made.observer()))
     except InputError as error:
         raise InputError(located(scenario._where, str(error))) from error
     return made

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 
 from cmg_mj.controller import Controller
-from cmg_mj.design import Design, design, fresh_observers
-from cmg_mj.errors import InputError
+from cmg_mj.design import Design, design
+from cmg_mj.errors import InputError, nearest
 from cmg_mj.law import Law
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.resolved import resolved
@@ -55,9 +56,8 @@ class Experiment:
             The controller.
         """
         settings = self.scenario.controller
-        observer, companions = fresh_observers(self.scenario, self.law, self.plant.reduced)
         return self.plant.controller(
-            observer,
+            self.design.observer(),
             law=self.law,
             sensors=self.scenario.sensors,
             seed=self.scenario.seed,
@@ -65,7 +65,7 @@ class Experiment:
             feedback=settings.feedback,
             angles=settings.angles,
             trim_s=settings.trim_s,
-            companions=companions,
+            companions=self.design.companions(),
         )
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
@@ -76,7 +76,7 @@ class Experiment:
         self,
         worlds: int | Sequence[int],
         plants: Sequence[Plant] | None = None,
-        vary: Mapping[str, Sequence[Any]] | None = None,
+        vary: Mapping[str, Sequence[Any] | np.ndarray] | None = None,
         **options: Any,
     ) -> Result:
         """Run many worlds at once.
@@ -95,6 +95,8 @@ class Experiment:
             InputError: There is no world, or the plants do not fit the worlds or each other.
         """
         numbers = [int(number) for number in (range(worlds) if isinstance(worlds, int) else worlds)]
+        if vary is not None and plants is not None:
+            raise InputError("run_many: give plants or vary, not both")
         if vary is not None:
             plants = self.rigs(vary)
         rigs = [self.plant] * len(numbers) if plants is None else list(plants)
@@ -102,12 +104,15 @@ class Experiment:
             raise InputError(
                 f"run_many: {len(numbers)} worlds and {len(rigs)} plants; give at least one, and as many of each"
             )
-        alike = {(rig.model.opt.timestep, int(rig.model.opt.integrator), *rig.joint_names) for rig in set(rigs)}
-        if len(alike) > 1:
-            raise InputError("run_many: the plants must have the same joints, timestep_s and integrator")
+        integrators = {int(rig.model.opt.integrator) for rig in set(rigs)}
+        alike = {(rig.model.opt.timestep, *rig.joint_names) for rig in {self.plant, *rigs}}
+        if len(alike) > 1 or len(integrators) > 1:
+            raise InputError(
+                "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"
+            )
         return self._simulate(rigs, self.controller(numbers), **options)
 
-    def rigs(self, vary: Mapping[str, Sequence[Any]]) -> list[Plant]:
+    def rigs(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Plant]:
         """The scenario's rig with other settings in each world; equal settings share one rig.
 
         Args:
@@ -120,16 +125,20 @@ class Experiment:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
         given = dataclasses.asdict(self.scenario.plant)
-        made: dict[tuple, Plant] = {}
+        for name in vary:
+            if name not in given:
+                raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, given)}")
+        lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in vary.values()]
+        if not lists or any(isinstance(values, str) or not isinstance(values, Sequence) for values in lists):
+            raise InputError('vary: must be lists of values by field, such as {"equilibrium_bias_deg": [0.0, 0.5]}')
+        if len({len(values) for values in lists}) > 1:
+            raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world")
+        made: dict[str, Plant] = {}  # by what a value looks like: a wrong one may not be hashable
         rigs = []
-        try:
-            rows = list(zip(*vary.values(), strict=True))
-        except ValueError as error:
-            raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world") from error
-        for row in rows:
-            if row not in made:
-                made[row] = load_plant(**given | dict(zip(vary, row, strict=True)))
-            rigs.append(made[row])
+        for row in zip(*lists, strict=True):
+            if repr(row) not in made:
+                made[repr(row)] = load_plant(**given | dict(zip(vary, row, strict=True)))
+            rigs.append(made[repr(row)])
         return rigs
 
     def _simulate(self, plant: Plant | Sequence[Plant], controller: Controller, **options: Any) -> Result:

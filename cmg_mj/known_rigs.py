@@ -46,12 +46,11 @@ def hash_of_models() -> str:
     return digest.hexdigest()
 
 
-def known_rig(settings: PlantSettings, beside: Path | None = None) -> RigFacts | None:
+def known_rig(settings: PlantSettings) -> RigFacts | None:
     """What is known of a scenario's rig without loading it.
 
     Args:
         settings: The scenario's plant.
-        beside: A folder that a relative model path may start from.
 
     Returns:
         The facts, if the rig is a bundled one whose files are as they were read; otherwise None.
@@ -59,12 +58,15 @@ def known_rig(settings: PlantSettings, beside: Path | None = None) -> RigFacts |
     Raises:
         InputError: There is no such file.
     """
-    path = find("models", settings.model, ".xml", "plant.model =", beside)
+    path = find("models", settings.model, ".xml", "plant.model =")
     kept = folder("models") / FILE
-    if path.resolve().parent != folder("models").resolve() or not kept.is_file():
+    # What a linked model includes, MuJoCo looks for beside the link.
+    if path.is_symlink() or path.resolve().parent != folder("models").resolve():
         return None
-    known = json.loads(kept.read_text(encoding="utf-8"))
-    rig = known["rigs"].get(name_of(path.name, locked=settings.lock_thrust_bearing))
-    if rig is None or known["sha256"] != hash_of_models():
+    try:
+        known = json.loads(kept.read_text(encoding="utf-8"))
+        rig = known["rigs"][name_of(path.name, locked=settings.lock_thrust_bearing)]
+        facts = RigFacts(path, tuple(rig["cubes"]), ReducedModel(**rig["reduced"]))
+        return facts if known["sha256"] == hash_of_models() else None
+    except (OSError, ValueError, LookupError, TypeError):  # not there, or not as `read_off` writes it
         return None
-    return RigFacts(path, tuple(rig["cubes"]), ReducedModel(**rig["reduced"]))

@@ -37,7 +37,9 @@ def lqr_gains(model: ReducedModel, state_cost: Sequence[float], input_cost: floa
     except Exception as error:
         raise InputError(f"controller.lqr: no stabilising gain for these weights ({error})") from error
     if not (np.all(np.isfinite(K)) and is_hurwitz(poles)):
-        raise InputError("controller.lqr: no stabilising gain for these weights (give x_e a positive weight)")
+        raise InputError(
+            "controller.lqr: no stabilising gain for these weights (give x_e a positive weight, or a larger one)"
+        )
     return tuple(float(k) for k in np.ravel(K))
 
 

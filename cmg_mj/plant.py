@@ -221,7 +221,8 @@ class Plant:
             observer = make_observer(observer, law.dt, self.reduced, **parameters)
         elif parameters:
             name = next(iter(parameters))
-            raise InputError(f"controller({name}=...): no such option; {nearest(name, CONTROLLER_OPTIONS)}")
+            known = {"law", "sensors", *CONTROLLER_OPTIONS}
+            raise InputError(f"controller({name}=...): no such option; {nearest(name, known)}")
         return Controller(
             observer,
             law,

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -49,16 +50,19 @@ class ReducedModel:
         s = sin(x3)
         return self.J1 + self.J2 * s * s
 
+    @cached_property
+    def _numbers(self) -> tuple[float, float, float, float, float]:
+        """J1, J2, m g l/sqrt(2), J_d omega_d and 2 J2."""
+        return self.J1, self.J2, self.gravity_torque, self.J_d * self.omega_d, self.J2 * 2.0
+
     def terms(self, x1: Scalar, x3: Scalar) -> Terms:
         """Parts of f2 in (4) that the angles decide: f2 = drift + u (gain - damping x2)."""
-        of: Any = math if type(x3) is float else np  # decided once: this is where observers spend their time
-        s, c = of.sin(x3), of.cos(x3)
-        D = self.J1 + self.J2 * s * s
-        return (
-            self.gravity_torque * of.sin(x1) / D,
-            self.J_d * self.omega_d * c / D,
-            self.J2 * 2.0 * s * c / D,
-        )
+        # Observers spend their time here: floats or arrays is decided once, numbers are looked up once.
+        sin, cos = (math.sin, math.cos) if type(x3) is float else (np.sin, np.cos)
+        J1, J2, gravity_torque, momentum, twice_J2 = self._numbers
+        s, c = sin(x3), cos(x3)
+        D = J1 + J2 * s * s
+        return gravity_torque * sin(x1) / D, momentum * c / D, twice_J2 * s * c / D
 
     def tilt_acceleration(self, x1: Scalar, x2: Scalar, x3: Scalar, u: Scalar) -> Scalar:
         """f2(x, u) [rad/s^2], the second line of (4)."""

@@ -23,10 +23,9 @@ WIDEST = 9
 
 
 def columns_of(summaries: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Summary keys that all have, but that of stopped worlds only if there are any."""
+    """Summary keys that are compared, but that of stopped worlds only if there are any."""
     stopped = any(summary["stopped_fraction"] for summary in summaries)
-    common = [key for key in KEYS if all(key in summary for summary in summaries)]
-    return [key for key in common if stopped or key != "stopped_fraction"]
+    return [key for key, about in KEYS.items() if about.compared and (stopped or key != "stopped_fraction")]
 
 
 def comparison_table(summaries: Sequence[Mapping[str, Any]], title: str) -> Table:
@@ -36,7 +35,7 @@ def comparison_table(summaries: Sequence[Mapping[str, Any]], title: str) -> Tabl
     columns = columns_of(summaries)
     for key in columns:
         unit = [f"[{KEYS[key].unit}]"] if KEYS[key].unit else []
-        lines = [*textwrap.wrap(KEYS[key].label, WIDEST), *unit]
+        lines = [*textwrap.wrap(KEYS[key].label, WIDEST, break_long_words=False), *unit]
         table.add_column("\n".join(lines), justify="right", vertical="bottom")
     for summary in summaries:
         table.add_row(summary["observer"], *(written(key, summary[key]) for key in columns))

@@ -37,7 +37,10 @@ def resolved(scenario: Scenario, design: Design, model: Path) -> dict[str, Any]:
         name: controller[name] for name in ControllerSettings.model_fields if controller[name] is not None
     }
     fields["companions"] = scenario.companion_names()
-    fields["observer"] = {"kind": scenario.observer.kind, **_parameters(scenario.observer.parameters, design.observer)}
+    fields["observer"] = {
+        "kind": scenario.observer.kind,
+        **_parameters(scenario.observer.parameters, design.observer()),
+    }
     fields["versions"] = versions()
     return _plain(fields)
 

@@ -130,4 +130,4 @@ class Rows:
             )
             columns[name] = whole[:, 0] if self._single else whole
         n_ticks = len(columns[names[0]])
-        return Trajectory({"time_s": np.arange(n_ticks) * self._dt, **columns}, self._layout)
+        return Trajectory({"time_s": np.arange(n_ticks) * self._dt, **columns}, layout=self._layout)

@@ -15,7 +15,7 @@ import numpy as np
 from cmg_mj.callback import installed
 from cmg_mj.controller import Controller, Tick
 from cmg_mj.engine import quiet
-from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.errors import InputError, RunStopped, nearest
 from cmg_mj.metrics import Metrics, MetricsSettings
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
@@ -83,8 +83,18 @@ class Result:
 
         Returns:
             (n_worlds,); NaN for a world that did not stand to the end, or has no such number.
+
+        Raises:
+            InputError: There is no such key or companion.
         """
-        of = [s if companion is None else s["companions"][companion] for s in self.summaries]
+        of = self.summaries
+        if companion is not None:
+            riding = self.summaries[0].get("companions", {})
+            if companion not in riding:
+                raise InputError(f"companion {companion!r}: did not ride along; {nearest(companion, riding)}")
+            of = [summary["companions"][companion] for summary in of]
+        if key not in of[0]:
+            raise InputError(f"{key!r}: not in the summary; {nearest(key, of[0])}")
         numbers = np.array([math.nan if s[key] is None else s[key] for s in of], dtype=float)
         return np.where(self.stood, numbers, math.nan)
 
@@ -96,9 +106,12 @@ class Result:
 
     def groups(self, count: int) -> list[Result]:
         """The worlds in so many groups of equal size, in their order, as `run_many` was given them."""
-        size, left = divmod(len(self.outcomes), count)
-        if left:
-            raise InputError(f"groups({count}): {len(self.outcomes)} worlds cannot be parted so")
+        worlds = len(self.outcomes)
+        if count < 1 or worlds % count:
+            raise InputError(f"groups({count}): {worlds} worlds cannot be parted so")
+        if count == 1:
+            return [self]
+        size = worlds // count
         parts = [slice(i * size, (i + 1) * size) for i in range(count)]
         return [
             Result(

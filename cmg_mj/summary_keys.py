@@ -12,11 +12,13 @@ class Key(NamedTuple):
         label: In words.
         unit: Empty for none.
         pattern: How it is written.
+        compared: Whether it is a column where observers are compared, which has room for a few.
     """
 
     label: str
     unit: str
     pattern: str
+    compared: bool = True
 
     @property
     def heading(self) -> str:
@@ -26,14 +28,14 @@ class Key(NamedTuple):
 
 KEYS = {
     "velocity_rms_error_rad_s": Key("velocity RMS error", "rad/s", "{:.4f}"),
-    "velocity_rms_error_fog_rad_s": Key("against the gyro", "rad/s", "{:.4f}"),
+    "velocity_rms_error_fog_rad_s": Key("error against the gyro", "rad/s", "{:.4f}"),
     "tilt_rms_deg": Key("tilt RMS", "deg", "{:.3f}"),
     "settle_time_s": Key("settle time", "s", "{:.2f}"),
     "gimbal_peak_deg": Key("gimbal peak", "deg", "{:.1f}"),
     "command_rms_rad_s": Key("command RMS", "rad/s", "{:.3f}"),
     "command_saturated_fraction": Key("command limited", "", "{:.1%}"),
-    "bias_estimate_deg": Key("equilibrium bias found", "deg", "{:.4f}"),
-    "bias_rms_error_deg": Key("bias RMS error", "deg", "{:.4f}"),
+    "bias_estimate_deg": Key("bias found", "deg", "{:.4f}", compared=False),
+    "bias_rms_error_deg": Key("bias RMS error", "deg", "{:.4f}", compared=False),
     "fell_fraction": Key("fell", "", "{:.0%}"),
     "stopped_fraction": Key("stopped", "", "{:.0%}"),
 }

@@ -66,13 +66,13 @@ class Trajectory:
     Attributes:
         columns: Name -> values, (n_ticks,) for one world, (n_ticks, n_worlds) for many; the unit ends the name.
             In many worlds, rows after a world's end are NaN.
-        layout: Whose columns they are; empty for one put together by hand.
         metadata: The outcome and the resolved scenario.
+        layout: Whose columns they are; empty for one put together by hand.
     """
 
     columns: dict[str, np.ndarray]
-    layout: Layout = field(default_factory=Layout)
     metadata: Mapping[str, Any] = field(default_factory=dict)
+    layout: Layout = field(default_factory=Layout)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -145,12 +145,18 @@ class Trajectory:
             table = pq.read_table(path)
         except (OSError, pa.ArrowException) as error:
             raise InputError(f"{path}: not a trajectory: {' '.join(str(error).split())}") from error
-        stored = json.loads((table.schema.metadata or {}).get(b"cmg_mj", b"{}"))
-        if "layout" not in stored or "time_s" not in table.column_names:
+        text = (table.schema.metadata or {}).get(b"cmg_mj")
+        if text is None or "time_s" not in table.column_names:
             raise InputError(f"{path}: a Parquet file, but not a trajectory written by cmg-mj")
-        observers, extras, joints = stored.pop("layout").values()
-        layout = Layout(tuple(observers), tuple(map(tuple, extras)), tuple(joints))
-        return Trajectory({name: table[name].to_numpy() for name in table.column_names}, layout, stored)
+        try:
+            stored = json.loads(text)
+            kept = stored.pop("layout")
+            layout = Layout(tuple(kept["observers"]), tuple(map(tuple, kept["extra_signals"])), tuple(kept["joints"]))
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
+            raise InputError(
+                f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"
+            ) from error
+        return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)
 
 
 @contextmanager

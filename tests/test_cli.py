@@ -222,6 +222,13 @@ def test_compare_prints_a_table(quick: str) -> None:
     assert said.err.startswith("Written to runs/quick-compare-0. ")
 
 
+def test_two_observers_of_the_bias_fit_too() -> None:
+    Path("bias.toml").write_text("duration_s = 0.3\n[metrics]\nbias_from_s = 0.1")
+    said = cmg_mj("compare", "bias.toml", "--worlds", 1, "--observers", "adaptive,homogeneous_adaptive")
+    assert max(map(len, said.out.splitlines())) <= 100
+    assert cmg_mj("run", "bias.toml", "--observer", "adaptive").out.count("Bias ") == 2
+
+
 def test_compare_prints_markdown(quick: str) -> None:
     said = cmg_mj("compare", quick, "--worlds", 1, "--observers", "linear", "--markdown")
     header, line, row = said.out.splitlines()

@@ -46,3 +46,18 @@ def test_a_users_own_model_is_not_known(tmp_path: Path) -> None:
     own = tmp_path / "scissored_pair.xml"
     own.write_text((folder("models") / "scissored_pair.xml").read_text())
     assert known_rig(PlantSettings(model=str(own))) is None
+
+
+def test_a_link_to_a_bundled_model_is_not_known(tmp_path: Path) -> None:
+    """MuJoCo looks for what it includes beside the link, where another cube may lie."""
+    link = tmp_path / "scissored_pair.xml"
+    link.symlink_to(folder("models") / "scissored_pair.xml")
+    assert known_rig(PlantSettings(model=str(link))) is None
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"rigs": {"scissored_pair.xml": 3}}'])
+def test_a_broken_file_is_as_good_as_none(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / FILE).write_text(text)
+    models = folder("models")
+    monkeypatch.setattr(known_rigs, "FILE", str(tmp_path / FILE))
+    assert known_rig(PlantSettings(model=str(models / "scissored_pair.xml"))) is None

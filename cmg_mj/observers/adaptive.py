@@ -18,7 +18,7 @@ from cmg_mj.elementwise import Scalar, cos, dot
 from cmg_mj.fields import STRICT, NonNegative, Positive
 from cmg_mj.observers.protocol import BIAS, Measurement
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.stability import is_hurwitz
+from cmg_mj.stability import MARGIN, is_hurwitz
 
 TORQUE, SINUSOID = "torque_n_m", "disturbance_n_m"
 
@@ -95,7 +95,9 @@ class Adaptive:
         poles = np.linalg.eigvals(self.error_matrix)
         if not is_hurwitz(poles):
             listed = ", ".join(f"{p:.3g}" for p in poles)
-            raise ValueError(f"L: A + L C must be Hurwitz (both negative), its eigenvalues are {listed}")
+            raise ValueError(
+                f"L: A + L C must be Hurwitz (both negative, left of -{MARGIN:g} 1/s), its eigenvalues are {listed}"
+            )
         fastest, limit = float(np.abs(poles).max()), FASTEST / self.dt
         if fastest >= limit:
             raise ValueError(

@@ -126,9 +126,9 @@ class HighGain:
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
         """Advance by one sample period."""
         x1, x2, L, before, terms = state
-        *moments, end = stages(self.model, before, terms, y, u)
+        begin, middle, end, after = stages(self.model, before, terms, y, u)
         Omega, half = abs(u * terms[2]), 0.5 * self.dt
         L_middle = updated_gain(L, Omega, half, self.phi1, self.phi2, self.phi3)
         L_end = updated_gain(L_middle, Omega, half, self.phi1, self.phi2, self.phi3)
-        x1, x2 = follow(self.correction, x1, x2, self.dt, *moments, gains=(L, L_middle, L_end))
-        return State(x1, x2, L_end, y, end), Estimate(x1, x2, y[1])
+        x1, x2 = follow(self.correction, x1, x2, self.dt, begin, middle, end, (L, L_middle, L_end))
+        return State(x1, x2, L_end, y, after), Estimate(x1, x2, y[1])

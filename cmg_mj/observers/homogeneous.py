@@ -88,6 +88,6 @@ class Homogeneous:
         """
         x1, x2, before, terms = state
         resisting = self.friction(x2, before[1]) if self._resists else 0.0
-        *moments, terms = stages(self.model, before, terms, y, u, bias, resisting)
-        x1, x2 = follow(self.correction, x1, x2, self.dt, *moments)
+        begin, middle, end, terms = stages(self.model, before, terms, y, u, bias, resisting)
+        x1, x2 = follow(self.correction, x1, x2, self.dt, begin, middle, end)
         return CopyState(x1, x2, y, terms), Estimate(x1, x2, y[1])

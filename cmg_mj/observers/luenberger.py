@@ -13,7 +13,7 @@ from cmg_mj.fields import STRICT, Positive
 from cmg_mj.observers.hold import hold_matrices
 from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.stability import is_hurwitz
+from cmg_mj.stability import MARGIN, is_hurwitz
 
 
 class State(NamedTuple):
@@ -50,7 +50,7 @@ class Luenberger:
         poles = np.linalg.eigvals(self.error_matrix)
         if not is_hurwitz(poles):
             shown = ", ".join(f"{p:.3g}" for p in poles)
-            raise ValueError(f"L: A - L C must be Hurwitz, its eigenvalues are {shown}")
+            raise ValueError(f"L: A - L C must be Hurwitz (left of -{MARGIN:g} 1/s), its eigenvalues are {shown}")
 
     @property
     def error_matrix(self) -> np.ndarray:
