@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import reduce
+from math import copysign
 from operator import add, mul
 from typing import Any
 
@@ -74,9 +75,9 @@ def signed_power(x: Scalar, exponent: float) -> Scalar:
     """[x]^a = |x|^a sign(x) for a > 0, elementwise."""
     if type(x) is float:
         try:
-            return math.copysign(abs(x) ** exponent, x)
+            return copysign(abs(x) ** exponent, x)
         except OverflowError:  # as on arrays
-            return math.copysign(math.inf, x)
+            return copysign(math.inf, x)
     return np.copysign(np.float_power(np.abs(x), exponent), x)  # not `np.power`: see below
 
 
@@ -90,7 +91,7 @@ def signed_powers(x: Scalar, exponent: float) -> tuple[Scalar, Scalar]:
         if size < SMALLEST:
             return 0.0 * x, 0.0 * x
         power = size**exponent
-        return math.copysign(power, x), math.copysign(power * power / size, x)
+        return copysign(power, x), copysign(power * power / size, x)
     # `np.power` may take a vector instruction that rounds differently from the C library; `np.float_power` does not.
     size = np.abs(x)
     power = np.where(size < SMALLEST, 0.0, np.float_power(size, exponent))
@@ -118,7 +119,7 @@ def digitise(x: Scalar, limit: float, step: float) -> Scalar:
     """
     if type(x) is float:
         if not -limit < x < limit:
-            x = math.copysign(limit, x)
+            x = copysign(limit, x)
         return round(x / step) * step if step else x
     x = np.minimum(np.maximum(x, -limit), limit)
     return np.rint(x / step) * step if step else x

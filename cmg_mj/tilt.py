@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from cmg_mj.elementwise import Scalar, atan2
 
@@ -28,6 +29,12 @@ class RadialTilt:
     r_inner: float
     r_outer: float
 
+    @cached_property
+    def _weights(self) -> tuple[float, float]:
+        """Of the inner and the outer accelerometer in the combination that is gravity alone."""
+        span = self.r_outer - self.r_inner
+        return self.r_outer / span, self.r_inner / span
+
     def __call__(self, inner_x: Scalar, inner_z: Scalar, outer_x: Scalar, outer_z: Scalar) -> Scalar:
         """Tilt y1 = q_b + pi/4 from the specific forces of both accelerometers.
 
@@ -40,8 +47,7 @@ class RadialTilt:
         Returns:
             Tilt of the radial line from the vertical [rad].
         """
-        span = self.r_outer - self.r_inner
-        w_inner, w_outer = self.r_outer / span, self.r_inner / span
+        w_inner, w_outer = self._weights
         gravity_x = w_inner * inner_x - w_outer * outer_x
         gravity_z = w_inner * inner_z - w_outer * outer_z
         return atan2(-gravity_x, gravity_z)

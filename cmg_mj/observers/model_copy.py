@@ -96,24 +96,26 @@ def follow(
     Returns:
         x1 and x2 at the end.
     """
+    half, sixth = 0.5 * h, h / 6.0
+    at_begin, at_middle, at_end = gains
     y1, known, loss = begin
-    c1, c2 = correction(x1 - y1, gains[0])
+    c1, c2 = correction(x1 - y1, at_begin)
     p1, p2 = x2 - c1, known - loss * x2 - c2
 
     y1, known, loss = middle
-    w1, w2 = x1 + 0.5 * h * p1, x2 + 0.5 * h * p2
-    c1, c2 = correction(w1 - y1, gains[1])
+    w1, w2 = x1 + half * p1, x2 + half * p2
+    c1, c2 = correction(w1 - y1, at_middle)
     q1, q2 = w2 - c1, known - loss * w2 - c2
 
-    w1, w2 = x1 + 0.5 * h * q1, x2 + 0.5 * h * q2
-    c1, c2 = correction(w1 - y1, gains[1])
+    w1, w2 = x1 + half * q1, x2 + half * q2
+    c1, c2 = correction(w1 - y1, at_middle)
     r1, r2 = w2 - c1, known - loss * w2 - c2
 
     y1, known, loss = end
     w1, w2 = x1 + h * r1, x2 + h * r2
-    c1, c2 = correction(w1 - y1, gains[2])
+    c1, c2 = correction(w1 - y1, at_end)
     s1, s2 = w2 - c1, known - loss * w2 - c2
-    return x1 + h / 6.0 * (p1 + 2.0 * (q1 + r1) + s1), x2 + h / 6.0 * (p2 + 2.0 * (q2 + r2) + s2)
+    return x1 + sixth * (p1 + 2.0 * (q1 + r1) + s1), x2 + sixth * (p2 + 2.0 * (q2 + r2) + s2)
 
 
 def require_stable_step(names: str, poles: np.ndarray, dt: float) -> None:
