@@ -69,7 +69,7 @@ def test_a_bias_leaves_a_rate_error_of_the_closed_form(e_deg: float) -> None:
     ],
 )
 def test_a_gain_that_does_not_stabilise_is_refused_by_name(L: tuple) -> None:
-    with pytest.raises(InputError, match=r"observer.L: A - L C must be Hurwitz, its eigenvalues are .+luenberger"):
+    with pytest.raises(InputError, match=r"L: A - L C must be Hurwitz .+, its eigenvalues are .+luenberger"):
         observer("luenberger", L=L)
 
 
