@@ -20,6 +20,7 @@ from scipy.linalg import expm
 from cmg_mj.errors import InputError
 from cmg_mj.papers.dao2023.matrices import real, real_matrix, require_positive_definite, require_shape, solve, times
 from cmg_mj.papers.require import require_positive
+from cmg_mj.stability import is_hurwitz
 
 
 @dataclass(frozen=True)
@@ -252,7 +253,7 @@ class FriedlandTacker:
         require_shape("C2", system.C2, (p, n), "(p, n), the shape of L transposed")
         poles = np.linalg.eigvals(system.A + self.L @ system.C2)
         worst = poles.ravel()[np.argmax(poles.real)]
-        if worst.real >= 0.0:
+        if not is_hurwitz(poles):
             raise InputError(f"L: A + L C2 must be Hurwitz; it has the eigenvalue {worst:.3g}")
 
     def slope(
