@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, NoReturn
 import numpy as np
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.errors import InputError, RunStopped, raised
 from cmg_mj.law import Law
 from cmg_mj.observers.protocol import BIAS, Estimate, Measurement, Observer, extra_signals
 from cmg_mj.sensors import Ideal, SampledSensor, Sensors, normals
@@ -63,6 +63,12 @@ class Tick(NamedTuple):
     x_e: Scalar
     estimates: Sequence[Sequence[Scalar]]
     """The observer's estimate (x1, x2, x3, its extra signals), then those of the companions."""
+
+
+def read_only(*arrays: np.ndarray) -> None:
+    """What is handed to several observers must not be changed by one of them: `d = y.y1; d -= 0.02` raises."""
+    for array in arrays:
+        array.flags.writeable = False
 
 
 def _estimate(parts: Sequence[Scalar]) -> Sequence[Scalar]:
@@ -208,6 +214,8 @@ class Controller:
         for share, angle in zip(self._shares, encoders, strict=True):
             y2 = y2 + share * angle
         y = Measurement(y1, y2)
+        if not self._single:
+            read_only(*y)  # observers share them
         if self._states is None:
             self._states = [self._start(observer, y, step) for observer in self._observers]
             zero = 0.0 * y1
@@ -225,6 +233,8 @@ class Controller:
         if step < self._trimmed_until:
             x_e = self._trim_gain * estimates[0][self._trim_part]
         u, self._x_e = self.law(x1, x2, x3, x_e)
+        if not self._single:
+            read_only(u)  # observers get it at the next tick, the trajectory later
         self.tick = Tick(y1, y2, fog, u, x_e, estimates)
         return True
 
@@ -233,22 +243,28 @@ class Controller:
         try:
             return observer.init(y)
         except (Exception, SystemExit) as error:  # a user's observer may fail in any way
-            self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
+            self._blame(observer, f"raised {raised(error)}", step, error)
 
     def _fits(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> bool:
         """Whether an estimate has all its parts, floats (one world) or arrays (n_worlds,)."""
         if self._single:
             return list(map(type, estimate)) == [float] * width
         shape = y[0].shape
-        return len(estimate) == width and all(getattr(part, "shape", None) == shape for part in estimate)
+        return len(estimate) == width and all(
+            getattr(part, "shape", None) == shape and part.dtype == float for part in estimate
+        )
 
     def _fitted(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> Sequence[Scalar]:
         """Make a user's estimate, which may be NumPy's numbers or the same for all worlds, consist of these."""
         if len(estimate) < width:
             raise ValueError(f"the estimate has {len(estimate)} parts, not {width}: x1, x2, x3 and the extra signals")
+        parts = [np.asarray(part) for part in estimate[:width]]
+        for part in parts:
+            if part.dtype.kind not in "fiub":
+                raise TypeError(f"the estimate has a part of type {part.dtype}, not real numbers")
         if self._single:
-            return _estimate([float(part) for part in estimate[:width]])
-        return _estimate([np.broadcast_to(np.asarray(part, dtype=float), y[0].shape) for part in estimate[:width]])
+            return _estimate([float(part) for part in parts])
+        return _estimate([np.broadcast_to(part.astype(float), y[0].shape) for part in parts])
 
     def _observe(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
         """Advance every observer by one sample."""
@@ -262,7 +278,7 @@ class Controller:
                     estimate = self._fitted(estimate, self._widths[i], y)
             except (Exception, SystemExit) as error:  # a user's observer may fail in any way
                 if i == 0:
-                    self._blame(observer, f"raised {type(error).__name__}: {error}", step, error)
+                    self._blame(observer, f"raised {raised(error)}", step, error)
                 # One that only rides along must not end the run: it is NaN from here on.
                 self._observers[i] = _Lost(self._widths[i])
                 states[i], estimate = self._observers[i].step(None, y, u)

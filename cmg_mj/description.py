@@ -44,6 +44,11 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         ("", f"tilt rate from the {scenario.controller.feedback}, {scenario.controller.angles} angles"),
         ("", f"{stability} with the reduced model and its true state, slowest pole {slowest:.3g} 1/s"),
         ("observer", f"{scenario.observer.kind}  {assignments(observer)}".rstrip()),
+        *(
+            [("", "your own code, which was imported and tried on two samples")]
+            if ":" in scenario.observer.kind
+            else []
+        ),
         ("companions", ", ".join(scenario.companion_names()) or "none"),
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
         *(("push", f"{p.torque_n_m:g} N m from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),

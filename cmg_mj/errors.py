@@ -35,6 +35,15 @@ def nearest(name: str, allowed: Iterable[str], label: str = "allowed") -> str:
     return f"did you mean {folded[match[0]]!r}? {listing}" if match else listing
 
 
+def raised(error: BaseException) -> str:
+    """What a user's code raised, `ValueError: too large`, whatever showing its own words does."""
+    try:
+        text = str(error)
+    except Exception:
+        text = "its message cannot be shown"
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
 def shown(value: Any) -> str:
     """A value as the user wrote it in TOML, shortened; strings in Python's quotes, which TOML takes too."""
     if isinstance(value, bool):

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.errors import InputError, shown
+from cmg_mj.controller import read_only
+from cmg_mj.errors import InputError, raised, shown
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
 
@@ -18,21 +19,30 @@ def rehearse(observer: Observer, worlds: int | None) -> None:
         y = Measurement(tilt, -tilt)
         return y if worlds is None else Measurement(*(np.full(worlds, angle) for angle in y))
 
-    hint = "" if worlds is None else "; many worlds come at once, as arrays: use operators and cmg_mj.elementwise"
+    hint = (
+        ""
+        if worlds is None
+        else "; many worlds come at once, as arrays that must not be changed: use operators and cmg_mj.elementwise"
+    )
     u: Any = 0.1 if worlds is None else np.full(worlds, 0.1)
+    first, second = sample(0.01), sample(0.011)
+    if worlds is not None:
+        read_only(*first, *second, u)
     call = "init(y)"
     try:
         names = ("x1", "x2", "x3", *extra_signals(observer))
     except ValueError as error:
         raise InputError(str(error)) from error
     try:
-        state = observer.init(sample(0.01))
+        state = observer.init(first)
         call = "step(state, y, u)"
-        returned = observer.step(state, sample(0.011), u)
-    except Exception as error:  # a user's observer may fail in any way
-        raise InputError(f"{call} raised {type(error).__name__}: {error}{hint}") from error
+        returned = observer.step(state, second, u)
+    except (Exception, SystemExit) as error:  # a user's observer may fail in any way
+        raise InputError(f"{call} raised {raised(error)}{hint}") from error
     try:
         _, estimate = returned
+        if not hasattr(estimate, "__len__"):  # a generator, which could be read once
+            raise TypeError
         parts = list(zip(names, estimate, strict=True))
     except (TypeError, ValueError) as error:
         pair = isinstance(returned, tuple) and len(returned) == 2

@@ -8,7 +8,17 @@ from pathlib import Path
 import click
 
 from cmg_mj.cli.arguments import Chosen, check_observer, names_of, of_a_run, of_observers
-from cmg_mj.cli.terminal import INTERRUPTED, WRONG_INPUT, CtrlC, progress, say, say_written, show
+from cmg_mj.cli.terminal import (
+    INTERRUPTED,
+    WRONG_INPUT,
+    CtrlC,
+    own_stdout,
+    progress,
+    say,
+    say_written,
+    show,
+    users_code,
+)
 from cmg_mj.errors import InputError, RunStopped
 
 
@@ -23,6 +33,7 @@ from cmg_mj.errors import InputError, RunStopped
     help="Who calls the controller: the runner, or MuJoCo through its control callback.",
 )
 @click.option("--plot", is_flag=True, help="Write plot.png as well.")
+@users_code()
 def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
     """Run a scenario and write a folder.
 
@@ -71,6 +82,7 @@ def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
     help="Runs an observer, each with noise of its own; all observers get the same.",
 )
 @click.option("--markdown", is_flag=True, help="Print the table as Markdown.")
+@users_code()
 def compare(chosen: Chosen, observers: str, worlds: int, markdown: bool) -> None:
     """Run several observers on the same plant, pushes and noise: one table, one recording.
 
@@ -133,6 +145,7 @@ def list_names(what: str | None) -> None:
 
 @click.command(short_help="Check a scenario file without running it.")
 @click.argument("file")
+@users_code()
 def check(file: str) -> None:
     """Check a scenario file without running it, and say what it amounts to."""
     from cmg_mj.description import description
@@ -146,4 +159,4 @@ def check(file: str) -> None:
         from cmg_mj.experiment import load_rig  # MuJoCo, which a bundled rig does without
 
         rig = load_rig(scenario).facts
-    click.echo(description(file, scenario, design(scenario, rig.reduced), rig))
+    click.echo(description(file, scenario, design(scenario, rig.reduced), rig), file=own_stdout())

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from cmg_mj.cli.arguments import Chosen, check_observer, named, names_of, of_a_run, of_observers
-from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, show
+from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, show, users_code
 from cmg_mj.errors import InputError, nearest
 
 
@@ -19,6 +19,7 @@ from cmg_mj.errors import InputError, nearest
     "--worlds", type=click.IntRange(min=1), default=256, show_default=True, metavar="N", help="Worlds of the batch."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
+@users_code()
 def bench(observers: str, worlds: int, as_json: bool) -> None:
     """Time the closed loop against bare MuJoCo: microseconds a physics step, and ratios of the same run."""
     from cmg_mj.bench import bench_table, measure
@@ -86,6 +87,7 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     help="Where to search for a parameter; may be given again.",
 )
 @click.option("--noise", default="", metavar="LIST", help="Accelerometer noise densities to tune at [ug/rtHz].")
+@users_code()
 def tune(
     chosen: Chosen, observer: str | None, worlds: int, parameters: str, ranges: tuple[str, ...], noise: str
 ) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import signal
+import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, redirect_stdout
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -64,6 +66,25 @@ class CtrlC:
             raise KeyboardInterrupt
 
 
+_own_stdout: ContextVar[Any] = ContextVar("standard output")
+
+
+@contextmanager
+def users_code() -> Iterator[None]:
+    """While a user's observer may run: what it prints goes to standard error. Standard output is the command's own."""
+    token = _own_stdout.set(sys.stdout)
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        _own_stdout.reset(token)
+
+
+def own_stdout() -> Any:
+    """Standard output, whatever has been done to it for a user's code."""
+    return _own_stdout.get(sys.stdout)
+
+
 def say(message: str) -> None:
     """One line on standard error."""
     click.echo(f"cmg-mj: {' '.join(message.split())}", err=True)
@@ -79,16 +100,16 @@ def show(value: Any, table: Any, as_json: bool) -> None:
     from rich.console import Console
 
     if as_json or isinstance(table, str):
-        click.echo(json.dumps(value, indent=2) if as_json else table)
+        click.echo(json.dumps(value, indent=2) if as_json else table, file=own_stdout())
         return
-    console = Console(markup=False, highlight=False)  # [rad/s] is a unit
+    console = Console(file=own_stdout(), markup=False, highlight=False)  # [rad/s] is a unit
     if console.is_terminal:
         console.print(table)
         return
-    console = Console(markup=False, highlight=False, width=1000)
+    console = Console(file=own_stdout(), markup=False, highlight=False, width=1000)
     with console.capture() as captured:
         console.print(table)
-    click.echo("\n".join(line.rstrip() for line in captured.get().splitlines()).strip("\n"))
+    click.echo("\n".join(line.rstrip() for line in captured.get().splitlines()).strip("\n"), file=own_stdout())
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from cmg_mj.complaint import complaint
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, nearest, raised
 from cmg_mj.observers.protocol import Observer
 from cmg_mj.reduced import ReducedModel
 
@@ -49,8 +49,8 @@ def observer_class(kind: str) -> type:
     module_name, _, class_name = path.partition(":")
     try:
         found = getattr(importlib.import_module(module_name), class_name)
-    except Exception as error:  # a user's module may fail in any way while it is imported
-        raise InputError(f"observer.kind = {kind!r}: cannot be imported: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:  # a user's module may fail in any way while it is imported
+        raise InputError(f"observer.kind = {kind!r}: cannot be imported: {raised(error)}") from error
     if not (
         inspect.isclass(found) and callable(getattr(found, "init", None)) and callable(getattr(found, "step", None))
     ):
@@ -84,8 +84,8 @@ def make_observer(kind: str, dt: float, model: ReducedModel, /, **parameters: An
     except ValidationError as error:
         clause = complaint(cls, error.errors()[0], {"dt": dt, "model": model, **parameters})
         raise InputError(f"observer.{clause} (observer {kind})") from error
-    except Exception as error:  # a user's own class may refuse its parameters in its own way
-        raise InputError(f"observer {kind}: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:  # a user's own class may refuse its parameters in its own way
+        raise InputError(f"observer {kind}: {raised(error)}") from error
 
 
 def _takes_any(cls: type) -> bool:
