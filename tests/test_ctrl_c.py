@@ -120,14 +120,14 @@ def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
     assert entry["observer"] == "linear"
 
 
-def test_before_the_first_observer_is_done_leaves_no_files() -> None:
+def test_before_the_first_observer_is_done_leaves_nothing() -> None:
     write(OBSERVER, "pressing.py")
     said = cmg_mj_process(
         "compare", write(LONG), "--observers", "pressing:Interrupts", "--worlds", 1, "--out", "it", cwd=Path()
     )
     assert (said.status, said.out) == (130, "")
     assert said.err == "cmg-mj: interrupted before the first observer was done; nothing was written\n"
-    assert names("it") == []
+    assert not Path("it").exists()
 
 
 def test_from_outside() -> None:
@@ -155,3 +155,16 @@ def test_from_outside() -> None:
     assert len(assert_whole("it")) == 768
     verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", "it/recording.rrd"], capture_output=True)
     assert verified.returncode == 0, verified
+
+
+def test_a_study_that_cannot_begin_leaves_no_folder() -> None:
+    said = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "a/b", cwd=Path())
+    assert said.status == 2
+    assert not Path("a").exists()
+
+
+def test_a_folder_that_was_there_stays() -> None:
+    Path("mine").mkdir()
+    said = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "mine", cwd=Path())
+    assert said.status == 2
+    assert Path("mine").is_dir()

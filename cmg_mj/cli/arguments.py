@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,9 +45,9 @@ class Chosen:
 
     def folder(self, default: str, experiment: Experiment) -> Path:
         """The folder to write to."""
-        from cmg_mj.runs import output_folder, unused_folder
+        from cmg_mj.runs import unused_folder
 
-        return output_folder(unused_folder(Path("runs"), default, experiment) if self.out is None else named(self.out))
+        return made_folder(unused_folder(Path("runs"), default, experiment) if self.out is None else named(self.out))
 
 
 def of_a_run(command: Callable) -> Callable:
@@ -84,6 +85,21 @@ of_observers = click.option(
     metavar="NAMES",
     help="Names with commas between, or all; your own as package.module:Class.",
 )
+
+
+def made_folder(path: Path) -> Path:
+    """The same folder, made and found writable; taken away again at the end if nothing was written to it."""
+    from cmg_mj.runs import output_folder
+
+    new = [folder for folder in (path, *path.parents) if not folder.exists()]
+
+    def take_away() -> None:
+        with suppress(OSError):  # what holds something stays
+            for folder in new:
+                folder.rmdir()
+
+    click.get_current_context().call_on_close(take_away)
+    return output_folder(path)
 
 
 def named(out: str) -> Path:

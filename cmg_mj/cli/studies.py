@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from cmg_mj.cli.arguments import Chosen, check_observer, named, names_of, of_a_run, of_observers
+from cmg_mj.cli.arguments import Chosen, check_observer, made_folder, named, names_of, of_a_run, of_observers
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, show, users_code
 from cmg_mj.errors import InputError, nearest
 
@@ -45,7 +45,6 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     from cmg_mj.papers import BEYOND, PAPERS, check_installed
     from cmg_mj.papers import reproduce as obtain
     from cmg_mj.papers.report import figures_of, save_report, verdict_table
-    from cmg_mj.runs import output_folder
 
     names = (*PAPERS, *BEYOND, "all")
     if paper not in names:
@@ -54,7 +53,7 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
         raise InputError("--out '': name a folder, . for the current one")
     papers = list(PAPERS) if paper == "all" else [paper]
     check_installed(papers)  # before a folder is made
-    folder = output_folder(Path(out) if out is not None else Path("runs") / f"reproduce-{paper}")
+    folder = made_folder(Path(out) if out is not None else Path("runs") / f"reproduce-{paper}")
     with CtrlC() as ctrl_c:
         with progress(f"reproduce {paper}", 1.0, ctrl_c) as on_progress:
             entries = obtain(papers, lambda now, done: on_progress(done, now))
@@ -100,7 +99,7 @@ def tune(
 
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """
-    from cmg_mj.runs import file_name, output_folder
+    from cmg_mj.runs import file_name
     from cmg_mj.tuning import figures_of, save_study, tuning_table
     from cmg_mj.tuning import tune as fit
 
@@ -108,7 +107,7 @@ def tune(
         check_observer("--observer", observer)
     scenario = chosen.scenario(observer)
     default = Path("runs") / f"tune-{file_name(scenario.observer.kind)}-{scenario.seed}"
-    folder = output_folder(default if chosen.out is None else named(chosen.out))
+    folder = made_folder(default if chosen.out is None else named(chosen.out))
     densities = [_density(text) for text in noise.split(",") if text.strip()]
     if noise and not densities:
         raise InputError(f"--noise {noise!r}: give numbers with commas between")
