@@ -54,7 +54,7 @@ class Rows:
 
     def add(
         self, q: Sequence[Scalar], v: Sequence[Scalar], tick: Tick, torque: float, running: np.ndarray | None
-    ) -> bool:
+    ) -> None:
         """Take one tick.
 
         Args:
@@ -63,15 +63,10 @@ class Rows:
             tick: What the controller measured and decided.
             torque: The push [N m].
             running: Which worlds have not ended, (n_worlds,); None for one world.
-
-        Returns:
-            Whether a piece was completed.
         """
         self._waiting.append((q, v, tick, torque, running))
-        if len(self._waiting) < TICKS_A_PIECE:
-            return False
-        self.flush()
-        return True
+        if len(self._waiting) >= TICKS_A_PIECE:
+            self.flush()
 
     def flush(self) -> None:
         """Make the waiting ticks into columns: to the metrics, and to the trajectory if it is kept."""

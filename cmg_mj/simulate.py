@@ -170,7 +170,7 @@ def simulate(
         settings: What counts as settled and fallen.
         driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only).
         keep_trajectory: Whether to keep every tick; without it memory does not grow with the duration.
-        on_progress: Called now and then with the simulated time [s].
+        on_progress: Called after every tick with the simulated time [s]; a KeyboardInterrupt it raises ends the run.
 
     Returns:
         The outcomes, summaries and the trajectory. Whatever stops a run, what was recorded until then is there.
@@ -232,8 +232,8 @@ def simulate(
                 if ticked:
                     tick = controller.tick
                     assert tick is not None
-                    completed = rows.add(q, v, tick, torque, None if single else worlds.running.copy())
-                    if completed and on_progress:
+                    rows.add(q, v, tick, torque, None if single else worlds.running.copy())
+                    if on_progress:
                         on_progress((step + count) * timestep)
     except RunStopped as error:
         ends = [end or Outcome("stopped", step * timestep, str(error)) for end in ends]

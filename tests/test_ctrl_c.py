@@ -24,8 +24,8 @@ from cmg_mj import Estimate
 
 class Interrupts:
     '''Presses Ctrl-C at the 600th sample, once or more often.'''
-    def __init__(self, dt, model, times=1):
-        self.times = times
+    def __init__(self, dt, model, times=1, signal="SIGINT"):
+        self.times, self.signal = times, signal
     def init(self, y):
         return 0
     def step(self, k, y, u):
@@ -34,7 +34,7 @@ class Interrupts:
                 self.press()
         return k + 1, Estimate(y.y1, 0.0 * y.y1, y.y2)
     def press(self):
-        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(getattr(signal, self.signal))
 
 class Waits(Interrupts):
     '''Waits at the 600th sample until somebody else has pressed it.'''
@@ -52,9 +52,18 @@ def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
     write(OBSERVER, "pressing.py")
     said = cmg_mj_process("run", write(LONG), "--out", "it", "--json", "--driver", driver, cwd=Path())
     assert said.status == 130, said
-    assert said.err == "cmg-mj: interrupted at 3.835 s; what was recorded until then is in it\n"
-    assert len(assert_whole("it")) == 768  # three pieces of 256 ticks
+    assert said.err == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it\n"
+    assert len(assert_whole("it")) == 600
     assert json.loads(said.out)["outcome"] == "interrupted"
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_what_ends_a_process_from_outside_counts_as_ctrl_c(name: str) -> None:
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process("run", write(LONG), "--out", "it", "--set", f"observer.signal={name}", cwd=Path())
+    assert said.status == 130, said
+    assert said.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+    assert len(assert_whole("it")) == 600
 
 
 def test_twice_ends_a_run_at_once() -> None:
@@ -151,8 +160,8 @@ def test_from_outside() -> None:
         finally:
             running.kill()
     assert running.returncode == 130, err
-    assert err.splitlines()[-1] == "cmg-mj: interrupted at 3.835 s; what was recorded until then is in it"
-    assert len(assert_whole("it")) == 768
+    assert err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+    assert len(assert_whole("it")) == 600
     verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", "it/recording.rrd"], capture_output=True)
     assert verified.returncode == 0, verified
 

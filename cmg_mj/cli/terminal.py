@@ -28,7 +28,8 @@ class OnProgress(Protocol):
 class CtrlC:
     """Ctrl-C while something is run and written: the first is noted and acted on by `check`, the second acts at once.
 
-    So a run ends between two ticks, and a file that is being written is finished.
+    So a run ends between two ticks, and a file that is being written is finished. What ends a process from outside,
+    SIGTERM and, where there is one, SIGHUP, counts as Ctrl-C.
 
     Attributes:
         noted: Whether there was one.
@@ -36,20 +37,20 @@ class CtrlC:
 
     def __init__(self) -> None:
         self.noted = False
-        self._before: Any = None
+        self._before: dict[int, Any] = {}
 
     def __enter__(self) -> CtrlC:
-        # Where Ctrl-C is not Python's own affair (another thread, a job in the background), nothing is changed.
-        if (
-            threading.current_thread() is threading.main_thread()
-            and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        ):
-            self._before = signal.signal(signal.SIGINT, self._note)
+        # Where a signal is not Python's own affair (another thread, a job in the background), nothing is changed.
+        if threading.current_thread() is threading.main_thread():
+            for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+                number = getattr(signal, name, None)  # Windows has no SIGHUP
+                if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                    self._before[number] = signal.signal(number, self._note)
         return self
 
     def __exit__(self, *exception: object) -> None:
-        if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
+        for number, before in self._before.items():
+            signal.signal(number, before)
 
     def _note(self, *signal: Any) -> None:
         if self.noted:
@@ -128,9 +129,15 @@ def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[
     bar = Progress(*columns, console=console, transient=True)
     task = bar.add_task(label, total=total)
 
+    shown = -total
+
     def on_progress(done: float, now: str | None = None) -> None:
+        nonlocal shown
         if ctrl_c is not None:
             ctrl_c.check()
+        if now is None and done - shown < total / 500.0:
+            return  # called after every tick, of which one in many is worth drawing
+        shown = done
         bar.update(task, completed=done, description=now)  # None leaves the description as it is
 
     with bar if console.is_terminal else nullcontext():  # below rich 15, a disabled bar leaves an empty line
