@@ -164,7 +164,7 @@ class Experiment:
     def save(self, path: Path) -> None:
         """Write the resolved scenario as TOML: running that file again gives the same run."""
         with whole_file(path) as temporary:
-            temporary.write_text(tomli_w.dumps(self.resolved()))
+            temporary.write_text(tomli_w.dumps(self.resolved()), encoding="utf-8")
 
 
 def load_rig(scenario: Scenario) -> Plant:

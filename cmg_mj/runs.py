@@ -15,7 +15,7 @@ import numpy as np
 import tomli_w
 
 from cmg_mj.engine import quiet
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, raised
 from cmg_mj.experiment import Experiment, load_rig, prepare
 from cmg_mj.observers.protocol import BIAS, extra_signals
 from cmg_mj.plant import Plant
@@ -253,11 +253,12 @@ def _write(folder: Path, files: Mapping[str, Callable[[Path], None]]) -> None:
         try:
             with quiet():
                 write(folder / name)
-        except OSError as error:
+        except Exception as error:  # a title that no file can hold: the other files are kept all the same
             wrong[name] = error
     if wrong:
         why = "; ".join(
-            f"{folder / name}: cannot be written: {error.strerror or error}" for name, error in wrong.items()
+            f"{folder / name}: cannot be written: {getattr(error, 'strerror', None) or raised(error)}"
+            for name, error in wrong.items()
         )
         raise InputError(why)
 
@@ -309,7 +310,7 @@ def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
 
 def _write_json(path: Path, value: Any) -> None:
     with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(value, indent=2) + "\n")
+        temporary.write_text(json.dumps(value, indent=2) + "\n", encoding="utf-8")
 
 
 def _finite(value: Any) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import subprocess
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,10 +14,11 @@ from typing import Any
 import pytest
 
 from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare, runs
+from cmg_mj.errors import InputError
 from cmg_mj.resources import folder
 from cmg_mj.simulate import Outcome
 from cmg_mj.trajectory import Trajectory
-from tests.command import cmg_mj
+from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, environment
 from tests.run_folders import assert_whole, names, write
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -226,3 +228,32 @@ def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
     scenario = load_scenario("bias_estimation", ["duration_s=0.5"])
     experiments = runs.prepare_comparison(scenario, ["linear", "adaptive", "homogeneous_adaptive"])
     assert [experiment.scenario.controller.trim_s for experiment in experiments] == [0.0, 1.0, 1.0]
+
+
+# --- letters -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("elsewhere")
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_a_title_of_any_letters_under_an_ascii_locale(command: str) -> None:
+    Path("my.toml").write_text('title = "Stoß – 1°"\nduration_s = 0.2', encoding="utf-8")
+    options = ["--observers", "linear", "--worlds", "1"] if command == "compare" else []
+    done = subprocess.run(
+        [*COMMAND, command, "my.toml", "--out", "it", *options],
+        env=environment(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0"),
+        capture_output=True,
+        timeout=HANGS_AFTER_S,
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"Sto\\xdf" in done.stdout
+    assert tomllib.loads(Path("it/scenario.toml").read_text(encoding="utf-8"))["title"] == "Stoß – 1°"
+
+
+@pytest.mark.usefixtures("elsewhere")
+def test_a_title_that_no_file_can_hold_loses_nothing_else() -> None:
+    """A lone surrogate, as the command line makes of a byte that is no UTF-8."""
+    experiment = prepare(parse_scenario({"duration_s": 0.2, "title": "ok"}))
+    bad = replace(experiment, scenario=experiment.scenario.model_copy(update={"title": "\udcff"}))
+    with pytest.raises(InputError, match="cannot be written: UnicodeEncodeError"):
+        runs.save_run(runs.output_folder(Path("it")), bad, bad.run())
+    assert {"summary.json", "trajectory.parquet"} <= {path.name for path in Path("it").iterdir()}
