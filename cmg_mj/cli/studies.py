@@ -49,11 +49,9 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     names = (*PAPERS, *BEYOND, "all")
     if paper not in names:
         raise InputError(f"{paper!r}: no such paper; {nearest(paper, names)}")
-    if out == "":
-        raise InputError("--out '': name a folder, . for the current one")
     papers = list(PAPERS) if paper == "all" else [paper]
     check_installed(papers)  # before a folder is made
-    folder = made_folder(Path(out) if out is not None else Path("runs") / f"reproduce-{paper}")
+    folder = made_folder(named(out) if out is not None else Path("runs") / f"reproduce-{paper}")
     with CtrlC() as ctrl_c:
         with progress(f"reproduce {paper}", 1.0, ctrl_c) as on_progress:
             entries = obtain(papers, lambda now, done: on_progress(done, now))

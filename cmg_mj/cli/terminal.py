@@ -40,11 +40,12 @@ class CtrlC:
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> CtrlC:
-        # Where a signal is not Python's own affair (another thread, a job in the background), nothing is changed.
+        # Where somebody else has a say in a signal (another thread, a job in the background), nothing is changed.
+        untouched = {"SIGINT": signal.default_int_handler, "SIGTERM": signal.SIG_DFL, "SIGHUP": signal.SIG_DFL}
         if threading.current_thread() is threading.main_thread():
-            for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            for name, handler in untouched.items():
                 number = getattr(signal, name, None)  # Windows has no SIGHUP
-                if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                if number is not None and signal.getsignal(number) == handler:
                     self._before[number] = signal.signal(number, self._note)
         return self
 

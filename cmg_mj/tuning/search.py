@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
+from scipy.stats import qmc
 
 from cmg_mj.tuning.parameters import Number
 
@@ -109,7 +110,10 @@ def _search_simplex(height: Callable, low: np.ndarray, high: np.ndarray, given: 
     if starts > 1:
         reach = math.log(SCATTER_FACTOR)
         floor, ceiling = np.maximum(low, given - reach), np.minimum(high, given + reach)
-        scattered = floor + _latin_hypercube(n, SCATTER * n) * (ceiling - floor)
+        # `seed` is what every scipy takes; the name `rng` is known from 1.15 on.
+        cube = qmc.LatinHypercube(n, seed=np.random.default_rng(0))  # pyright: ignore[reportCallIssue]
+        unit = cube.random(SCATTER * n)
+        scattered = floor + unit * (ceiling - floor)
         order = np.argsort([height(point) for point in scattered], kind="stable")
         first += [scattered[i] for i in order[: starts - 1]]
     for start in first:
@@ -122,20 +126,6 @@ def _search_simplex(height: Callable, low: np.ndarray, high: np.ndarray, given: 
             bounds=list(zip(low, high, strict=True)),
             options={"initial_simplex": corners, "xatol": TOLERANCE, "fatol": 1e-5, "maxfev": 120 * n},
         )
-
-
-def _latin_hypercube(dimension: int, points: int) -> np.ndarray:
-    """Points in the unit cube, one in each of as many equal slices of every side, (points, dimension).
-
-    Those of scipy's LatinHypercube with the generator default_rng(0), bit by bit; its argument for the generator has
-    another name below scipy 1.15.
-    """
-    rng = np.random.default_rng(0).spawn(1)[0]
-    inside = rng.uniform(size=(points, dimension))
-    slices = np.tile(np.arange(1, points + 1), (dimension, 1))
-    for side in slices:
-        rng.shuffle(side)
-    return (slices.T - inside) / points
 
 
 def crossing(x: Sequence[float], y: Sequence[float]) -> float | None:
