@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import mujoco
+import numpy as np
 
 from cmg_mj.controller import Controller
 from cmg_mj.engine import control_callback
@@ -17,9 +18,8 @@ from cmg_mj.plant import Plant
 def control(plant: Plant, controller: Controller, data: mujoco.MjData) -> bool:
     """Sample what is due at this physics step, and set the servos' commands if it is a control tick.
 
-    Call it before every `mujoco.mj_step`, without an `mj_forward` between: that would show the accelerometers
-    one step newer than the runner's. At the first tick they are computed here, so that a start without `mj_forward`
-    is as good as one with it.
+    Call it before every `mujoco.mj_step`, after the torques from outside have been set. Where something is due it runs
+    `mj_forward`, so that every sensor shows the present state.
 
     Args:
         plant: The rig.
@@ -33,6 +33,17 @@ def control(plant: Plant, controller: Controller, data: mujoco.MjData) -> bool:
         InputError: Steps at which something was due were left out.
         RunStopped: The plant diverged, or an observer failed.
     """
+    with control_callback(None):  # the forward pass is a look at the sensors, no step
+        return _tick(plant, controller, data, lambda: _forward(plant.model, data))
+
+
+def _forward(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    mujoco.mj_forward(model, data)
+    return data.sensordata
+
+
+def _tick(plant: Plant, controller: Controller, data: mujoco.MjData, sense: Callable[[], np.ndarray]) -> bool:
+    """Sample what is due, from sensordata as `sense` gives it, and set the servos if it is a control tick."""
     step = round(data.time / plant.model.opt.timestep)
     if step % controller.beat:
         return False
@@ -46,9 +57,7 @@ def control(plant: Plant, controller: Controller, data: mujoco.MjData) -> bool:
             )
     if not math.isfinite(data.qpos[plant.tilt]):
         raise RunStopped(f"the plant diverged at t = {data.time:g} s")
-    sensordata = _first_readings(plant, data) if controller.tick is None else data.sensordata
-    ideal = plant.ideal(data.qpos.tolist(), data.qvel.tolist(), sensordata.tolist())
-    if not controller.update(step, ideal):
+    if not controller.update(step, plant.ideal(sense().tolist(), data.qvel.tolist())):
         return False
     _hold(plant, controller, data)
     return True
@@ -59,15 +68,6 @@ def _hold(plant: Plant, controller: Controller, data: mujoco.MjData) -> None:
     if controller.tick is not None:
         for cube in plant.cubes:
             data.ctrl[cube.servo] = cube.direction * controller.tick.u
-
-
-def _first_readings(plant: Plant, data: mujoco.MjData):
-    """Accelerometers at the start: MuJoCo shows zeros until a first forward pass."""
-    scratch = mujoco.MjData(plant.model)
-    mujoco.mj_copyState(plant.model, data, scratch, int(mujoco.mjtState.mjSTATE_INTEGRATION))
-    with control_callback(None):
-        mujoco.mj_forward(plant.model, scratch)
-    return scratch.sensordata
 
 
 class ControlCallback:
@@ -88,17 +88,25 @@ class ControlCallback:
     def __init__(self, plant: Plant, controller: Controller) -> None:
         self.plant = plant
         self.controller = controller
+        self._scratch = mujoco.MjData(plant.model)
         self._instant: float | None = None
         self._latest = -math.inf
         self._half_stages = 0
 
     def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Take the control decision if this call is the first at a sampling instant."""
-        if self._is_instant(model.opt.timestep, data.time):
-            control(self.plant, self.controller, data)
         _hold(self.plant, self.controller, data)
         for cube in self.plant.cubes:
             data.ctrl[cube.motor] = cube.speed
+        if self._is_instant(model.opt.timestep, data.time):
+            _tick(self.plant, self.controller, data, lambda: self._sense(data))
+
+    def _sense(self, data: mujoco.MjData) -> np.ndarray:
+        """Sensordata at the present state, with the commands that hold there: MuJoCo is in the middle of its own pass."""
+        model = self.plant.model
+        mujoco.mj_copyState(model, data, self._scratch, int(mujoco.mjtState.mjSTATE_INTEGRATION))
+        with control_callback(None):
+            return _forward(model, self._scratch)
 
     def _is_instant(self, h: float, t: float) -> bool:
         """Whether a call at time t is the first of a step of length h, and not one of its later stages."""

@@ -14,7 +14,7 @@ from cmg_mj.law import Law
 from cmg_mj.observers.protocol import BIAS, Estimate, Measurement, Observer, extra_signals
 from cmg_mj.sensors import Ideal, SampledSensor, Sensors, normals
 from cmg_mj.tilt import RadialTilt
-from cmg_mj.timing import whole_steps
+from cmg_mj.timing import steps_until, whole_steps
 
 Feedback = Literal["observer", "fog", "truth"]
 Angles = Literal["measured", "estimated"]
@@ -122,7 +122,7 @@ class Controller:
         extra_signals: Names of what the observer, then each companion, estimates beyond x.
 
     Raises:
-        InputError: A rate or latency does not fit the physics step, or there is no bias estimate to trim with.
+        InputError: A rate does not fit the physics step, or there is no bias estimate to trim with.
     """
 
     def __init__(
@@ -160,7 +160,7 @@ class Controller:
         self.extra_signals = [_extra_signals(o) for o in (observer, *self.companions.values())]
         self._widths = [3 + len(names) for names in self.extra_signals]
         self._trim_part, self._trim_gain = trim_of(trim_s, law, self.extra_signals[0])
-        self._trimmed_until = whole_steps(trim_s, timestep, "controller.trim_s", f"{trim_s:g} s")
+        self._trimmed_until = steps_until(trim_s, timestep)
         # y2 = sum of share * encoder - offset: half the difference of the encoders of a scissored pair.
         self._shares = [direction / len(self.directions) for direction in self.directions]
         self._offset = sum(share * zero for share, zero in zip(self._shares, self.gimbal_zero, strict=True))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.design import Design
+from cmg_mj.grid import physics_step
 from cmg_mj.known_rigs import RigFacts
 from cmg_mj.law import closed_loop_poles
 from cmg_mj.resolved import resolved
@@ -28,9 +29,10 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         Lines of text.
     """
     law = design.law
-    fields = resolved(scenario, design, rig.path)
     settings = scenario.plant
-    steps = f"{round(scenario.duration_s / settings.timestep_s)} physics steps of {settings.timestep_s:g} s"
+    timestep = physics_step(scenario, rig.own_timestep)
+    fields = resolved(scenario, design, rig.path, timestep)
+    steps = f"{round(scenario.duration_s / timestep)} physics steps of {timestep:g} s"
     poles = closed_loop_poles(rig.reduced, law.gains)
     slowest = float(np.max(np.real(poles)))
     stability = "stable" if is_hurwitz(poles) else "MARGINAL" if slowest < MARGIN else "UNSTABLE"

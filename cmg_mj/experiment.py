@@ -13,6 +13,7 @@ import tomli_w
 from cmg_mj.controller import Controller
 from cmg_mj.design import Design, design
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.grid import common_period
 from cmg_mj.law import Law
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.resolved import resolved
@@ -124,7 +125,7 @@ class Experiment:
         Raises:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
-        given = dataclasses.asdict(self.scenario.plant)
+        given = dataclasses.asdict(self.scenario.plant) | {"timestep_s": self.plant.timestep}
         for name in vary:
             if name not in given:
                 raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, given)}")
@@ -159,7 +160,7 @@ class Experiment:
 
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
-        return resolved(self.scenario, self.design, self.plant.path)
+        return resolved(self.scenario, self.design, self.plant.path, self.plant.timestep)
 
     def save(self, path: Path) -> None:
         """Write the resolved scenario as TOML: running that file again gives the same run."""
@@ -174,7 +175,8 @@ def load_rig(scenario: Scenario) -> Plant:
         InputError: `load_plant` refuses it; the scenario is named.
     """
     try:
-        return load_plant(scenario.plant)
+        period = common_period(scenario) if scenario.plant.timestep_s is None else None
+        return load_plant(scenario.plant, period_s=period)
     except InputError as error:
         raise InputError(located(scenario._where, str(error))) from error
 

@@ -1,13 +1,20 @@
-"""Every rate and time of a scenario on the grid of its physics steps."""
+"""The physics step, and every rate and time of a scenario on the grid of its steps."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from fractions import Fraction
 
 from cmg_mj.errors import InputError
+from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.schema import Scenario
 from cmg_mj.timing import whole_steps
+
+SENSORS = ("accelerometer", "encoder", "fog")
+FINEST_S = 1e-4
+"""A scenario whose rates and times leave only a smaller step than this must name the step itself [s]."""
+_LARGEST_DENOMINATOR = 10**9  # 1/3 s as a float is the fraction 1/3
 
 
 def check_times(scenario: Scenario) -> None:
@@ -17,25 +24,91 @@ def check_times(scenario: Scenario) -> None:
         InputError: One does not; the nearest that would is named.
     """
     timestep = scenario.plant.timestep_s
-    sensors = {kind: getattr(scenario.sensors, kind) for kind in ("accelerometer", "encoder", "fog")}
-    rates = {"controller.rate_hz": scenario.controller.rate_hz}
-    rates |= {f"sensors.{kind}.rate_hz": sensor.rate_hz for kind, sensor in sensors.items()}
-    times = {"duration_s": scenario.duration_s}
-    times |= {f"sensors.{kind}.latency_s": sensor.latency_s for kind, sensor in sensors.items()}
-    if scenario.controller.trim_s:
-        times["controller.trim_s"] = scenario.controller.trim_s
-    for i, push in enumerate(scenario.push):
-        times |= {f"push.{i}.start_s": push.start_s, f"push.{i}.duration_s": push.duration_s}
-    for field, rate in rates.items():
-        _check_grid(1.0 / rate, timestep, field, f"{rate:g} Hz", lambda steps: f"{1.0 / (steps * timestep):g} Hz")
-    for field, time in times.items():
-        _check_grid(time, timestep, field, f"{time:g} s", lambda steps: f"{steps * timestep:g} s")
+    if timestep is None:
+        common_period(scenario)
+    else:
+        for field, rate in _rates(scenario):
+            _check_grid(1.0 / rate, timestep, field, f"{rate:g} Hz", lambda steps: f"{1.0 / (steps * timestep):g} Hz")
+        for field, time in _times(scenario):
+            _check_grid(time, timestep, field, f"{time:g} s", lambda steps: f"{steps * timestep:g} s")
     for i, push in enumerate(scenario.push):
         if push.start_s >= scenario.duration_s:
             raise InputError(
                 f"push.{i}.start_s = {push.start_s:g}: must be less than duration_s = {scenario.duration_s:g}, "
                 "where the run ends"
             )
+
+
+def common_period(scenario: Scenario) -> float:
+    """The longest time that divides every period and time of a scenario [s].
+
+    Raises:
+        InputError: It is shorter than `FINEST_S`; the first field that makes it so is named.
+    """
+    periods = [(field, 1 / _fraction(rate), f"{rate:g} Hz") for field, rate in _rates(scenario)]
+    times = [(field, _fraction(time), f"{time:g} s") for field, time in _times(scenario)]
+    common = Fraction(0)
+    for field, time, shown in periods + times:
+        common = _common_divisor(common, time)
+        if common and common < _fraction(FINEST_S):
+            raise InputError(
+                f"{field} = {shown}: does not fit the other rates and times: no physics step of {FINEST_S:g} s or more "
+                "divides them all; take rounder numbers, or set plant.timestep_s"
+            )
+    return float(common)
+
+
+def fitting_step(settings: PlantSettings, limit_s: float, period_s: float | None) -> float:
+    """The physics step of a scenario: its own, or the largest that is within a limit and divides a period.
+
+    Args:
+        settings: The scenario's plant.
+        limit_s: The largest step that is accurate enough [s]: see `largest_step`.
+        period_s: The time that whole steps must fill [s]; None if any will do.
+
+    Returns:
+        The step [s].
+    """
+    if settings.timestep_s is not None:
+        return settings.timestep_s
+    if period_s is None:
+        return limit_s
+    return period_s / math.ceil(period_s / limit_s * (1.0 - 1e-9))
+
+
+def physics_step(scenario: Scenario, own_s: float) -> float:
+    """The physics step that a scenario is run with.
+
+    Args:
+        scenario: The scenario.
+        own_s: The model file's own step [s].
+
+    Returns:
+        The step [s].
+    """
+    period = common_period(scenario) if scenario.plant.timestep_s is None else None
+    return fitting_step(scenario.plant, own_s, period)
+
+
+def _rates(scenario: Scenario) -> Iterator[tuple[str, float]]:
+    yield "controller.rate_hz", scenario.controller.rate_hz
+    for kind in SENSORS:
+        yield f"sensors.{kind}.rate_hz", getattr(scenario.sensors, kind).rate_hz
+
+
+def _times(scenario: Scenario) -> Iterator[tuple[str, float]]:
+    yield "duration_s", scenario.duration_s
+    for i, push in enumerate(scenario.push):
+        yield f"push.{i}.start_s", push.start_s
+        yield f"push.{i}.duration_s", push.duration_s
+
+
+def _fraction(number: float) -> Fraction:
+    return Fraction(number).limit_denominator(_LARGEST_DENOMINATOR)
+
+
+def _common_divisor(a: Fraction, b: Fraction) -> Fraction:
+    return Fraction(math.gcd(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator)
 
 
 def _check_grid(time: float, timestep: float, field: str, given: str, show: Callable[[int], str]) -> None:

@@ -26,11 +26,13 @@ class RigFacts(NamedTuple):
         path: The model's file.
         cubes: Names of its modules.
         reduced: Its reduced model.
+        own_timestep: The file's own physics step [s].
     """
 
     path: Path
     cubes: tuple[str, ...]
     reduced: ReducedModel
+    own_timestep: float
 
 
 def name_of(model: str, *, locked: bool) -> str:
@@ -66,7 +68,7 @@ def known_rig(settings: PlantSettings) -> RigFacts | None:
     try:
         known = json.loads(kept.read_text(encoding="utf-8"))
         rig = known["rigs"][name_of(path.name, locked=settings.lock_thrust_bearing)]
-        facts = RigFacts(path, tuple(rig["cubes"]), ReducedModel(**rig["reduced"]))
+        facts = RigFacts(path, tuple(rig["cubes"]), ReducedModel(**rig["reduced"]), float(rig["timestep_s"]))
         return facts if known["sha256"] == hash_of_models() else None
     except (OSError, ValueError, LookupError, TypeError):  # not there, or not as `read_off` writes it
         return None

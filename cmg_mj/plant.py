@@ -17,6 +17,7 @@ from cmg_mj.controller import CONTROLLER_OPTIONS, Controller
 from cmg_mj.elementwise import Scalar
 from cmg_mj.engine import control_callback, quiet
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.grid import fitting_step
 from cmg_mj.known_rigs import RigFacts
 from cmg_mj.law import Law
 from cmg_mj.mjcf import KEYFRAME, compile_model, lock_thrust_bearing, parse
@@ -62,25 +63,24 @@ class Plant:
 
     Attributes:
         settings: What it was made from.
-        model: The compiled model. Do not change it: the plant may be shared.
+        model: The compiled model, without what is only seen. Do not change it: the plant may be shared.
         reduced: Parameters of the reduced model, read off the file as it is, without bias or friction, which
             the controller does not know.
         cubes: Addresses of the modules.
         tilt: Address of q_b in qpos and qvel.
         yaw: Address of q_a, or None if the thrust bearing is locked.
+        own_timestep: The model file's own physics step [s].
         tilt_zero: q_b at which the radial line is upright [rad].
         bias: e [rad].
         radial_tilt: The tilt estimate for this rig's accelerometers.
     """
 
-    def __init__(self, settings: PlantSettings, path: Path) -> None:
+    def __init__(self, settings: PlantSettings, path: Path, period_s: float | None = None) -> None:
         self.settings = settings
         self.path = path
         self.bias = math.radians(settings.equilibrium_bias_deg)
-        spec = parse(path)
-        if settings.lock_thrust_bearing:
-            lock_thrust_bearing(spec, path)
-        self.model = compile_model(spec, path)
+        self.model = self._compiled(discard_visual=True)
+        self.own_timestep = float(self.model.opt.timestep)
         self._resolve()
         self.reduced = self._read_reduced()
         vary(
@@ -90,7 +90,21 @@ class Plant:
             tilt=self.tilt,
             gimbals=self._gimbals,
             flywheels=[cube.flywheel for cube in self.cubes],
+            timestep_s=fitting_step(settings, self.own_timestep, period_s),
         )
+
+    def _compiled(self, *, discard_visual: bool) -> mujoco.MjModel:
+        spec = parse(self.path)
+        if self.settings.lock_thrust_bearing:
+            lock_thrust_bearing(spec, self.path)
+        spec.compiler.discardvisual = discard_visual
+        return compile_model(spec, self.path)
+
+    @cached_property
+    def drawn_model(self) -> mujoco.MjModel:
+        """The model with all that is only seen: the same bodies and joints, and geoms that physics does without."""
+        with control_callback(None), quiet():  # compiling a model runs it
+            return self._compiled(discard_visual=False)
 
     # --- names ---------------------------------------------------------------------------------------------
 
@@ -110,35 +124,49 @@ class Plant:
                 f"{self.path}: accelerometer_outer must lie farther from the tilt axis than accelerometer_inner"
             )
         self.radial_tilt = RadialTilt(*radii)
-        self._id("sensor", "fog")
+        self._gyro = self._gyro_axis("fog")
         self.cubes = tuple(self._cube(prefix) for prefix in prefixes)
         self.servos = [cube.servo for cube in self.cubes]
         self.directions = [cube.direction for cube in self.cubes]
         self._gimbals = [cube.gimbal for cube in self.cubes]
         self._shares = [cube.direction / len(self.cubes) for cube in self.cubes]
+        self._encoders = [int(model.sensor_adr[self._id("sensor", f"{name}/gimbal_encoder")]) for name in prefixes]
         self._specific_forces = [address + axis for address, _ in self._accelerometers for axis in (0, 2)]
 
     def _id(self, kind: str, name: str) -> int:
         """Address of an element that `mjcf.require` has found."""
         return int(mujoco.mj_name2id(self.model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
 
-    def _accelerometer(self, name: str) -> tuple[int, float]:
-        """Address in sensordata, and distance of the site from the tilt axis."""
+    def _site_of(self, name: str) -> tuple[int, int, np.ndarray]:
+        """Of a sensor on the frame: its address in sensordata, its site, and the site's axes in the frame, (9,)."""
         model = self.model
         sensor = self._id("sensor", name)
         site = int(model.sensor_objid[sensor])
         if model.site_bodyid[site] != self.frame:
             raise InputError(f"{self.path}: sensor {name!r} must be at a site of the body with the joint 'tilt'")
-        x, _, z = model.site_pos[site] - model.jnt_pos[self.tilt]
-        radius = float(math.hypot(x, z))
         axes = np.zeros(9)
         mujoco.mju_quat2Mat(axes, model.site_quat[site])
+        return int(model.sensor_adr[sensor]), site, axes
+
+    def _gyro_axis(self, name: str) -> int:
+        """Address of the gyro's y axis in sensordata."""
+        address, _, axes = self._site_of(name)
+        if axes[4] < UPRIGHT:
+            raise InputError(f"{self.path}: the site of sensor {name!r} must have its y axis along the tilt axis")
+        return address + 1
+
+    def _accelerometer(self, name: str) -> tuple[int, float]:
+        """Address in sensordata, and distance of the site from the tilt axis."""
+        model = self.model
+        address, site, axes = self._site_of(name)
+        x, _, z = model.site_pos[site] - model.jnt_pos[self.tilt]
+        radius = float(math.hypot(x, z))
         if axes[4] < UPRIGHT or axes[2] * x + axes[8] * z < UPRIGHT * radius:
             raise InputError(
                 f"{self.path}: the site of sensor {name!r} must have its y axis along the tilt axis and its z axis "
                 "pointing away from it"
             )
-        return int(model.sensor_adr[sensor]), radius
+        return address, radius
 
     def _cube(self, prefix: str) -> Cube:
         model = self.model
@@ -235,9 +263,14 @@ class Plant:
         )
 
     @property
+    def timestep(self) -> float:
+        """The physics step [s]."""
+        return float(self.model.opt.timestep)
+
+    @property
     def facts(self) -> RigFacts:
         """What a scenario's controller and observers are made from."""
-        return RigFacts(self.path, tuple(cube.name for cube in self.cubes), self.reduced)
+        return RigFacts(self.path, tuple(cube.name for cube in self.cubes), self.reduced, self.own_timestep)
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
         """What an observer of the bias should find: e less the tilt that the accelerometers' own bias makes.
@@ -261,21 +294,18 @@ class Plant:
             mujoco.mj_forward(self.model, data)
 
     def new_data(self) -> mujoco.MjData:
-        """Fresh simulation data at the scenario's initial state, accelerometers included."""
+        """Fresh simulation data at the scenario's initial state."""
         data = mujoco.MjData(self.model)
         self.initialise(data)
         return data
 
-    def ideal(self, qpos: Any, qvel: Any, sensordata: Any) -> Ideal:
-        """What perfect sensors show: encoders and gyro the present state, accelerometers the last physics step.
-
-        Encoders and gyro are read off the joints they sit on, because after a step MuJoCo's own sensordata
-        is still that of the state before it. On the frame, the gyro's tilt axis shows exactly q_b'.
+    def ideal(self, sensordata: Any, qvel: Any) -> Ideal:
+        """What perfect sensors show.
 
         Args:
-            qpos: Joint angles, indexed by address: floats, or an array (n_joints, n_worlds) [rad].
+            sensordata: MuJoCo's sensor readings after a forward pass, indexed by address: floats, or an array
+                (n_numbers, n_worlds).
             qvel: Joint rates, the same way [rad/s].
-            sensordata: MuJoCo's sensor readings, the same way.
 
         Returns:
             The ideal readings, of the elements' own type (float, or array (n_worlds,)).
@@ -285,7 +315,8 @@ class Plant:
         else:
             i, j, k, m = self._specific_forces
             forces = (sensordata[i], sensordata[j], sensordata[k], sensordata[m])
-        return Ideal(forces, [qpos[gimbal] for gimbal in self._gimbals], qvel[self.tilt])
+        encoders = [sensordata[address] for address in self._encoders]
+        return Ideal(forces, encoders, sensordata[self._gyro], qvel[self.tilt])
 
     def gimbal_angle(self, qpos: Any) -> Scalar:
         """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""
@@ -301,12 +332,18 @@ class Plant:
 
 
 @quiet()
-def load_plant(settings: PlantSettings | None = None, beside: Path | None = None, **fields: object) -> Plant:
+def load_plant(
+    settings: PlantSettings | None = None,
+    beside: Path | None = None,
+    period_s: float | None = None,
+    **fields: object,
+) -> Plant:
     """Load a rig.
 
     Args:
         settings: Its settings; or give them as keyword arguments.
         beside: A folder that a relative model path may start from.
+        period_s: If the settings leave the physics step open: what whole steps must fill, such as the control period [s].
         **fields: Fields of `PlantSettings`.
 
     Returns:
@@ -322,4 +359,4 @@ def load_plant(settings: PlantSettings | None = None, beside: Path | None = None
         except ValidationError as error:
             raise InputError(f"plant.{complaint(PlantSettings, error.errors()[0], fields)}") from error
     with control_callback(None):  # compiling a model runs it
-        return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside))
+        return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside), period_s)

@@ -20,7 +20,8 @@ class PlantSettings:
         model: A bundled MJCF by name, or a path.
         equilibrium_bias_deg: e: the centre of mass of all that tilts is turned about the pivot by this angle [deg].
         initial_tilt_deg: x1(0), from the true equilibrium [deg].
-        timestep_s: Physics step [s].
+        timestep_s: Physics step [s]; left out, the largest that divides the control's and the sensors' periods, meets the
+            pushes' edges and is no larger than the model file's own (`<option timestep>`).
         integrator: MuJoCo's integrator. Fast flywheels need RK4.
         lock_thrust_bearing: Take the yaw joint out.
         gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
@@ -34,7 +35,7 @@ class PlantSettings:
     model: str = "scissored_pair.xml"
     equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 0.5
     initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 1.0
-    timestep_s: Annotated[float, Field(ge=1e-6, le=0.1)] = 0.001
+    timestep_s: Annotated[float, Field(ge=1e-6, le=0.1)] | None = None
     integrator: Integrator = "RK4"
     lock_thrust_bearing: bool = False
     gimbal_armature_kg_m2: NonNegative | None = None

@@ -24,7 +24,11 @@ def read_off() -> dict[str, Any]:
             except InputError:  # a module, which is no rig by itself
                 continue
             cubes = [cube.name for cube in plant.cubes]
-            rigs[name_of(name, locked=locked)] = {"cubes": cubes, "reduced": dataclasses.asdict(plant.reduced)}
+            rigs[name_of(name, locked=locked)] = {
+                "cubes": cubes,
+                "timestep_s": plant.own_timestep,
+                "reduced": dataclasses.asdict(plant.reduced),
+            }
     return {"sha256": hash_of_models(), "rigs": rigs}
 
 

@@ -18,13 +18,14 @@ from cmg_mj.resources import folder
 from cmg_mj.schema import ControllerSettings, Scenario
 
 
-def resolved(scenario: Scenario, design: Design, model: Path) -> dict[str, Any]:
+def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float) -> dict[str, Any]:
     """The scenario with every default written out, and the versions it ran with, as TOML can hold it.
 
     Args:
         scenario: The scenario.
         design: What was made of it.
         model: The model's file.
+        timestep_s: The physics step [s].
 
     Returns:
         Sections and fields.
@@ -32,6 +33,7 @@ def resolved(scenario: Scenario, design: Design, model: Path) -> dict[str, Any]:
     fields = TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
     path = model.resolve()
     fields["plant"]["model"] = path.name if path.parent == folder("models").resolve() else str(path)
+    fields["plant"]["timestep_s"] = timestep_s
     controller = fields["controller"] | {"gains": list(design.law.gains), "lqr": None}
     fields["controller"] = {
         name: controller[name] for name in ControllerSettings.model_fields if controller[name] is not None

@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, digitise
 from cmg_mj.fields import STRICT, NonNegative, Positive
-from cmg_mj.timing import whole_steps
+from cmg_mj.timing import steps_until, whole_steps
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
 
@@ -29,8 +29,10 @@ class Ideal(NamedTuple):
     """Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
     gimbals: Sequence[Scalar]
     """Gimbal angles, one a gimbal [rad]."""
+    gyro: Scalar
+    """What a gyro on the frame shows along the tilt axis [rad/s]."""
     rate: Scalar
-    """Tilt rate [rad/s]."""
+    """The true tilt rate, q_b' [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -46,7 +48,7 @@ class Accelerometer:
         bias_mg: Offsets of the tangential axes of the inner and the outer accelerometer [mg].
         range_g: Readings saturate here [g].
         counts_per_g: Resolution; 0 for none.
-        latency_s: From sampling to delivery [s], a multiple of the physics step.
+        latency_s: From sampling to delivery [s].
     """
 
     rate_hz: Positive = 200.0
@@ -100,7 +102,7 @@ class Encoder:
     Attributes:
         rate_hz: Samples a second (the servo is polled once a control period).
         counts_per_revolution: Resolution; 0 for none.
-        latency_s: From sampling to delivery [s], a multiple of the physics step.
+        latency_s: From sampling to delivery [s].
     """
 
     rate_hz: Positive = 200.0
@@ -130,7 +132,7 @@ class Fog:
         bias_deg_h: Constant offset [deg/h].
         bandwidth_hz: First-order low-pass, exact between samples; 0 for none.
         range_deg_s: Readings saturate here [deg/s].
-        latency_s: From sampling to delivery [s], a multiple of the physics step.
+        latency_s: From sampling to delivery [s].
     """
 
     rate_hz: Positive = 200.0
@@ -158,7 +160,7 @@ class Fog:
 
         def measure(ideal: Ideal, normal: Sequence[Scalar]) -> Scalar:
             nonlocal passed
-            passed = ideal.rate if passed is None else passed + share * (ideal.rate - passed)
+            passed = ideal.gyro if passed is None else passed + share * (ideal.gyro - passed)
             return clip(passed + bias + sigma * normal[0], -limit, limit)
 
         return measure
@@ -210,7 +212,7 @@ class SampledSensor:
 
     def __init__(self, sensor: Accelerometer | Encoder | Fog, timestep: float, noise: Iterator, where: str) -> None:
         self.period = whole_steps(1.0 / sensor.rate_hz, timestep, f"{where}.rate_hz", f"{sensor.rate_hz:g} Hz")
-        self.latency = whole_steps(sensor.latency_s, timestep, f"{where}.latency_s", f"{sensor.latency_s:g} s")
+        self.latency = steps_until(sensor.latency_s, timestep)
         self._measure = sensor.meter()
         self._noise = noise
         self._on_the_way: deque = deque()

@@ -205,7 +205,7 @@ def simulate(
                 if held != torque:
                     torque = held
                     worlds.push(torque)
-                q, v, s = worlds.read()
+                q, v = worlds.state()
                 lean = q[rig.tilt] - rig.tilt_zero
                 if single:
                     if not abs(lean) <= fall:
@@ -220,7 +220,8 @@ def simulate(
                     if not worlds.running.any():
                         break
                 if native:
-                    ticked = step % controller.beat == 0 and controller.update(step, rig.ideal(q, v, s))
+                    due = step % controller.beat == 0
+                    ticked = due and controller.update(step, rig.ideal(worlds.sense(), v))
                     if ticked and controller.tick is not None:
                         if not single:
                             _stop_blind(worlds, controller.tick, ends, step * timestep)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from cmg_mj.errors import InputError
 
 
@@ -27,3 +29,16 @@ def whole_steps(duration: float, timestep: float, field: str, shown: str) -> int
             f"rates must divide {1.0 / timestep:g} Hz and times be multiples of {timestep:g} s"
         )
     return steps
+
+
+def steps_until(delay: float, timestep: float) -> int:
+    """The first physics step that is no earlier than a delay after step 0.
+
+    Args:
+        delay: The delay [s], any number.
+        timestep: Physics step [s].
+
+    Returns:
+        The number of steps.
+    """
+    return math.ceil(delay / timestep - 1e-6)

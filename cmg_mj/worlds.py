@@ -12,8 +12,8 @@ from mujoco.batch import Batch, SimulationError
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant import Plant
 
-Reading = tuple[Any, Any, Any]
-"""Joint angles, joint rates, sensordata: lists of floats, or arrays (n, n_worlds)."""
+State = tuple[Any, Any]
+"""Joint angles, joint rates: lists of floats, or arrays (n, n_worlds)."""
 
 
 class OneWorld:
@@ -27,9 +27,14 @@ class OneWorld:
         self._servos = list(zip(plant.servos, plant.directions, strict=True))
         self._tilt = plant.tilt
 
-    def read(self) -> Reading:
-        """Joint angles, joint rates and sensordata as floats."""
-        return self._qpos.tolist(), self._qvel.tolist(), self._sensordata.tolist()
+    def state(self) -> State:
+        """Joint angles and rates as floats."""
+        return self._qpos.tolist(), self._qvel.tolist()
+
+    def sense(self) -> Any:
+        """MuJoCo's sensordata at the present state, with the torque and the commands that hold there."""
+        mujoco.mj_forward(self.model, self.data)
+        return self._sensordata.tolist()
 
     def command(self, u: Scalar) -> None:
         """Set the gimbal rate, each cube in its direction."""
@@ -66,16 +71,23 @@ class ManyWorlds:
         for i, plant in enumerate(plants):
             data = starts[plant]
             self._qpos[i], self._qvel[i], self._ctrl[i], act[i] = data.qpos, data.qvel, data.ctrl, data.act
-        b.forward()
         self._servos = first.servos
         self._directions = np.array(first.directions)
         self._tilt = first.tilt
         self.running = np.ones(len(plants), dtype=bool)
         self._all_run = True
 
-    def read(self) -> Reading:
-        """Joint angles, joint rates and sensordata, each (n, n_worlds)."""
-        return self._qpos.T.copy(), self._qvel.T.copy(), self._sensordata.T.copy()
+    def state(self) -> State:
+        """Joint angles and rates, each (n, n_worlds)."""
+        return self._qpos.T.copy(), self._qvel.T.copy()
+
+    def sense(self) -> Any:
+        """MuJoCo's sensordata at the present state, with the torque and the commands that hold there, (n, n_worlds)."""
+        try:
+            self.batch.forward(None if self._all_run else self.running)
+        except SimulationError as error:
+            self._qpos[error.ids, self._tilt] = np.nan
+        return self._sensordata.T.copy()
 
     def command(self, u: Scalar) -> None:
         """Set the gimbal rates, each cube in its direction."""

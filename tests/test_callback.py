@@ -75,12 +75,16 @@ class Loop:
         tilt = math.radians(self.of.scenario.plant.initial_tilt_deg)
         self.data.qpos[self.plant.tilt] = self.plant.tilt_zero - self.plant.bias + tilt
 
-    def step(self, before: Callable[[], object] = lambda: None) -> None:
-        """Push, call a driver, take a physics step, and note a new tick with the state it was taken at."""
+    def push(self) -> None:
+        """Set the torque of this instant."""
         t = self.data.time
         self.data.qfrc_applied[self.plant.tilt] = sum(
             push.torque_n_m for push in self.of.scenario.push if push.start_s <= t + 1e-9 < push.end_s - 1e-9
         )
+
+    def step(self, before: Callable[[], object] = lambda: None) -> None:
+        """Push, call a driver, take a physics step, and note a new tick with the state it was taken at."""
+        self.push()
         angles = self.data.qpos.copy()
         before()
         mujoco.mj_step(self.plant.model, self.data)
@@ -156,12 +160,13 @@ def test_the_callback_drives_one_world_only() -> None:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_forward_passes_in_between_change_nothing(integrator: str) -> None:
-    """Once, twice or not at all after a step, as a viewer or a logger does."""
+    """Once, twice or not at all after a step, as a viewer or a logger does; the first is where sensors are read."""
     settings = (f"plant.integrator={integrator}",)
     loop = Loop(experiment(settings), cold=True)
     calls = iter([0, 1, 2] * 1000)
 
     def look() -> None:
+        loop.push()
         for _ in range(next(calls)):
             mujoco.mj_forward(loop.plant.model, loop.data)
 

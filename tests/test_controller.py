@@ -259,7 +259,7 @@ IDEAL_SENSORS = Sensors(
 def reading(tilt: float, gimbal: float, rate: float) -> Ideal:
     """A still rig: gravity in both accelerometers, gimbals moved oppositely from a quarter turn."""
     x, z = -9.81 * math.sin(tilt), 9.81 * math.cos(tilt)
-    return Ideal((x, z, x, z), [math.pi / 2.0 + gimbal, math.pi / 2.0 - gimbal], rate)
+    return Ideal((x, z, x, z), [math.pi / 2.0 + gimbal, math.pi / 2.0 - gimbal], rate, rate)
 
 
 def controller(observer: Any, law: Law | None = None, **options: Any) -> Controller:
@@ -295,7 +295,7 @@ def test_measurements_are_tilt_and_half_the_difference_of_the_gimbals() -> None:
     ):
         assert tick.y1 == pytest.approx(tilt, abs=1e-14)
         assert tick.y2 == pytest.approx(gimbal, abs=1e-14)
-    lopsided = Ideal(READINGS[0].accelerations, [math.pi / 2.0 + 0.3, math.pi / 2.0 - 0.1], 0.0)
+    lopsided = Ideal(READINGS[0].accelerations, [math.pi / 2.0 + 0.3, math.pi / 2.0 - 0.1], 0.0, 0.0)
     assert ticks(controller(Script(ESTIMATES.__getitem__)), [lopsided])[0].y2 == pytest.approx(0.2)
 
 

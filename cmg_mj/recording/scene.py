@@ -109,8 +109,10 @@ def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def extent(plant: Plant) -> tuple[np.ndarray, float]:
     """Centre, (3,) [m], and radius [m] of all that is drawn of the rig in its initial pose, floor apart."""
-    model = plant.model
-    data = plant.new_data()
+    model = plant.drawn_model
+    data = mujoco.MjData(model)
+    data.qpos[:] = plant.new_data().qpos
+    mujoco.mj_forward(model, data)
     drawn = [i for i in range(model.ngeom) if _is_drawn(model.geom_group[i], _rgba(model, i)) and model.geom_bodyid[i]]
     if not drawn:
         return data.subtree_com[0].copy(), float(model.stat.extent)
@@ -138,7 +140,7 @@ def _slowed_path(branch: str, plant: Plant, cube: Cube) -> str:
 
 def _log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant) -> None:
     """One static entity a geom and a site, under its body."""
-    model = plant.model
+    model = plant.drawn_model
     parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
     for cube in plant.cubes:
         parents[int(model.jnt_bodyid[cube.flywheel])] = _slowed_path(branch, plant, cube)
@@ -267,7 +269,7 @@ def _log_push(rec: rr.RecordingStream, branch: str, plant: Plant, pushes: Sequen
 
 def _edge(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     """The frame's upper edge on the radial line, and where a positive torque moves it, both in the frame's axes."""
-    model = plant.model
+    model = plant.drawn_model
     axis, anchor = model.jnt_axis[plant.tilt], model.jnt_pos[plant.tilt]
     site = model.site_pos[model.sensor("accelerometer_outer").objid[0]] - anchor
     radial = site - axis * (axis @ site)

@@ -11,6 +11,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.grid import common_period
 from cmg_mj.observers import Observer
 from cmg_mj.replay import replay
 from cmg_mj.schema import ObserverSettings, Scenario
@@ -97,8 +98,8 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     if noise_ug_rthz is not None:
         accelerometer = dataclasses.replace(sensors.accelerometer, noise_density_ug_rthz=noise_ug_rthz)
         sensors = dataclasses.replace(sensors, accelerometer=accelerometer)
-    timestep = scenario.plant.timestep_s
-    duration = math.ceil(window_of(scenario)[1] / timestep - 1e-9) * timestep
+    period = scenario.plant.timestep_s or common_period(scenario)
+    duration = math.ceil(window_of(scenario)[1] / period - 1e-9) * period
     feedback = "fog" if scenario.controller.feedback == "observer" else scenario.controller.feedback
     loop = {"feedback": feedback, "trim_s": 0.0}
     return scenario.model_copy(

@@ -48,7 +48,7 @@ def record_motion(noise_ug: float, worlds: int, seed: int) -> Motion:
     experiment = prepare(load_scenario("observer_tuning", settings))
     noisy = experiment.run_many(worlds).trajectory
     assert noisy is not None
-    late = noisy["x1_rad"] - experiment.plant.settings.timestep_s * noisy["x2_rad_s"]
+    late = noisy["x1_rad"] - experiment.plant.timestep * noisy["x2_rad_s"]
     return Motion(experiment, noisy, Trajectory({**noisy.columns, "y1_rad": late}))
 
 
