@@ -102,7 +102,7 @@ class ControlCallback:
             _tick(self.plant, self.controller, data, lambda: self._sense(data))
 
     def _sense(self, data: mujoco.MjData) -> np.ndarray:
-        """Sensordata at the present state, with the commands that hold there: MuJoCo is in the middle of its own pass."""
+        """Sensordata at the present state and commands, by a pass of its own: MuJoCo is in the middle of one."""
         model = self.plant.model
         mujoco.mj_copyState(model, data, self._scratch, int(mujoco.mjtState.mjSTATE_INTEGRATION))
         with control_callback(None):

@@ -30,7 +30,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
     """
     law = design.law
     settings = scenario.plant
-    timestep = physics_step(scenario, rig.own_timestep)
+    timestep = physics_step(scenario, rig.largest_step)
     fields = resolved(scenario, design, rig.path, timestep)
     steps = f"{round(scenario.duration_s / timestep)} physics steps of {timestep:g} s"
     poles = closed_loop_poles(rig.reduced, law.gains)

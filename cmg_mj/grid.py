@@ -63,7 +63,7 @@ def fitting_step(settings: PlantSettings, limit_s: float, period_s: float | None
 
     Args:
         settings: The scenario's plant.
-        limit_s: The largest step that is accurate enough [s]: see `largest_step`.
+        limit_s: The largest step that is accurate enough [s]: see `step_limit.py`.
         period_s: The time that whole steps must fill [s]; None if any will do.
 
     Returns:
@@ -76,18 +76,18 @@ def fitting_step(settings: PlantSettings, limit_s: float, period_s: float | None
     return period_s / math.ceil(period_s / limit_s * (1.0 - 1e-9))
 
 
-def physics_step(scenario: Scenario, own_s: float) -> float:
+def physics_step(scenario: Scenario, limit_s: float) -> float:
     """The physics step that a scenario is run with.
 
     Args:
         scenario: The scenario.
-        own_s: The model file's own step [s].
+        limit_s: The largest step that is accurate enough [s]: see `step_limit.py`.
 
     Returns:
         The step [s].
     """
     period = common_period(scenario) if scenario.plant.timestep_s is None else None
-    return fitting_step(scenario.plant, own_s, period)
+    return fitting_step(scenario.plant, limit_s, period)
 
 
 def _rates(scenario: Scenario) -> Iterator[tuple[str, float]]:

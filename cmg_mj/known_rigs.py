@@ -7,6 +7,7 @@ cmg_mj.read_off` writes it anew.
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 from pathlib import Path
@@ -26,13 +27,13 @@ class RigFacts(NamedTuple):
         path: The model's file.
         cubes: Names of its modules.
         reduced: Its reduced model.
-        own_timestep: The file's own physics step [s].
+        largest_step: The largest physics step that is accurate enough [s].
     """
 
     path: Path
     cubes: tuple[str, ...]
     reduced: ReducedModel
-    own_timestep: float
+    largest_step: float
 
 
 def name_of(model: str, *, locked: bool) -> str:
@@ -48,6 +49,12 @@ def hash_of_models() -> str:
     return digest.hexdigest()
 
 
+def _moves_otherwise(settings: PlantSettings) -> bool:
+    """Whether a setting changes how large the physics step may be."""
+    changed = {name for name, value in dataclasses.asdict(settings).items() if value != getattr(PlantSettings, name)}
+    return bool(changed - {"model", "equilibrium_bias_deg", "initial_tilt_deg", "lock_thrust_bearing"})
+
+
 def known_rig(settings: PlantSettings) -> RigFacts | None:
     """What is known of a scenario's rig without loading it.
 
@@ -55,12 +62,14 @@ def known_rig(settings: PlantSettings) -> RigFacts | None:
         settings: The scenario's plant.
 
     Returns:
-        The facts, if the rig is a bundled one whose files are as they were read; otherwise None.
+        The facts, if the rig is a bundled one, its files are as they were read and no setting changes them; else None.
 
     Raises:
         InputError: There is no such file.
     """
     path = find("models", settings.model, ".xml", "plant.model =")
+    if settings.timestep_s is None and _moves_otherwise(settings):
+        return None
     kept = folder("models") / FILE
     # What a linked model includes, MuJoCo looks for beside the link.
     if path.is_symlink() or path.resolve().parent != folder("models").resolve():
@@ -68,7 +77,7 @@ def known_rig(settings: PlantSettings) -> RigFacts | None:
     try:
         known = json.loads(kept.read_text(encoding="utf-8"))
         rig = known["rigs"][name_of(path.name, locked=settings.lock_thrust_bearing)]
-        facts = RigFacts(path, tuple(rig["cubes"]), ReducedModel(**rig["reduced"]), float(rig["timestep_s"]))
+        facts = RigFacts(path, tuple(rig["cubes"]), ReducedModel(**rig["reduced"]), float(rig["largest_step_s"]))
         return facts if known["sha256"] == hash_of_models() else None
     except (OSError, ValueError, LookupError, TypeError):  # not there, or not as `read_off` writes it
         return None

@@ -26,6 +26,7 @@ from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
 from cmg_mj.sensors import Accelerometer, Ideal, Sensors
+from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.variations import vary
 
@@ -69,7 +70,7 @@ class Plant:
         cubes: Addresses of the modules.
         tilt: Address of q_b in qpos and qvel.
         yaw: Address of q_a, or None if the thrust bearing is locked.
-        own_timestep: The model file's own physics step [s].
+        largest_step: The largest physics step that is accurate enough [s].
         tilt_zero: q_b at which the radial line is upright [rad].
         bias: e [rad].
         radial_tilt: The tilt estimate for this rig's accelerometers.
@@ -80,7 +81,7 @@ class Plant:
         self.path = path
         self.bias = math.radians(settings.equilibrium_bias_deg)
         self.model = self._compiled(discard_visual=True)
-        self.own_timestep = float(self.model.opt.timestep)
+        own = float(self.model.opt.timestep)
         self._resolve()
         self.reduced = self._read_reduced()
         vary(
@@ -90,8 +91,9 @@ class Plant:
             tilt=self.tilt,
             gimbals=self._gimbals,
             flywheels=[cube.flywheel for cube in self.cubes],
-            timestep_s=fitting_step(settings, self.own_timestep, period_s),
         )
+        self.largest_step = largest_step(self.model, self.key, own)
+        self.model.opt.timestep = fitting_step(settings, self.largest_step, period_s)
 
     def _compiled(self, *, discard_visual: bool) -> mujoco.MjModel:
         spec = parse(self.path)
@@ -270,7 +272,7 @@ class Plant:
     @property
     def facts(self) -> RigFacts:
         """What a scenario's controller and observers are made from."""
-        return RigFacts(self.path, tuple(cube.name for cube in self.cubes), self.reduced, self.own_timestep)
+        return RigFacts(self.path, tuple(cube.name for cube in self.cubes), self.reduced, self.largest_step)
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
         """What an observer of the bias should find: e less the tilt that the accelerometers' own bias makes.
@@ -343,7 +345,7 @@ def load_plant(
     Args:
         settings: Its settings; or give them as keyword arguments.
         beside: A folder that a relative model path may start from.
-        period_s: If the settings leave the physics step open: what whole steps must fill, such as the control period [s].
+        period_s: Where the settings leave the physics step open, what whole steps must fill, say a control period [s].
         **fields: Fields of `PlantSettings`.
 
     Returns:

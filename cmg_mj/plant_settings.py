@@ -20,8 +20,8 @@ class PlantSettings:
         model: A bundled MJCF by name, or a path.
         equilibrium_bias_deg: e: the centre of mass of all that tilts is turned about the pivot by this angle [deg].
         initial_tilt_deg: x1(0), from the true equilibrium [deg].
-        timestep_s: Physics step [s]; left out, the largest that divides the control's and the sensors' periods, meets the
-            pushes' edges and is no larger than the model file's own (`<option timestep>`).
+        timestep_s: Physics step [s]; left out, the largest that divides the control's and the sensors' periods, meets
+            the pushes' edges, follows the rig's fastest motion (`step_limit.py`) and is not above the model file's own.
         integrator: MuJoCo's integrator. Fast flywheels need RK4.
         lock_thrust_bearing: Take the yaw joint out.
         gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].

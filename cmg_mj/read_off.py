@@ -26,7 +26,7 @@ def read_off() -> dict[str, Any]:
             cubes = [cube.name for cube in plant.cubes]
             rigs[name_of(name, locked=locked)] = {
                 "cubes": cubes,
-                "timestep_s": plant.own_timestep,
+                "largest_step_s": plant.largest_step,
                 "reduced": dataclasses.asdict(plant.reduced),
             }
     return {"sha256": hash_of_models(), "rigs": rigs}

@@ -14,6 +14,7 @@ import tomli_w
 from pydantic import TypeAdapter
 
 from cmg_mj.design import Design
+from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.resources import folder
 from cmg_mj.schema import ControllerSettings, Scenario
 
@@ -33,7 +34,10 @@ def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float)
     fields = TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
     path = model.resolve()
     fields["plant"]["model"] = path.name if path.parent == folder("models").resolve() else str(path)
-    fields["plant"]["timestep_s"] = timestep_s
+    plant = fields["plant"] | {"timestep_s": timestep_s}
+    fields["plant"] = {
+        field.name: plant[field.name] for field in dataclasses.fields(PlantSettings) if field.name in plant
+    }
     controller = fields["controller"] | {"gains": list(design.law.gains), "lqr": None}
     fields["controller"] = {
         name: controller[name] for name in ControllerSettings.model_fields if controller[name] is not None

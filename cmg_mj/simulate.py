@@ -25,6 +25,9 @@ from cmg_mj.timing import whole_steps
 from cmg_mj.trajectory import Trajectory
 from cmg_mj.worlds import ManyWorlds, OneWorld
 
+A_TURN = 2.0 * math.pi
+"""No rig that stood at the last look lies a whole turn farther at the next one: its numbers have gone [rad]."""
+
 Driver = Literal["native", "callback"]
 
 
@@ -259,7 +262,7 @@ def _stop_blind(worlds: ManyWorlds, tick: Tick, ends: list[Outcome | None], time
 
 
 def _fallen(lean: float, time: float) -> Outcome:
-    if np.isfinite(lean):
+    if abs(lean) < A_TURN:
         return Outcome("fell", time)
     return Outcome(
         "stopped",

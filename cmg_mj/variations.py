@@ -30,7 +30,6 @@ def vary(
     tilt: int,
     gimbals: Sequence[int],
     flywheels: Sequence[int],
-    timestep_s: float,
 ) -> None:
     """Change a compiled model as its settings say.
 
@@ -41,12 +40,10 @@ def vary(
         tilt: The tilt joint.
         gimbals: The gimbals' joints.
         flywheels: The flywheels' joints.
-        timestep_s: The physics step [s].
 
     Raises:
         InputError: The body that tilts has no mass of its own to move.
     """
-    model.opt.timestep = timestep_s
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)

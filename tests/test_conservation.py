@@ -101,7 +101,7 @@ def test_drifts_shrink_with_the_fourth_power_of_the_step(gravity: bool) -> None:
 # --- the balance of work ------------------------------------------------------------------------------------
 
 CONTROL_PERIOD_S = 5e-3
-STEPS = 5  # physics steps of PlantSettings' 1 ms a control period
+STEPS = 5  # physics steps of 1 ms a control period
 NEWTON_COTES = np.array([19.0, 75.0, 50.0, 50.0, 75.0, 19.0]) / 288.0  # on six points, of order six
 
 
@@ -177,7 +177,9 @@ def work_balance(settings: PlantSettings, duration_s: float, seed: int) -> Balan
 
 
 def test_energy_changes_by_the_work_of_motors_and_viscous_friction() -> None:
-    viscous = PlantSettings(equilibrium_bias_deg=0.0, tilt_damping_n_m_s=0.05, gimbal_damping_n_m_s=0.02)
+    viscous = PlantSettings(
+        equilibrium_bias_deg=0.0, timestep_s=1e-3, tilt_damping_n_m_s=0.05, gimbal_damping_n_m_s=0.02
+    )
     balance = work_balance(viscous, duration_s=5.0, seed=0)
     print(f"viscous friction: {balance}")
     assert balance.torque_used < 1.0  # no kinks from saturation, and a quadrature of full order
@@ -190,7 +192,7 @@ def test_dry_friction_takes_about_what_coulomb_says() -> None:
 
     The balance is therefore only as good as the model of friction: its error is stated, not made small.
     """
-    dry = PlantSettings(equilibrium_bias_deg=0.0, tilt_friction_n_m=0.05, gimbal_friction_n_m=0.05)
+    dry = PlantSettings(equilibrium_bias_deg=0.0, timestep_s=1e-3, tilt_friction_n_m=0.05, gimbal_friction_n_m=0.05)
     balance = work_balance(dry, duration_s=5.0, seed=0)
     print(f"dry friction: {balance}")
     assert balance.lost_j > 0.5

@@ -126,7 +126,7 @@ def test_everything_promised_is_there(path: Path, experiment: Experiment) -> Non
     promised = {"/summary", "/scenario", *(f"/homogeneous/{entity}" for entity in below)}
     assert promised <= entities(path)
     geoms = [name for name in entities(path) if name.startswith("/homogeneous/rig/")]
-    model = experiment.plant.model
+    model = experiment.plant.drawn_model
     # Every geom and site, every moving body, and besides: two slowed flywheels, one push.
     assert len(geoms) == model.ngeom + model.nsite + (model.nbody - 1) + 2 + 1
 
@@ -226,7 +226,7 @@ def pose(path: Path, entity: str, k: int) -> tuple[float, np.ndarray, np.ndarray
 
 @pytest.mark.parametrize("k", [0, 7, 25, -1])
 def test_bodies_stand_where_kinematics_puts_them(path: Path, run: Run, experiment: Experiment, k: int) -> None:
-    model = experiment.plant.model
+    model = experiment.plant.drawn_model
     data = mujoco.MjData(model)
     for body in range(1, model.nbody):
         name = model.body(body).name.replace("/", ".")
@@ -261,7 +261,7 @@ def test_flywheels_are_drawn_slowed(path: Path, run: Run, experiment: Experiment
 
 
 def test_shapes_span_what_mujoco_draws(path: Path, experiment: Experiment) -> None:
-    model = experiment.plant.model
+    model = experiment.plant.drawn_model
     frame = "/homogeneous/rig/frame"
     for name in ("cube1/edge_y_pp", "cube2/edge_x_nn"):
         geom = model.geom(name)

@@ -134,7 +134,9 @@ def test_comparing_keeps_the_parameters_of_the_scenarios_own() -> None:
 
 
 def test_what_does_not_fit_names_the_file_whenever_it_is_found() -> None:
-    scenario = load_scenario(write("[controller]\nrate_hz = 300"), ["seed=1"]).with_observer("ltv")
+    scenario = load_scenario(write("plant.timestep_s = 0.001\n[controller]\nrate_hz = 300"), ["seed=1"]).with_observer(
+        "ltv"
+    )
     with pytest.raises(InputError, match=r"^my\.toml with --set seed=1: controller\.rate_hz = 300 Hz: not a whole"):
         prepare(scenario)
 

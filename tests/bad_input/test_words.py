@@ -59,6 +59,6 @@ def test_a_scenario_in_python_takes_numpys_numbers(value: Any) -> None:
 
 def test_a_scenario_in_python_is_checked_alike() -> None:
     with pytest.raises(InputError, match=r"^controller\.rate_hz = 300 Hz: not a whole number"):
-        prepare(parse_scenario({"controller": {"rate_hz": 300.0}}))
+        prepare(parse_scenario({"plant": {"timestep_s": 0.001}, "controller": {"rate_hz": 300.0}}))
     with pytest.raises(InputError, match=r"^here: seed = '1': must be a whole number"):
         parse_scenario({"seed": "1"}, "here")

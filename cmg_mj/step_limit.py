@@ -1,0 +1,64 @@
+"""How large a physics step of a rig may be."""
+
+from __future__ import annotations
+
+import copy
+
+import mujoco
+import numpy as np
+
+RK4_LIMIT = 1.5
+"""Physics step times the rig's fastest rate: with RK4 the figures of a summary are then within 0.2 % of their limit.
+
+RK4 is stable up to 2.8. `docs/studies/steps.py` prints the table.
+"""
+OTHERS_LIMIT_S = 0.001
+"""Of MuJoCo's other integrators none is as accurate at any step that costs less [s]."""
+
+
+def largest_step(model: mujoco.MjModel, key: int, own_s: float) -> float:
+    """The largest physics step that is accurate enough for a rig [s].
+
+    Args:
+        model: The compiled model, hinges only, with its friction and its integrator.
+        key: The keyframe at which it is judged.
+        own_s: The model file's own step [s], which is never exceeded: it knows about contacts, say.
+
+    Returns:
+        The step [s].
+    """
+    if int(model.opt.integrator) != int(mujoco.mjtIntegrator.mjINT_RK4):
+        return min(own_s, OTHERS_LIMIT_S)
+    return min(own_s, RK4_LIMIT / max(fastest_rate(model, key), RK4_LIMIT / own_s))
+
+
+def fastest_rate(model: mujoco.MjModel, key: int) -> float:
+    """The largest modulus of a pole of a rig without dry friction, linearised at a keyframe by central differences.
+
+    Args:
+        model: The compiled model, hinges only.
+        key: The keyframe.
+
+    Returns:
+        The rate [1/s]; 0 where the model has no finite accelerations, which is found elsewhere.
+    """
+    smooth = copy.copy(model)
+    smooth.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+    data = mujoco.MjData(smooth)
+    nv = smooth.nv
+
+    def slope(state: np.ndarray) -> np.ndarray:
+        mujoco.mj_resetDataKeyframe(smooth, data, key)
+        data.qpos[:], data.qvel[:], data.act[:] = state[:nv], state[nv : 2 * nv], state[2 * nv :]
+        mujoco.mj_forward(smooth, data)
+        return np.concatenate([data.qvel, data.qacc, data.act_dot])
+
+    at = np.concatenate([smooth.key_qpos[key], smooth.key_qvel[key], smooth.key_act[key]])
+    columns = []
+    for direction in np.eye(len(at)):
+        h = 1e-5 * max(1.0, float(np.abs(at @ direction)))
+        columns.append((slope(at + h * direction) - slope(at - h * direction)) / (2.0 * h))
+    jacobian = np.array(columns).T
+    if not np.isfinite(jacobian).all():
+        return 0.0
+    return float(np.abs(np.linalg.eigvals(jacobian)).max())
