@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import statistics
 import time
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,11 +18,12 @@ from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.scenario import parse_scenario
 from cmg_mj.schema import Scenario
+from cmg_mj.simulate import Result
 
 CONTROL_RATES_HZ = (200.0, 1000.0)
 REPEATS = 7
-ONE_WORLD_S = 3.0
-MANY_WORLDS_S = 0.5
+ONE_WORLD_S = 6.0
+MANY_WORLDS_S = 1.0
 UPDATES = 400
 """So many updates of an observer are timed at once, along a recorded run."""
 
@@ -50,6 +51,7 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
         for observer, rate in cases
     ]
     rows = []
+    load = _load()
     for i, ((observer, rate), (one, many)) in enumerate(zip(cases, experiments, strict=True)):
         single = [(_bare_one(one), _closed_one(one)) for _ in range(REPEATS)]
         on_progress((i + 0.5) / len(cases))
@@ -60,37 +62,49 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
             {
                 "observer": observer,
                 "control_rate_hz": rate,
-                "bare_step_us": statistics.median(bare for bare, _ in single),
-                "closed_loop_step_us": statistics.median(closed for _, closed in single),
-                "closed_loop_over_bare": statistics.median(closed / bare for bare, closed in single),
-                "batch_world_step_us": statistics.median(bare for bare, _ in batch),
-                "closed_loop_batch_world_step_us": statistics.median(closed for _, closed in batch),
-                "closed_loop_share_of_batch": statistics.median(bare / closed for bare, closed in batch),
+                "timestep_ms": 1e3 * one.plant.timestep,
+                "bare_ms": _median_ms(bare.wall for bare, _ in single),
+                "closed_loop_ms": _median_ms(closed.wall for _, closed in single),
+                "closed_loop_over_bare": statistics.median(closed.wall / bare.wall for bare, closed in single),
+                "batch_ms": _median_ms(bare.wall for bare, _ in batch),
+                "closed_loop_batch_ms": _median_ms(closed.wall for _, closed in batch),
+                "closed_loop_share_of_batch": statistics.median(bare.wall / closed.wall for bare, closed in batch),
+                "closed_loop_batch_cpu_ms": _median_ms(closed.cpu for _, closed in batch),
                 "update_us": on_floats,
                 "update_of_batch_us": on_arrays,
             }
         )
-    return {"worlds": worlds, "processors": os.cpu_count(), "mujoco": mujoco.__version__, "figures": rows}
+    return {
+        "worlds": worlds,
+        "processors": os.cpu_count(),
+        "load_before": load,
+        "mujoco": mujoco.__version__,
+        "figures": rows,
+    }
 
 
 def bench_table(figures: dict[str, Any]) -> Table:
     """The table that `cmg-mj bench` prints."""
+    load = figures["load_before"]
+    busy = "" if load is None else f", {load:.1f} processes wanted one before"
     table = Table(
-        title=f"Microseconds, {figures['processors']} processors; sensors at the control rate; ratios: medians of "
-        f"{REPEATS} pairs",
+        title=f"{figures['processors']} processors{busy}; sensors at the control rate; ratios: medians of {REPEATS} pairs; "
+        "bare: MuJoCo alone with the same steps and forward passes",
         box=box.SIMPLE_HEAD,
         title_justify="left",
     )
     worlds = figures["worlds"]
     columns = {
         "control\n[Hz]": ("control_rate_hz", "{:g}"),
-        "a step:\nbare\nmj_step": ("bare_step_us", "{:.2f}"),
-        "\nclosed\nloop": ("closed_loop_step_us", "{:.2f}"),
+        "step\n[ms]": ("timestep_ms", "{:g}"),
+        "1 s of one\nworld [ms]:\nbare": ("bare_ms", "{:.2f}"),
+        "\nclosed\nloop": ("closed_loop_ms", "{:.2f}"),
         "\n\nratio": ("closed_loop_over_bare", "{:.2f}"),
-        f"a world-step:\nBatch of\n{worlds}": ("batch_world_step_us", "{:.2f}"),
-        "\nclosed\nloop ": ("closed_loop_batch_world_step_us", "{:.2f}"),
+        f"1 s of one\nof {worlds} [ms]:\nbare Batch": ("batch_ms", "{:.2f}"),
+        "\nclosed\nloop ": ("closed_loop_batch_ms", "{:.2f}"),
         "\n\nshare": ("closed_loop_share_of_batch", "{:.2f}"),
-        "an update:\none\nworld": ("update_us", "{:.1f}"),
+        "\nof all\nthreads": ("closed_loop_batch_cpu_ms", "{:.2f}"),
+        "an update\n[us]: one\nworld": ("update_us", "{:.1f}"),
         f"\n{worlds}\nworlds": ("update_of_batch_us", "{:.0f}"),
     }
     table.add_column("observer", vertical="bottom")
@@ -99,6 +113,10 @@ def bench_table(figures: dict[str, Any]) -> Table:
     for row in figures["figures"]:
         table.add_row(row["observer"], *(_cell(row[key], pattern) for key, pattern in columns.values()))
     return table
+
+
+def _median_ms(seconds: Iterable[float]) -> float:
+    return 1e3 * statistics.median(seconds)
 
 
 def _cell(value: float | None, pattern: str) -> str:
@@ -115,7 +133,7 @@ def update_us(experiment: Experiment, worlds: int | None) -> float | None:
     Returns:
         The time [us]; None for an observer that raises, or a rig that falls at once.
     """
-    result = experiment.run() if worlds is None else experiment.run_many(worlds)
+    result = _finished(experiment.run() if worlds is None else experiment.run_many(worlds))
     assert result.trajectory is not None
     columns = [result.trajectory[name][:UPDATES] for name in ("y1_rad", "y2_rad", "u_rad_s")]
     if worlds is None:
@@ -165,41 +183,76 @@ def _scenario(observer: str, rate: float, duration_s: float) -> Scenario:
     )
 
 
-def _bare_one(experiment: Experiment) -> float:
-    """Microseconds a step of mj_step alone."""
-    data = experiment.plant.new_data()
-    steps = round(experiment.scenario.duration_s / experiment.plant.model.opt.timestep)
-    start = time.perf_counter()
-    mujoco.mj_step(experiment.plant.model, data, steps)
-    return (time.perf_counter() - start) / steps * 1e6
+class _Cost(NamedTuple):
+    """What a simulated world-second takes [s]."""
+
+    wall: float
+    cpu: float
+    """Processor time of all threads."""
 
 
-def _closed_one(experiment: Experiment) -> float:
-    """Microseconds a step of a whole run, its trajectory and summary included."""
-    start = time.perf_counter()
-    result = experiment.run()
-    return (time.perf_counter() - start) / _steps(experiment, result.seconds) * 1e6
+def _timed(work: Callable[[], float], worlds: int) -> _Cost:
+    """Time work that returns how many seconds it has simulated of so many worlds."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    seconds = work()
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    return _Cost(wall / (seconds * worlds), cpu / (seconds * worlds))
 
 
-def _bare_many(experiment: Experiment, worlds: int) -> float:
-    """Microseconds a world-step of Batch alone, at its best: many steps a call."""
-    model = experiment.plant.model
-    data = experiment.plant.new_data()
+def _bare_one(experiment: Experiment) -> _Cost:
+    """MuJoCo alone on one world: a forward pass where sensors are read, then steps."""
+    model, data = experiment.plant.model, experiment.plant.new_data()
+    looks, steps = _looks(experiment)
+
+    def work() -> float:
+        for _ in range(looks):
+            mujoco.mj_forward(model, data)
+            mujoco.mj_step(model, data, steps)
+        return looks * steps * model.opt.timestep
+
+    return _timed(work, 1)
+
+
+def _bare_many(experiment: Experiment, worlds: int) -> _Cost:
+    """MuJoCo's Batch alone: the same."""
+    model, data = experiment.plant.model, experiment.plant.new_data()
+    looks, steps = _looks(experiment)
     batch = Batch(model, worlds)
     for field in ("qpos", "qvel", "act", "ctrl"):
         batch.bind(field)[:] = getattr(data, field)
-    steps = round(experiment.scenario.duration_s / model.opt.timestep)
-    start = time.perf_counter()
-    batch.step(nstep=steps)
-    return (time.perf_counter() - start) / steps / worlds * 1e6
+
+    def work() -> float:
+        for _ in range(looks):
+            batch.forward()
+            batch.step(nstep=steps)
+        return looks * steps * model.opt.timestep
+
+    return _timed(work, worlds)
 
 
-def _closed_many(experiment: Experiment, worlds: int) -> float:
-    """Microseconds a world-step of a batch run without trajectory."""
-    start = time.perf_counter()
-    result = experiment.run_many(worlds, keep_trajectory=False)
-    return (time.perf_counter() - start) / _steps(experiment, result.seconds) / worlds * 1e6
+def _closed_one(experiment: Experiment) -> _Cost:
+    """A whole run, its trajectory and summary included."""
+    return _timed(lambda: _finished(experiment.run()).seconds, 1)
 
 
-def _steps(experiment: Experiment, seconds: float) -> float:
-    return seconds / experiment.plant.model.opt.timestep
+def _closed_many(experiment: Experiment, worlds: int) -> _Cost:
+    """A batch run without trajectory."""
+    return _timed(lambda: _finished(experiment.run_many(worlds, keep_trajectory=False)).seconds, worlds)
+
+
+def _finished(result: Result) -> Result:
+    """The result, unless Ctrl-C has cut it short: that ends the measurement."""
+    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        raise KeyboardInterrupt
+    return result
+
+
+def _looks(experiment: Experiment) -> tuple[int, int]:
+    """How often a run looks at its sensors, and the physics steps in between."""
+    steps = experiment.controller().beat
+    return round(experiment.scenario.duration_s / (experiment.plant.timestep * steps)), steps
+
+
+def _load() -> float | None:
+    """How many processes wanted a processor in the last minute; None where the system does not say."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None

@@ -57,6 +57,13 @@ def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
     assert json.loads(said.out)["outcome"] == "interrupted"
 
 
+def test_ends_a_measurement_of_speed() -> None:
+    """The run that hears it ends as a result; no other is started."""
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process("bench", "--observers", "pressing:Interrupts", "--worlds", "2", cwd=Path())
+    assert (said.status, said.out, said.err) == (130, "", "cmg-mj: interrupted\n")
+
+
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_what_ends_a_process_from_outside_counts_as_ctrl_c(name: str) -> None:
     write(OBSERVER, "pressing.py")

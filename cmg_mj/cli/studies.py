@@ -21,7 +21,7 @@ from cmg_mj.errors import InputError, nearest
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 @users_code()
 def bench(observers: str, worlds: int, as_json: bool) -> None:
-    """Time the closed loop against bare MuJoCo: microseconds a physics step, and ratios of the same run."""
+    """Time the closed loop against bare MuJoCo doing the same physics, and an update of each observer."""
     from cmg_mj.bench import bench_table, measure
 
     names = names_of(observers)
