@@ -88,8 +88,8 @@ def bench_table(figures: dict[str, Any]) -> Table:
     load = figures["load_before"]
     busy = "" if load is None else f", {load:.1f} processes wanted one before"
     table = Table(
-        title=f"{figures['processors']} processors{busy}; sensors at the control rate; ratios: medians of {REPEATS} pairs; "
-        "bare: MuJoCo alone with the same steps and forward passes",
+        title=f"{figures['processors']} processors{busy}; sensors at the control rate; ratios: medians of {REPEATS} "
+        "pairs; bare: MuJoCo alone with the same steps and forward passes",
         box=box.SIMPLE_HEAD,
         title_justify="left",
     )
