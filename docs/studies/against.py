@@ -1,4 +1,4 @@
-"""This checkout's observers against another checkout's: the same recorded run, the closed loop, the time of an update.
+"""This checkout against another: observers on one recorded run, the closed loop, the time of an update and of a run.
 
     python docs/studies/against.py OTHER_CHECKOUT [--python OTHER_PYTHON] [--worlds 20]
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -49,13 +50,21 @@ np.savez(sys.argv[2], **found)
 """
 
 COMPARE = """
-import json, sys
-import cmg_mj
-from cmg_mj.runs import compare, prepare_comparison
-scenario = cmg_mj.load_scenario("push_recovery")
-compared = compare(prepare_comparison(scenario, list(cmg_mj.OBSERVERS)), int(sys.argv[1]))
-print(json.dumps([entry.summary for entry in compared]))
+import sys
+from cmg_mj.cli import main
+main(["compare", "push_recovery", "--observers", "all", "--worlds", sys.argv[1], "--out", "it", "--json"])
 """
+
+COST = """
+import sys, time
+import cmg_mj
+experiment = cmg_mj.prepare(cmg_mj.load_scenario("push_recovery", observer=sys.argv[1]))
+experiment.run_many(2, keep_trajectory=False)
+start = time.process_time()
+result = experiment.run_many(256, keep_trajectory=False)
+print(1e3 * (time.process_time() - start) / 256 / result.seconds)
+"""
+PAIRS = 3
 
 
 def run(checkout: Path, python: str, code: str, *arguments: object) -> str:
@@ -84,7 +93,7 @@ def largest(a: np.ndarray, b: np.ndarray) -> str:
 
 
 def main() -> None:
-    """Print the two tables."""
+    """Print the three tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("other", type=Path)
     parser.add_argument("--python", default=sys.executable)
@@ -113,7 +122,21 @@ def main() -> None:
         (f"`{old['observer']}`", *("-" if s[key] is None else f"{s[key]:.4f}" for key in keys for s in (old, new)))
         for old, new in zip(means["before"], means["after"], strict=True)
     ]
-    print(table(("observer", *(f"{key} {name}" for key in keys for name in ("before", "after"))), rows))
+    print(table(("observer", *(f"{key} {name}" for key in keys for name in ("before", "after"))), rows), "\n")
+
+    rows = []
+    for kind in ("linear", "homogeneous", "adaptive"):
+        pairs = [[float(run(*at, COST, kind)) for at in checkouts.values()] for _ in range(PAIRS)]
+        ratio = statistics.median(new / old for old, new in pairs)
+        rows.append(
+            (f"`{kind}`", *(f"{statistics.median(times):.2f}" for times in zip(*pairs, strict=True)), f"{ratio:.2f}")
+        )
+    costs = (
+        "processor time of a simulated world-second, 256 worlds [ms]: before",
+        "after",
+        f"ratio, median of {PAIRS} pairs",
+    )
+    print(table(("observer", *costs), rows))
 
 
 if __name__ == "__main__":
