@@ -22,6 +22,7 @@ class Claim:
         place: Where in the paper: `Fig. 2`, `Remark 1`, `Section V`.
         says: What the paper says there, in our words.
         found: What was obtained, with its figures, in words.
+        table: More figures than a sentence bears, as a Markdown table below the words.
         holds: Whether what was obtained bears the paper out, computed from the figures.
         conditions: Under which conditions it holds, a whole sentence; empty if it holds outright.
         otherwise: What to make of it where it does not hold, a whole sentence.
@@ -33,6 +34,7 @@ class Claim:
     place: str
     says: str
     found: str
+    table: str = ""
     holds: bool
     conditions: str = ""
     otherwise: str = "The figures above do not bear it out."

@@ -38,6 +38,7 @@ def _figures_of_claim(claim: Claim) -> dict[str, Any]:
         "place": claim.place,
         "says": claim.says,
         "found": claim.found,
+        "table": claim.table,
         "verdict": claim.verdict,
         "why": claim.why,
         "ours": claim.ours,
@@ -94,6 +95,8 @@ def _parts_of_claim(claim: Claim) -> list[str]:
         f"**{'Ours' if claim.ours else 'The paper'}:** {claim.says}",
         f"**Here:** {claim.found}",
     ]
+    if claim.table:
+        parts.append(claim.table)
     if claim.why:
         parts.append(f"**{'Conditions' if claim.holds else 'Why not'}:** {claim.why}")
     return parts + [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]

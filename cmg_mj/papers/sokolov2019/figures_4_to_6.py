@@ -1,165 +1,178 @@
-"""Figs 4 to 6: the loop closed on (8), (9) and (10)."""
+"""Figs 4 to 6: the loop closed on (8), (9) and (10), without backlash and with that of the servo's datasheet."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
-import numpy as np
-
 from cmg_mj.intervals import known_interval
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.recorded import pushed, trajectory_of
-from cmg_mj.papers.sokolov2019.lag import Lags
+from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
+from cmg_mj.papers.sokolov2019.cycles import WITH_Y2, Cycles
+from cmg_mj.papers.sokolov2019.lag import Lags, in_ms
 from cmg_mj.papers.sokolov2019.loops import (
     LATE_S,
     SHOWN_DEG,
-    SLOW_LAG_S,
     Loops,
     deviation,
-    limited_share,
     main_frequency,
     numbers,
     shown,
+    tail,
 )
-from cmg_mj.papers.sokolov2019.paper import OBSERVERS
-from cmg_mj.papers.sokolov2019.release import LAGS_S
-from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.papers.sokolov2019.pictures_4_to_6 import picture
 
-FIGURES = {"linear": 4, "luenberger": 5, "homogeneous": 6}
+HELD = (
+    f"With {GAP_ARCMIN:g} arcmin of backlash behind the servo's motor, as its datasheet has it, and friction that holds "
+    "the gimbal in the gap. The paper mentions neither."
+)
 
 
-def figure_4(found: Loops, lags: Lags) -> Claim:
+def _setting(found: Loops) -> str:
+    return f"e = {SHOWN_DEG} deg, a push at 1 s, {found.worlds} seeds; standard deviation of the tilt over the last {LATE_S:g} s"
+
+
+def _standing(found: Loops, name: str) -> str:
+    """The tilt's late deviation in both rigs, and what of it the push's tail is, in words."""
+    own, gap = found.by_bias[SHOWN_DEG][name], found.gap[name]
+    return (
+        f"{_setting(found)}: {shown(deviation(own))} deg without backlash, {shown(deviation(gap))} with it. "
+        f"The push's tail is {tail(found.quiet[name]):.3f} deg of it."
+    )
+
+
+def _figures(found: Loops, name: str, cycles: Cycles) -> dict:
+    own, gap, cycle = found.by_bias[SHOWN_DEG][name], found.gap[name], cycles.ends[name]
+    return {
+        "without_backlash": numbers(own),
+        "with_backlash": numbers(gap),
+        "main_frequency_hz": main_frequency(own),
+        "main_frequency_with_backlash_hz": main_frequency(gap),
+        "push_tail_deg": tail(found.quiet[name]),
+        "cycle_amplitude_deg": cycle.amplitude_deg,
+        "cycle_frequency_hz": cycle.frequency_hz,
+        "cycle_is_sustained": cycle.sustained,
+    }
+
+
+def figure_4(found: Loops, lags: Lags, cycles: Cycles) -> Claim:
     """(8): sustained oscillations."""
-    own, slow = found.by_bias[SHOWN_DEG]["linear"], found.slow["linear"]
-    sweep, begins, prediction = lags.sweeps["linear"], lags.thresholds["linear"].middle, lags.predictions["linear"]
-    by_itself, at_slow = bool(sweep.sustained[0]), sweep.sustained_at(SLOW_LAG_S)
+    by_itself, cycle = bool(lags.sweeps["linear"].sustained[0]), cycles.ends["linear"]
+    begins, prediction = lags.thresholds["linear"].middle, lags.predictions["linear"]
+    own = found.by_bias[SHOWN_DEG]["linear"]
     return Claim(
         place="Fig. 4",
         says="With (8) in the loop the system enters sustained oscillations.",
         found=(
-            f"e = {SHOWN_DEG} deg, {found.worlds} seeds, 95 % intervals, standard deviation of the tilt over the last "
-            f"{LATE_S:g} s: {shown(deviation(own))} deg with the model's servo, most of it at "
-            f"{main_frequency(own):.1f} Hz (the loop's pole: {prediction.frequency_hz:.1f} Hz), "
-            f"{shown(deviation(found.gyro))} deg if the gyro closes the loop. Without noise it "
-            f"{'goes on' if by_itself else 'decays'}. With a servo lag of {1e3 * SLOW_LAG_S:.0f} ms it "
-            f"{'goes on' if at_slow else 'decays'}: {shown(deviation(slow))} deg at "
-            f"{main_frequency(slow):.1f} Hz, a limit cycle: the command is at its limit "
-            f"{limited_share(slow):.0%} of the time, and {slow.fell.mean():.0%} fall."
+            f"Let go without noise it {'oscillates by itself' if by_itself else 'comes to rest'} without backlash; "
+            f"with {GAP_ARCMIN:g} arcmin it {cycle.words}. {_standing(found, 'linear')} Without backlash most of it is "
+            f"at {main_frequency(own):.1f} Hz, where the loop has a badly damped pole "
+            f"({prediction.frequency_hz:.1f} Hz). With the gyro in the law it is {shown(deviation(found.gyro))} deg."
         ),
-        holds=by_itself or at_slow,
+        holds=by_itself or cycle.sustained,
         conditions=(
             ""
-            if by_itself or begins is None
-            else f"It does with a servo lag from {1e3 * begins:.1f} ms; the model's is "
-            f"{1e3 * lags.own_lag_s:.1f} ms, and there noise keeps a badly damped loop ringing, which is no "
-            "oscillation by itself."
+            if by_itself
+            else f"{HELD} Without it noise keeps the loop ringing, which is no oscillation by itself; that takes a servo "
+            f"lag of {in_ms(begins)}, and the model's is {in_ms(lags.own_lag_s)}."
         ),
-        otherwise="It decays at both servo lags.",
-        figures={
-            "models_servo": numbers(own),
-            "slow_servo": numbers(slow),
-            "gyro": numbers(found.gyro),
-            "main_frequency_hz": main_frequency(own),
-            "limited_fraction_slow_servo": limited_share(slow),
-            "main_frequency_slow_servo_hz": main_frequency(slow),
-            "predicted_frequency_hz": prediction.frequency_hz,
-        },
-        pictures=[_picture("linear", found, lags)],
+        otherwise="Without noise it comes to rest, with backlash too.",
+        figures=_figures(found, "linear", cycles)
+        | {"gyro": numbers(found.gyro), "predicted_frequency_hz": prediction.frequency_hz},
+        pictures=[picture("linear", found)],
     )
 
 
-def figure_5(found: Loops, lags: Lags) -> Claim:
-    """(9): much the same, says the paper."""
-    sweep, prediction = lags.sweeps["luenberger"], lags.predictions["luenberger"]
+def figure_5(found: Loops, lags: Lags, cycles: Cycles) -> Claim:
+    """(9): much the same."""
+    by_itself, cycle = bool(lags.sweeps["luenberger"].sustained[0]), cycles.ends["luenberger"]
     falls = {e: float(by_name["luenberger"].fell.mean()) for e, by_name in found.by_bias.items()}
     fallen = ", ".join(f"{share:.0%} at e = {e:g} deg" for e, share in falls.items())
-    own, linear = (found.by_bias[SHOWN_DEG][name] for name in ("luenberger", "linear"))
-    needed = prediction.servo_lag_s
+    prediction = lags.predictions["luenberger"]
     return Claim(
         place="Fig. 5",
-        says="With (9) in the loop the system oscillates much as with (8), because the linearisation does not fit.",
+        says="With (9) in the loop the system oscillates, much as with (8).",
         found=(
-            f"Released without noise it oscillates by itself at {sweep.sustained.sum()} of the {len(sweep.lags_s)} "
-            f"servo lags tried, up to {1e3 * LAGS_S[-1]:.0f} ms. With noise and "
-            f"the push, {found.worlds} seeds, it falls in {fallen}. Where it stands, at e = {SHOWN_DEG} deg, "
-            f"the tilt's standard deviation over the last {LATE_S:g} s is {shown(deviation(own))} deg, (8)'s "
-            f"{shown(deviation(linear))} deg, and the main frequency {main_frequency(own):.1f} Hz."
+            f"Let go without noise it {'oscillates by itself' if by_itself else 'comes to rest'} without backlash; "
+            f"with {GAP_ARCMIN:g} arcmin it {cycle.words}, (8) {cycles.ends['linear'].words}. "
+            f"{_standing(found, 'luenberger')} Without backlash it falls in {fallen}."
         ),
-        holds=bool(sweep.sustained[0]) or sweep.sustained_at(SLOW_LAG_S),
+        holds=by_itself or cycle.sustained,
+        conditions=(
+            ""
+            if by_itself
+            else f"{HELD} Without it the loop is well damped (damping ratio {prediction.damping:.2f}) and misses the push: "
+            "it falls, if the bias adds to that."
+        ),
+        otherwise="Without noise it comes to rest, with backlash too.",
+        figures=_figures(found, "luenberger", cycles)
+        | {"fell_fraction": {f"{e:g}_deg": share for e, share in falls.items()}, "damping_ratio": prediction.damping},
+        pictures=[picture("luenberger", found)],
+    )
+
+
+def cause_of_figure_5(cycles: Cycles) -> Claim:
+    """What Section V puts the oscillation with (9) down to."""
+    own, with_y2 = cycles.ends["luenberger"], cycles.ends[WITH_Y2]
+    linear = {name: cycles.foreseen[name] for name in ("linear", "luenberger")}
+    foreseen = " and ".join(
+        "none" if cycle is None else f"{cycle.amplitude_deg:.2f} deg at {cycle.frequency_hz:.1f} Hz"
+        for cycle in linear.values()
+    )
+    return Claim(
+        place="Section V, the cause of Fig. 5",
+        says="(9) makes the system oscillate because the linearisation does not fit its behaviour.",
+        found=(
+            f"With backlash the loop {own.words}. With gravity, J2 and y2 in (9) as in the nonlinear model it "
+            f"{with_y2.words}. The linear loop with a gap, for which the linearisation is exact, has by its describing "
+            f"function cycles of {foreseen} with (8) and (9)."
+        ),
+        holds=own.sustained and with_y2.amplitude_deg < 0.5 * own.amplitude_deg,
         otherwise=(
-            f"Its loop is well damped (damping ratio {prediction.damping:.2f}): to oscillate it would need a servo lag "
-            f"of {'more than 120 ms' if needed is None else f'{1e3 * needed:.0f} ms'}, by the linearised loop. What it "
-            "does instead is miss the push and fall, if the bias adds to it."
+            "The terms that the linearisation leaves out change next to nothing. The gap makes the oscillation, and "
+            "would do so in a linear system."
         ),
         figures={
-            "models_servo": numbers(own),
-            "slow_servo": numbers(found.slow["luenberger"]),
-            "fell_fraction": {f"{e:g}_deg": share for e, share in falls.items()},
-            "damping_ratio": prediction.damping,
-            "main_frequency_hz": main_frequency(own),
+            "cycle_amplitude_deg": own.amplitude_deg,
+            "cycle_amplitude_with_nonlinear_terms_deg": with_y2.amplitude_deg,
+            "foreseen_amplitude_deg": {name: cycle and cycle.amplitude_deg for name, cycle in linear.items()},
+            "foreseen_frequency_hz": {name: cycle and cycle.frequency_hz for name, cycle in linear.items()},
         },
-        pictures=[_picture("luenberger", found, lags)],
     )
 
 
-def figure_6(found: Loops, lags: Lags) -> Claim:
-    """(10): stabilised, without oscillation."""
-    own, slow = found.by_bias[SHOWN_DEG]["homogeneous"], found.slow["homogeneous"]
-    sweep = lags.sweeps["homogeneous"]
-    quiet = not (sweep.sustained[0] or sweep.sustained_at(SLOW_LAG_S))
-    falls = max(float(by_name["homogeneous"].fell.mean()) for by_name in found.everywhere.values())
-    error, error_slow = (known_interval(result.values("velocity_rms_error_rad_s")) for result in (own, slow))
+def figure_6(found: Loops, cycles: Cycles) -> Claim:
+    """(10): stabilised."""
+    falls = {where: float(by_name["homogeneous"].fell.mean()) for where, by_name in found.everywhere.items()}
+    error = known_interval(found.by_bias[SHOWN_DEG]["homogeneous"].values("velocity_rms_error_rad_s"))
     return Claim(
         place="Fig. 6",
-        says="With (10) in the loop the system is stabilised, without the oscillations of Figs 4 and 5.",
+        says="With (10) in the loop the system is stabilised.",
         found=(
-            f"Released without noise it {'comes to rest' if quiet else 'does not come to rest'}, with the model's "
-            f"servo and with one of {1e3 * SLOW_LAG_S:.0f} ms; with noise and the push it falls in at most {falls:.0%} "
-            f"of {found.worlds} seeds at e = {', '.join(f'{e:g}' for e in found.by_bias)} deg. At e = {SHOWN_DEG} deg "
-            f"the tilt's standard deviation over the last {LATE_S:g} s is {shown(deviation(own))} deg, with "
-            f"the slow servo {shown(deviation(slow))} deg; velocity RMS error "
-            f"{shown(error)} and {shown(error_slow)} rad/s."
+            f"With noise and the push it falls in at most {max(falls.values()):.0%} of {found.worlds} seeds at "
+            f"{', '.join(falls)}. {_standing(found, 'homogeneous')} The velocity RMS error is {shown(error)} rad/s."
         ),
-        holds=quiet and falls == 0.0,
-        otherwise="It oscillates or falls.",
-        figures={"models_servo": numbers(own), "slow_servo": numbers(slow), "largest_fell_fraction": falls},
-        pictures=[_picture("homogeneous", found, lags)],
+        holds=max(falls.values()) == 0.0,
+        otherwise="It falls.",
+        figures=_figures(found, "homogeneous", cycles) | {"largest_fell_fraction": max(falls.values())},
+        pictures=[picture("homogeneous", found)],
     )
 
 
-def _picture(name: str, found: Loops, lags: Lags) -> Picture:
-    """World 0 with the model's servo and with the slow one, side by side on the same scales."""
-    runs = {
-        f"the model's servo, {1e3 * lags.own_lag_s:.1f} ms": found.by_bias[SHOWN_DEG][name],
-        f"a servo lag of {1e3 * SLOW_LAG_S:.0f} ms": found.slow[name],
-    }
-    worlds = {title: trajectory_of(result).world(0) for title, result in runs.items()}
-    rows: list[list[Panel]] = [[], [], []]
-    for title, one in worlds.items():
-        t = one["time_s"]
-        signals = [
-            ("tilt y1 [deg]", [Line(t, np.degrees(one["y1_rad"]), "y1", color=7, width=0.7)]),
-            ("command u [rad/s]", [Line(t, one["u_rad_s"], "u", color=3, width=0.7)]),
-            (
-                "tilt rate [rad/s]",
-                [
-                    Line(t, one[f"estimate/{name}/x2_rad_s"], f"{OBSERVERS[name]} {name}", color=1, width=0.7),
-                    Line(t, one["x2_rad_s"], "true rate", color=0, width=1.0),
-                ],
-            ),
-        ]
-        for row, (label, lines) in zip(rows, signals, strict=True):
-            row.append(Panel(label, lines, title if row is rows[0] else "", shaded=pushed(one)))
-    panels = [panel for row in rows for panel in _on_one_scale(row)]
-    number = FIGURES[name]
-    title = f"sokolov2019, Fig. {number}: {OBSERVERS[name]} in the loop, a push at 1 s (e = {SHOWN_DEG} deg)"
-    return Picture(f"sokolov2019-fig-{number}", title, panels, columns=2)
-
-
-def _on_one_scale(row: Sequence[Panel]) -> list[Panel]:
-    """Room for all that the panels show, so that they compare."""
-    values = np.concatenate([line.y for panel in row for line in panel.lines])
-    low, high = float(values.min()), float(values.max())
-    room = 0.05 * (high - low)
-    return [replace(panel, y_range=(low - room, high + room)) for panel in row]
+def figure_6_at_rest(lags: Lags, cycles: Cycles) -> Claim:
+    """(10): without the oscillations of the others, on the rig on which they have them."""
+    eight, nine, ten = (cycles.ends[name] for name in ("linear", "luenberger", "homogeneous"))
+    compared = f"{ten.amplitude_deg / eight.amplitude_deg:.2f} and {ten.amplitude_deg / nine.amplitude_deg:.2f} times"
+    slow = lags.sweeps["homogeneous"].sustained
+    return Claim(
+        place="Fig. 6, beside Figs 4 and 5",
+        says="With (10) in the loop the oscillations of Figs 4 and 5 are not there.",
+        found=(
+            f"Let go without noise, with backlash: (8) {eight.words}, (9) {nine.words}, (10) {ten.words}. "
+            f"Without backlash (10) comes to rest at {len(slow) - slow.sum()} of {len(slow)} servo lags up to "
+            f"{in_ms(float(lags.sweeps['homogeneous'].lags_s[-1]))}."
+        ),
+        holds=(eight.sustained or nine.sustained) and not ten.sustained,
+        otherwise=(
+            f"What makes (8) and (9) oscillate makes (10) oscillate as well, though only {compared} as far. A slow servo "
+            "makes (8) oscillate and not (10), but not (9) either."
+        ),
+        figures={f"cycle_amplitude_{name}_deg": cycle.amplitude_deg for name, cycle in cycles.ends.items()},
+    )

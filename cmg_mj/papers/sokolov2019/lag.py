@@ -51,7 +51,7 @@ class Predicted(NamedTuple):
 
 
 Loop = Callable[..., np.ndarray]
-"""(servo, age_steps=1) -> the map of a control period."""
+"""(servo, age_steps=1, share=1.0) -> the map of a control period."""
 
 _rig = cache(experiment)
 
@@ -70,8 +70,9 @@ def linearised(observer: str | None, **parameters: float) -> tuple[Loop, Servo, 
     plant, law = prepared.plant, prepared.law
     o = None if observer is None else estimator(observer, prepared, **parameters)
 
-    def loop(servo: Servo, age_steps: int = 1) -> np.ndarray:
-        return period_map(plant.reduced, servo, o, law, timestep=plant.model.opt.timestep, age_steps=age_steps)
+    def loop(servo: Servo, age_steps: int = 1, share: complex = 1.0) -> np.ndarray:
+        step = plant.model.opt.timestep
+        return period_map(plant.reduced, servo, o, law, timestep=step, age_steps=age_steps, share=share)
 
     return loop, servo_of(plant), law.dt
 
@@ -129,7 +130,8 @@ def lags(on_share: OnShare) -> Lags:
     return Lags(sweeps, thresholds, latencies, predictions, largest_tau(), float(sweeps["linear"].lags_s[0]))
 
 
-def _ms(seconds: float | None, otherwise: str = "none") -> str:
+def in_ms(seconds: float | None, otherwise: str = "none") -> str:
+    """A time in words."""
     return otherwise if seconds is None else f"{1e3 * seconds:.1f} ms"
 
 
@@ -139,8 +141,8 @@ def claim(found: Lags) -> Claim:
     linear, luenberger, truth = (found.predictions[name] for name in ("linear", "luenberger", "truth"))
     begins, others = lag["linear"], min(lag[name].low for name in ("luenberger", "homogeneous"))
     listed = "; ".join(
-        f"{equation} servo lag {_ms(lag[name].middle, f'none up to {1e3 * LAGS_S[-1]:.0f} ms')}, latency "
-        f"{_ms(latency[name].high, f'none up to {LARGEST_LATENCY_STEPS} ms')}"
+        f"{equation} servo lag {in_ms(lag[name].middle, f'none up to {1e3 * LAGS_S[-1]:.0f} ms')}, latency "
+        f"{in_ms(latency[name].high, f'none up to {LARGEST_LATENCY_STEPS} ms')}"
         for name, equation in OBSERVERS.items()
     )
     return Claim(
@@ -148,19 +150,19 @@ def claim(found: Lags) -> Claim:
         says="Finite differences lag, and the lag brings the loop into sustained oscillations.",
         found=(
             f"Released without noise, the rig oscillates by itself from these on: {listed}. Eigenvalues of the "
-            f"linearised, sampled loop say: (8) {_ms(linear.servo_lag_s)} and {_ms(linear.latency_s)}, "
-            f"(9) {_ms(luenberger.servo_lag_s)} and {_ms(luenberger.latency_s)}, the true rate in the "
-            f"law {_ms(truth.servo_lag_s)}. With the model's servo ({1e3 * own:.1f} ms) the loop of (8) has "
+            f"linearised, sampled loop say: (8) {in_ms(linear.servo_lag_s)} and {in_ms(linear.latency_s)}, "
+            f"(9) {in_ms(luenberger.servo_lag_s)} and {in_ms(luenberger.latency_s)}, the true rate in the "
+            f"law {in_ms(truth.servo_lag_s)}. With the model's servo ({1e3 * own:.1f} ms) the loop of (8) has "
             f"poles {linear.pole.real:.1f} +- {linear.pole.imag:.1f}j 1/s, a damping ratio of {linear.damping:.2f} at "
-            f"{linear.frequency_hz:.1f} Hz; from tau = {_ms(found.tau)} on it would oscillate as "
+            f"{linear.frequency_hz:.1f} Hz; from tau = {in_ms(found.tau)} on it would oscillate as "
             "it is. A servo that lags because it is soft never does it "
-            f"({_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the flywheel then turns the "
+            f"({in_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the flywheel then turns the "
             "gimbal back, which damps the tilt."
         ),
         holds=begins.high is not None and begins.high < others,
         conditions=(
-            f"It does with a servo lag from {_ms(begins.middle)} or a latency of y1 from "
-            f"{_ms(latency['linear'].high)}; at the model's servo lag of {1e3 * own:.1f} ms the oscillation decays."
+            f"It does with a servo lag from {in_ms(begins.middle)} or a latency of y1 from "
+            f"{in_ms(latency['linear'].high)}; at the model's servo lag of {1e3 * own:.1f} ms the oscillation decays."
             if begins.middle is not None and begins.middle > own
             else ""
         ),

@@ -27,16 +27,16 @@ LARGEST_LATENCY_STEPS = 64
 """The largest latency tried [physics steps]."""
 
 
-def is_sustained(trajectory: Trajectory) -> np.ndarray:
+def is_sustained(trajectory: Trajectory, window_s: float = WINDOW_S) -> np.ndarray:
     """Which worlds of a release oscillate without end, grow or fall, (n_worlds,).
 
-    Sustained: the tilt rate's peak over the last 2 s is at least 98 % of that over the 2 s before, and above 1e-3
+    Sustained: the tilt rate's peak over the last window is at least 98 % of that over the window before, and above 1e-3
     rad/s. A fall counts too.
     """
     t = trajectory["time_s"]
     x2 = np.abs(trajectory["x2_rad_s"].reshape(len(t), -1))
-    middle, end = t[-1] - WINDOW_S, t[-1]
-    before, last = x2[(t > middle - WINDOW_S) & (t <= middle)].max(axis=0), x2[(t > middle) & (t <= end)].max(axis=0)
+    middle, end = t[-1] - window_s, t[-1]
+    before, last = x2[(t > middle - window_s) & (t <= middle)].max(axis=0), x2[(t > middle) & (t <= end)].max(axis=0)
     return ~np.isfinite(x2[-1]) | ((last > FLOOR_RAD_S) & (last >= STEADY * before))
 
 

@@ -71,7 +71,14 @@ def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndar
 
 
 def period_map(
-    model: ReducedModel, servo: Servo, observer: Observer | None, law: Law, *, timestep: float, age_steps: int = 1
+    model: ReducedModel,
+    servo: Servo,
+    observer: Observer | None,
+    law: Law,
+    *,
+    timestep: float,
+    age_steps: int = 1,
+    share: complex = 1.0,
 ) -> np.ndarray:
     """The matrix that takes the loop from one control tick to the next.
 
@@ -82,6 +89,7 @@ def period_map(
         law: The law; its rate limit does not count.
         timestep: Physics step [s].
         age_steps: How old y1 is at a tick [physics steps]; accelerometers show the state one step before.
+        share: What the gimbal's setpoint makes of the commanded rate: 1, or the describing function of a gap.
 
     Returns:
         A square matrix. Its state is that of the rig, the tilts not yet seen, the observer's, x_e and the last u.
@@ -104,7 +112,7 @@ def period_map(
         u, x_e = law(y1, x2, y2, x_e)
         for _ in range(steps):
             seen = np.concatenate([rig[:1], seen])[:age_steps]
-            rig = Phi @ rig + gamma * u
+            rig = Phi @ rig + gamma * (share * u)
         return np.concatenate([rig, seen, inside, [x_e, u]])
 
     return np.column_stack([period(unit) for unit in np.eye(parts[-1] + 2)])

@@ -1,0 +1,39 @@
+"""One scale for what is to be compared across pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cmg_mj.papers.claim import Claim
+from cmg_mj.picture import Panel
+
+ROOM = 0.05
+"""Left above and below, as a share of the range."""
+
+
+def on_common_scales(claims: Sequence[Claim]) -> list[Claim]:
+    """The claims with their pictures redrawn so that all panels of one quantity have the range that all of them need."""
+    panels = [panel for claim in claims for picture in claim.pictures for panel in picture.panels]
+    ranges = {label: _range([panel for panel in panels if panel.y_label == label]) for label in _labels(panels)}
+
+    def scaled(claim: Claim) -> Claim:
+        pictures = [
+            replace(picture, panels=[replace(panel, y_range=ranges[panel.y_label]) for panel in picture.panels])
+            for picture in claim.pictures
+        ]
+        return replace(claim, pictures=pictures)
+
+    return [scaled(claim) for claim in claims]
+
+
+def _labels(panels: Sequence[Panel]) -> set[str]:
+    return {panel.y_label for panel in panels}
+
+
+def _range(panels: Sequence[Panel]) -> tuple[float, float]:
+    values = np.concatenate([np.asarray(line.y) for panel in panels for line in panel.lines])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    return low - ROOM * (high - low), high + ROOM * (high - low)

@@ -1,0 +1,29 @@
+"""What each loop does by itself behind the datasheet's gap, on MuJoCo and by the linear loop's describing function."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from cmg_mj.papers.sokolov2019.backlash import Cycle, cycle_of
+from cmg_mj.papers.sokolov2019.figure_3 import L1, WITH_Y2, stiffness
+from cmg_mj.papers.sokolov2019.gap_prediction import Foreseen, foreseen_cycle
+from cmg_mj.papers.sokolov2019.paper import OBSERVERS
+from cmg_mj.papers.sokolov2019.rig import experiment
+
+
+class Cycles(NamedTuple):
+    """Releases without noise."""
+
+    ends: dict[str, Cycle]
+    """Observer, and (9) with all terms in y2 -> what the loop ends in."""
+    foreseen: dict[str, Foreseen | None]
+    """Linear observer -> the same by its describing function."""
+
+
+def cycles() -> Cycles:
+    """All of them."""
+    ends = {name: cycle_of(name) for name in OBSERVERS}
+    # (9) but for J2, cos y2 and the sine: see `figure_3.nine_with_y2`.
+    nine = {"k1": L1, "k2": stiffness(experiment().plant.reduced), "alpha": 1.0}
+    ends[WITH_Y2] = cycle_of("homogeneous", **nine)
+    return Cycles(ends, {name: foreseen_cycle(name) for name in ("linear", "luenberger")})

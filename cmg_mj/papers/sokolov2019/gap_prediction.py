@@ -1,0 +1,64 @@
+"""Which cycle a gap makes of the linearised, sampled loop, by its describing function."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cmg_mj.papers.sokolov2019.backlash import gap_rad
+from cmg_mj.papers.sokolov2019.lag import linearised
+
+
+class Foreseen(NamedTuple):
+    """A cycle of the linear loop with the gap."""
+
+    amplitude_deg: float
+    """Of the tilt [deg]."""
+    frequency_hz: float
+
+
+def share_of(c: float) -> complex:
+    """What a gap passes of a sine: the fundamental of the gimbal's angle by that of the motor's.
+
+    Args:
+        c: gap/A - 1, with A the motor's amplitude: -1 without a gap, 1 where the motor only just crosses it.
+    """
+    root = math.sqrt(max(1.0 - c * c, 0.0))
+    return complex(0.5 - (math.asin(c) + c * root) / math.pi, -root * root / math.pi)
+
+
+def foreseen_cycle(observer: str, points: int = 60) -> Foreseen | None:
+    """The largest motion that neither grows nor decays, of which larger ones decay and smaller ones grow.
+
+    Args:
+        observer: A linear one, in the loop.
+        points: Of the grid on which it is sought.
+
+    Returns:
+        The cycle; None if there is none.
+    """
+    loop, servo, dt = linearised(observer)
+
+    def turning(c: float) -> tuple[complex, np.ndarray]:
+        """The least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
+        factors, shapes = np.linalg.eig(loop(servo, share=share_of(c)))
+        forward = np.angle(factors) > dt
+        best = int(np.argmax(np.where(forward, np.abs(factors), 0.0)))
+        return complex(factors[best]), shapes[:, best]
+
+    def growth(c: float) -> float:
+        return math.log(abs(turning(c)[0])) / dt
+
+    grid = np.linspace(-1.0, 0.98, points)
+    rates = [growth(float(c)) for c in grid]
+    first = next((i for i in range(1, points) if rates[i - 1] < 0.0 <= rates[i]), None)
+    if first is None:
+        return None
+    c = float(brentq(growth, grid[first - 1], grid[first], xtol=1e-9))  # type: ignore[arg-type]
+    factor, shape = turning(c)
+    rate = math.atan2(factor.imag, factor.real) / dt
+    motor = gap_rad() / (1.0 + c)
+    return Foreseen(math.degrees(motor * rate * float(abs(shape[0]) / abs(shape[-1]))), rate / (2.0 * math.pi))
