@@ -1,0 +1,122 @@
+"""Table II: the estimators tuned again as Section V does it, fitted to the gyro and scored on other seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from cmg_mj import markdown
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.sokolov2019.paper import OBSERVERS
+from cmg_mj.papers.sokolov2019.rig import experiment
+from cmg_mj.tuning import Level, tune
+
+SEED, WORLDS = 85_000, 10
+WARM_UP_S = 0.5
+"""Replayed before the window: many times the time constants of the three [s]."""
+NUMBERS = {"linear": ["tau"], "luenberger": ["L[0][0]", "L[1][0]"], "homogeneous": ["k1", "k2", "alpha"]}
+"""What is tuned of each; the entry of L that corrects x3 does not reach the rate."""
+NOISES_UG_RTHZ = (100.0, 400.0, 1600.0)
+"""One list for all three: they were tuned on one recording."""
+GENTLE = ("push.0.torque_n_m=0.15", "plant.equilibrium_bias_deg=0.0")
+"""A push of which the model knows more, on a rig without bias."""
+PUSHES: dict[str, Sequence[str]] = {"0.5 N m, e = 0.5 deg": (), "0.15 N m, e = 0": GENTLE}
+
+Tuned = Mapping[str, Mapping[str, Sequence[Level]]]
+"""Push -> observer -> what came out, one a noise."""
+
+
+def levels_of(name: str, settings: Sequence[str], worlds: int, seed: int, noises: Sequence[float]) -> Sequence[Level]:
+    """Tune one estimator at several sensor noises."""
+    scenario = experiment([f"seed={seed}", "duration_s=3.0", *settings], name, feedback="fog").scenario
+    return tune(
+        scenario, worlds=worlds, parameters=NUMBERS[name], noise_ug_rthz=noises, warm_up_s=WARM_UP_S, starts=1
+    ).levels
+
+
+def tuned(
+    on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, noises: Sequence[float] = NOISES_UG_RTHZ
+) -> dict[str, dict[str, Sequence[Level]]]:
+    """Tune all three under both pushes."""
+    found: dict[str, dict[str, Sequence[Level]]] = {push: {} for push in PUSHES}
+    for i, (push, settings) in enumerate(PUSHES.items()):
+        for j, name in enumerate(OBSERVERS):
+            found[push][name] = levels_of(name, settings, worlds, seed, noises)
+            on_share((3 * i + j + 1) / 6.0)
+    return found
+
+
+def none_better(levels: Sequence[Level]) -> bool:
+    """Whether at one noise none of the tuned estimators is better on the held-out seeds than the printed one."""
+    return all(level.verdict != "better" for level in levels)
+
+
+def claim(found: Tuned) -> Claim:
+    """The printed values beside the best ones."""
+    settings = [(push, i, level.noise_ug_rthz) for push, of in found.items() for i, level in enumerate(of["linear"])]
+    best = [
+        f"{push} at {noise:g} ug/rtHz"
+        for push, i, noise in settings
+        if none_better([levels[i] for levels in found[push].values()])
+    ]
+    alone = {
+        name: [f"{noise:g} ({push})" for push, i, noise in settings if none_better([found[push][name][i]])]
+        for name in OBSERVERS
+    }
+    worse = [
+        OBSERVERS[name]
+        for name in OBSERVERS
+        if all(level.rms.mean() > level.zero_rms for of in found.values() for level in of[name])
+    ]
+    each = "; ".join(f"{OBSERVERS[name]} at {', '.join(at) or 'none'}" for name, at in alone.items())
+    return Claim(
+        place="Table II, tuning",
+        says="tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
+        found=(
+            f"Fitted on {WORLDS} seeds and scored on as many others, from the push's start to a second after it. The "
+            f"printed values are not beaten, by noise in ug/rtHz: {each}."
+        ),
+        table=_table(found),
+        holds=bool(best),
+        conditions=(
+            f"For a push of {'; '.join(best)}. The paper gives neither push nor noise."
+            + (f" The best {' and '.join(worse)} are farther from the gyro than zero is." if worse else "")
+        ),
+        otherwise="In none of these settings are all three printed lines the best: they were not found on such a recording.",
+        figures={
+            push: {
+                name: {
+                    "noise_density_ug_rthz": [level.noise_ug_rthz for level in levels],
+                    "tuned": [dict(level.sizes) for level in levels],
+                    "table_2_by_tuned_error": [list(level.ratio) for level in levels],
+                    "tuned_error_rad_s": [float(level.rms.mean()) for level in levels],
+                    "zero_estimate_error_rad_s": [level.zero_rms for level in levels],
+                    "tuned_is": [level.verdict for level in levels],
+                }
+                for name, levels in of.items()
+            }
+            for push, of in found.items()
+        },
+    )
+
+
+def _table(found: Tuned) -> str:
+    rows = [
+        (
+            push,
+            OBSERVERS[name],
+            f"{level.noise_ug_rthz:g}",
+            ", ".join(f"{number} = {size:.4g}" for number, size in level.sizes.items()),
+            f"{level.ratio.mean:.3f} +- {level.ratio.half:.3f}",
+            f"{level.rms.mean() / level.zero_rms:.2f}",
+        )
+        for push, of in found.items()
+        for name, levels in of.items()
+        for level in levels
+    ]
+    headings = ("push", "", "noise [ug/rtHz]", "tuned", "printed by tuned error", "tuned error by zero's")
+    return markdown.table(headings, rows, text_columns=4)
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """Table II."""
+    return [claim(tuned(on_share))]
