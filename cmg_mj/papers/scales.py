@@ -15,7 +15,7 @@ ROOM = 0.05
 
 
 def on_common_scales(claims: Sequence[Claim]) -> list[Claim]:
-    """The claims with their pictures redrawn so that all panels of one quantity have the range that all of them need."""
+    """The claims with pictures in which all panels of one quantity have the range that all of them need."""
     panels = [panel for claim in claims for picture in claim.pictures for panel in picture.panels]
     ranges = {label: _range([panel for panel in panels if panel.y_label == label]) for label in _labels(panels)}
 

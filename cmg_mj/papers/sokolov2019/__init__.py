@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from cmg_mj.papers.claim import Section
-from cmg_mj.papers.sokolov2019 import bearing, closed_loop, equations, figure_3, observer_bias, proposition_1
+from cmg_mj.papers.sokolov2019 import (
+    bearing,
+    closed_loop,
+    equations,
+    figure_3,
+    observer_bias,
+    proposition_1,
+    table_2,
+)
 
 SECTIONS: list[Section] = [
     Section("the equations", 0.1, equations.claims),
     Section("the observers' bias", 1.2, observer_bias.claims),
     Section("Proposition 1", 1.3, proposition_1.claims),
     Section("Fig. 3", 0.8, figure_3.claims),
-    Section("Figs 4 to 6, and the lag", 13.0, closed_loop.claims),
+    Section("Table II", 12.0, table_2.claims),
+    Section("Figs 4 to 6, and the lag", 10.0, closed_loop.claims),
     Section("the thrust bearing", 3.0, bearing.claims),
 ]

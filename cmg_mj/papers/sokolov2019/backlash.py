@@ -1,12 +1,13 @@
 """Backlash of the gimbal's servo, held by friction: the gimbal rests until the motor has crossed the gap.
 
-In velocity mode the servo's motor turns at the commanded rate and does not know of the gap behind it. The observers know
-the command, not what the gimbal makes of it.
+In velocity mode the servo's motor turns at the commanded rate and does not know of the gap behind it. The observers
+know the command, not what the gimbal makes of it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from cmg_mj.experiment import Experiment
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.release import RELEASE, is_sustained
 from cmg_mj.papers.sokolov2019.rig import experiment
+from cmg_mj.plant import Plant
 from cmg_mj.sensors import Ideal
 from cmg_mj.simulate import Result, simulate
 
@@ -62,12 +64,24 @@ class BehindAGap:
         return True
 
 
-def run_behind_a_gap(prepared: Experiment, worlds: int, gap: Scalar | None = None) -> Result:
-    """As `Experiment.run_many`, with a gap in front of the gimbals: the datasheet's, or another or one a world [rad]."""
-    controller: Any = BehindAGap(prepared.controller(range(worlds)), gap_rad() if gap is None else gap)
+def run_behind_a_gap(
+    prepared: Experiment, worlds: Sequence[int], gap: Scalar, plants: Sequence[Plant] | None = None
+) -> Result:
+    """As `Experiment.run_many`, with a gap before the gimbals.
+
+    Args:
+        prepared: The experiment.
+        worlds: Their numbers.
+        gap: One for all, or one a world [rad].
+        plants: A rig a world, if they differ.
+
+    Returns:
+        The result.
+    """
+    controller: Any = BehindAGap(prepared.controller(worlds), gap)
     scenario = prepared.scenario
     return simulate(
-        [prepared.plant] * worlds,
+        [prepared.plant] * len(worlds) if plants is None else plants,
         controller,
         scenario.duration_s,
         observers=prepared.observer_names,
@@ -107,7 +121,7 @@ def cycle_of(observer: str, gap: float | None = None, **parameters: Any) -> Cycl
     """
     changed = [f"observer.{name}={value}" for name, value in parameters.items()]
     prepared = experiment([*RELEASE, f"duration_s={RELEASE_S}", *changed], observer)
-    trajectory = trajectory_of(run_behind_a_gap(prepared, 1, gap))
+    trajectory = trajectory_of(run_behind_a_gap(prepared, [0], gap_rad() if gap is None else gap))
     last = trajectory.between(RELEASE_S - WINDOW_S, RELEASE_S)
     x2, t = last["x2_rad_s"][:, 0], last["time_s"]
     spectrum = np.abs(np.fft.rfft((x2 - x2.mean()) * np.hanning(len(x2)), 8 * len(x2)))

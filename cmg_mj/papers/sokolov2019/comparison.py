@@ -77,8 +77,8 @@ def model_based(found: Loops) -> Claim:
         place="Section VI",
         says="The designs with a model outperform the one without; of them the nonlinear one has the smaller error.",
         found=(
-            f"By velocity RMS error, {found.worlds} seeds, world by world beyond chance, (10) is better than (9) and (9) "
-            f"than (8), with no fall, at {'; '.join(holds_at) or 'none'}."
+            f"By velocity RMS error, {found.worlds} seeds, world by world beyond chance, (10) is better than (9) and "
+            f"(9) than (8), with no fall, at {'; '.join(holds_at) or 'none'}."
         ),
         holds=bool(holds_at),
         conditions=(

@@ -20,13 +20,16 @@ from cmg_mj.papers.sokolov2019.loops import (
 from cmg_mj.papers.sokolov2019.pictures_4_to_6 import picture
 
 HELD = (
-    f"With {GAP_ARCMIN:g} arcmin of backlash behind the servo's motor, as its datasheet has it, and friction that holds "
-    "the gimbal in the gap. The paper mentions neither."
+    f"With {GAP_ARCMIN:g} arcmin of backlash behind the servo's motor, as its datasheet has it, and friction that "
+    "holds the gimbal in the gap. The paper mentions neither."
 )
 
 
 def _setting(found: Loops) -> str:
-    return f"e = {SHOWN_DEG} deg, a push at 1 s, {found.worlds} seeds; standard deviation of the tilt over the last {LATE_S:g} s"
+    return (
+        f"e = {SHOWN_DEG} deg, a push at 1 s, {found.worlds} seeds; standard deviation of the tilt over the last "
+        f"{LATE_S:g} s"
+    )
 
 
 def _standing(found: Loops, name: str) -> str:
@@ -70,8 +73,8 @@ def figure_4(found: Loops, lags: Lags, cycles: Cycles) -> Claim:
         conditions=(
             ""
             if by_itself
-            else f"{HELD} Without it noise keeps the loop ringing, which is no oscillation by itself; that takes a servo "
-            f"lag of {in_ms(begins)}, and the model's is {in_ms(lags.own_lag_s)}."
+            else f"{HELD} Without it noise keeps the loop ringing, which is no oscillation by itself; that takes a "
+            f"servo lag of {in_ms(begins)}, and the model's is {in_ms(lags.own_lag_s)}."
         ),
         otherwise="Without noise it comes to rest, with backlash too.",
         figures=_figures(found, "linear", cycles)
@@ -98,8 +101,8 @@ def figure_5(found: Loops, lags: Lags, cycles: Cycles) -> Claim:
         conditions=(
             ""
             if by_itself
-            else f"{HELD} Without it the loop is well damped (damping ratio {prediction.damping:.2f}) and misses the push: "
-            "it falls, if the bias adds to that."
+            else f"{HELD} Without it the loop is well damped (damping ratio {prediction.damping:.2f}) and misses the "
+            "push: it falls, if the bias adds to that."
         ),
         otherwise="Without noise it comes to rest, with backlash too.",
         figures=_figures(found, "luenberger", cycles)
@@ -159,7 +162,9 @@ def figure_6(found: Loops, cycles: Cycles) -> Claim:
 def figure_6_at_rest(lags: Lags, cycles: Cycles) -> Claim:
     """(10): without the oscillations of the others, on the rig on which they have them."""
     eight, nine, ten = (cycles.ends[name] for name in ("linear", "luenberger", "homogeneous"))
-    compared = f"{ten.amplitude_deg / eight.amplitude_deg:.2f} and {ten.amplitude_deg / nine.amplitude_deg:.2f} times"
+    compared = " and ".join(
+        f"{ten.amplitude_deg / other.amplitude_deg:.2f}" for other in (eight, nine) if other.sustained
+    )
     slow = lags.sweeps["homogeneous"].sustained
     return Claim(
         place="Fig. 6, beside Figs 4 and 5",
@@ -170,9 +175,11 @@ def figure_6_at_rest(lags: Lags, cycles: Cycles) -> Claim:
             f"{in_ms(float(lags.sweeps['homogeneous'].lags_s[-1]))}."
         ),
         holds=(eight.sustained or nine.sustained) and not ten.sustained,
-        otherwise=(
-            f"What makes (8) and (9) oscillate makes (10) oscillate as well, though only {compared} as far. A slow servo "
-            "makes (8) oscillate and not (10), but not (9) either."
+        otherwise="Nothing oscillates."
+        if not compared
+        else (
+            f"What makes (8) and (9) oscillate makes (10) oscillate as well, {compared} times as far. A slow "
+            "servo makes (8) oscillate and not (10), but not (9) either."
         ),
         figures={f"cycle_amplitude_{name}_deg": cycle.amplitude_deg for name, cycle in cycles.ends.items()},
     )

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj import markdown
+from cmg_mj.experiment import Experiment
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.release import (
@@ -19,7 +21,7 @@ from cmg_mj.papers.sokolov2019.release import (
     latency_threshold,
     sweep,
 )
-from cmg_mj.papers.sokolov2019.rig import estimator, experiment, servo_of
+from cmg_mj.papers.sokolov2019.rig import FINE, estimator, experiment, servo_of
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
 from cmg_mj.picture import Line, Panel, Picture
 
@@ -51,9 +53,13 @@ class Predicted(NamedTuple):
 
 
 Loop = Callable[..., np.ndarray]
-"""(servo, age_steps=1, share=1.0) -> the map of a control period."""
+"""(servo, age_steps=0, share=1.0) -> the map of a control period."""
 
-_rig = cache(experiment)
+
+@cache
+def _rig() -> Experiment:
+    """With the physics step of the releases, in which latencies are counted."""
+    return experiment([FINE])
 
 
 def linearised(observer: str | None, **parameters: float) -> tuple[Loop, Servo, float]:
@@ -70,7 +76,7 @@ def linearised(observer: str | None, **parameters: float) -> tuple[Loop, Servo, 
     plant, law = prepared.plant, prepared.law
     o = None if observer is None else estimator(observer, prepared, **parameters)
 
-    def loop(servo: Servo, age_steps: int = 1, share: complex = 1.0) -> np.ndarray:
+    def loop(servo: Servo, age_steps: int = 0, share: complex = 1.0) -> np.ndarray:
         step = plant.model.opt.timestep
         return period_map(plant.reduced, servo, o, law, timestep=step, age_steps=age_steps, share=share)
 
@@ -81,14 +87,14 @@ def predicted(observer: str | None) -> Predicted:
     """What the linearised loop does with a linear observer, or with the true rate (None)."""
     loop, servo, dt = linearised(observer)
 
-    def growth(varied: Servo, age_steps: int = 1) -> float:
+    def growth(varied: Servo, age_steps: int = 0) -> float:
         return float(modes(loop(varied, age_steps), dt)[0].real)
 
     latencies = range(LARGEST_LATENCY_STEPS + 1) if observer else ()
     return Predicted(
         first_crossing(lambda lag: growth(servo.damped(lag)), 5e-3, LARGEST_S),
         first_crossing(lambda lag: growth(servo.softened(lag)), 5e-3, LARGEST_S),
-        next((steps / 1000 for steps in latencies if growth(servo, 1 + steps) > 0.0), None),
+        next((steps / 1000 for steps in latencies if growth(servo, steps) > 0.0), None),
         oscillation(loop(servo), dt),
     )
 
@@ -138,31 +144,24 @@ def in_ms(seconds: float | None, otherwise: str = "none") -> str:
 def claim(found: Lags) -> Claim:
     """Section V: the differentiator's lag."""
     own, lag, latency = found.own_lag_s, found.thresholds, found.latencies
-    linear, luenberger, truth = (found.predictions[name] for name in ("linear", "luenberger", "truth"))
+    linear = found.predictions["linear"]
     begins, others = lag["linear"], min(lag[name].low for name in ("luenberger", "homogeneous"))
-    listed = "; ".join(
-        f"{equation} servo lag {in_ms(lag[name].middle, f'none up to {1e3 * LAGS_S[-1]:.0f} ms')}, latency "
-        f"{in_ms(latency[name].high, f'none up to {LARGEST_LATENCY_STEPS} ms')}"
-        for name, equation in OBSERVERS.items()
-    )
     return Claim(
         place="Section V, the lag",
         says="Finite differences lag, and the lag brings the loop into sustained oscillations.",
         found=(
-            f"Released without noise, the rig oscillates by itself from these on: {listed}. Eigenvalues of the "
-            f"linearised, sampled loop say: (8) {in_ms(linear.servo_lag_s)} and {in_ms(linear.latency_s)}, "
-            f"(9) {in_ms(luenberger.servo_lag_s)} and {in_ms(luenberger.latency_s)}, the true rate in the "
-            f"law {in_ms(truth.servo_lag_s)}. With the model's servo ({1e3 * own:.1f} ms) the loop of (8) has "
-            f"poles {linear.pole.real:.1f} +- {linear.pole.imag:.1f}j 1/s, a damping ratio of {linear.damping:.2f} at "
-            f"{linear.frequency_hz:.1f} Hz; from tau = {in_ms(found.tau)} on it would oscillate as "
-            "it is. A servo that lags because it is soft never does it "
-            f"({in_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the flywheel then turns the "
-            "gimbal back, which damps the tilt."
+            "Let go without noise, the rig oscillates by itself from the lags and latencies of the table on. With the "
+            f"model's servo, {in_ms(own)}, the loop of (8) has poles {linear.pole.real:.1f} +- {linear.pole.imag:.1f}j "
+            f"1/s, a damping ratio of {linear.damping:.2f} at {linear.frequency_hz:.1f} Hz. From tau = "
+            f"{in_ms(found.tau)} on it would oscillate as it is. A servo that lags because it is soft never makes it "
+            f"oscillate ({in_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the flywheel then "
+            "turns the gimbal back, which damps the tilt."
         ),
+        table=_table(found),
         holds=begins.high is not None and begins.high < others,
         conditions=(
             f"It does with a servo lag from {in_ms(begins.middle)} or a latency of y1 from "
-            f"{in_ms(latency['linear'].high)}; at the model's servo lag of {1e3 * own:.1f} ms the oscillation decays."
+            f"{in_ms(latency['linear'].high)}; at the model's servo lag of {in_ms(own)} the oscillation decays."
             if begins.middle is not None and begins.middle > own
             else ""
         ),
@@ -185,6 +184,23 @@ def claim(found: Lags) -> Claim:
         },
         pictures=[_picture(found)],
     )
+
+
+def _table(found: Lags) -> str:
+    rows = []
+    for name, equation in (OBSERVERS | {"truth": "true rate in the law"}).items():
+        lag, latency, of = found.thresholds.get(name), found.latencies.get(name), found.predictions.get(name)
+        rows.append(
+            (
+                equation,
+                "-" if lag is None else in_ms(lag.middle, f"none up to {1e3 * LAGS_S[-1]:.0f} ms"),
+                "-" if of is None else in_ms(of.servo_lag_s),
+                "-" if latency is None else in_ms(latency.high, f"none up to {LARGEST_LATENCY_STEPS} ms"),
+                "-" if of is None or name == "truth" else in_ms(of.latency_s),
+            )
+        )
+    headings = ("", "servo lag, MuJoCo", "by eigenvalues", "latency of y1, MuJoCo", "by eigenvalues")
+    return markdown.table(headings, rows)
 
 
 def _growth(observer: str, lags_s: np.ndarray) -> list[float]:

@@ -10,7 +10,7 @@ import numpy as np
 from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.papers.claim import OnShare
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, run_behind_a_gap
+from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, gap_rad, run_behind_a_gap
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment
 from cmg_mj.papers.words import plus_minus
@@ -55,13 +55,13 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
     quiet: dict[str, Result] = {}
     for i, name in enumerate(OBSERVERS):
         prepared = experiment(settings, name)
-        biased = np.repeat(BIASES_DEG, worlds)
-        numbers = [*range(worlds)] * len(BIASES_DEG)
-        result = prepared.run_many(numbers, vary={"equilibrium_bias_deg": biased})
-        for e, found in zip(BIASES_DEG, result.groups(len(BIASES_DEG)), strict=True):
+        rigs = prepared.rigs({"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds)})
+        cases = len(BIASES_DEG) + 1
+        gaps = np.repeat([*[0.0] * len(BIASES_DEG), gap_rad()], worlds)
+        *own, gap[name] = run_behind_a_gap(prepared, [*range(worlds)] * cases, gaps, rigs).groups(cases)
+        for e, found in zip(BIASES_DEG, own, strict=True):
             by_bias[e][name] = found
-        gap[name] = run_behind_a_gap(prepared, worlds)
-        quiet[name] = experiment([*settings, *NO_NOISE], name).run_many(1)
+        quiet[name] = experiment([*settings, *NO_NOISE], name).run()
         on_share((i + 1) / (len(OBSERVERS) + 0.3))
     return Loops(by_bias, gap, quiet, experiment(settings, feedback="fog").run_many(worlds), worlds)
 
@@ -72,7 +72,7 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
 def _late(result: Result, name: str) -> np.ndarray:
     """A signal over the last `LATE_S` of the worlds that stood, (n_ticks, n_stood)."""
     t = trajectory_of(result)["time_s"]
-    return trajectory_of(result)[name][t >= t[-1] - LATE_S][:, result.stood]
+    return trajectory_of(result)[name].reshape(len(t), -1)[t >= t[-1] - LATE_S][:, result.stood]
 
 
 def main_frequency(result: Result) -> float:
@@ -120,7 +120,7 @@ def smaller(a: Result, b: Result, key: str = "velocity_rms_error_rad_s") -> bool
 
 
 def better(a: Result, b: Result) -> bool:
-    """Whether a is the better one: its velocity error is smaller beyond chance, or, where b fell throughout, a stood."""
+    """Whether a has the smaller velocity error beyond chance and falls no more often, or stands where b always fell."""
     beyond_chance = smaller(a, b)
     if beyond_chance is None:
         return bool(a.stood.all() and b.fell.all())

@@ -8,11 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment, rig_with, servo_of
+from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, experiment, rig_with, servo_of
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
 from cmg_mj.trajectory import Trajectory
 
-RELEASE = (*NO_NOISE, "plant.equilibrium_bias_deg=0.0", "plant.initial_tilt_deg=0.2", "push=[]", "duration_s=6.0")
+RELEASE = (
+    *NO_NOISE,
+    "plant.equilibrium_bias_deg=0.0",
+    "plant.initial_tilt_deg=0.2",
+    "push=[]",
+    "duration_s=6.0",
+)
 """Let go 0.2 degrees off, nothing else disturbing it."""
 
 WINDOW_S = 2.0
@@ -42,7 +48,7 @@ def is_sustained(trajectory: Trajectory, window_s: float = WINDOW_S) -> np.ndarr
 
 def release(observer: str, servos: Sequence[Servo], settings: Sequence[str] = ()) -> Trajectory:
     """Let the rig go without noise, one world a servo."""
-    prepared = experiment([*RELEASE, *settings], observer)
+    prepared = experiment([*RELEASE, FINE, *settings], observer)
     plants = [rig_with(prepared.scenario.plant, servo) for servo in servos]
     return trajectory_of(prepared.run_many(len(plants), plants=plants))
 
@@ -105,7 +111,7 @@ def latency_threshold(observer: str, largest_steps: int = LARGEST_LATENCY_STEPS)
 
     def sustained(steps: int) -> bool:
         latency = f"sensors.accelerometer.latency_s={steps / 1000}"
-        result = experiment([*RELEASE, "sensors.accelerometer.rate_hz=1000.0", latency], observer).run()
+        result = experiment([*RELEASE, FINE, "sensors.accelerometer.rate_hz=1000.0", latency], observer).run()
         return not result.stood.all() or bool(is_sustained(trajectory_of(result))[0])
 
     low, high = 0, largest_steps

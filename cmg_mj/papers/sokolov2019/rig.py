@@ -21,6 +21,9 @@ NO_NOISE = (
     "sensors.fog.angle_random_walk_deg_rth=0.0",
 )
 
+FINE = "plant.timestep_s=0.001"
+"""A servo that is slow because of its damping is stiff: it asks for a smaller step than the rig's own."""
+
 RK4_LIMIT = 2.7
 """Runge-Kutta 4 follows x' = -x only for steps below 2.785."""
 
@@ -64,13 +67,13 @@ def rig_with(settings: PlantSettings, servo: Servo) -> Plant:
     Raises:
         ValueError: The servo is too stiffly damped for RK4 at this timestep: it would chatter by itself.
     """
-    decay = servo.kv * settings.timestep_s / servo.inertia
+    plant = load_plant(settings)
+    decay = servo.kv * plant.timestep / servo.inertia
     if decay > RK4_LIMIT:
         raise ValueError(
             f"servo lag {1e3 * servo.lag_s:.3g} ms: kv h/I = {decay:.3g} must be at most {RK4_LIMIT} at timestep_s = "
-            f"{settings.timestep_s:g}"
+            f"{plant.timestep:g}"
         )
-    plant = load_plant(settings)
     for i in plant.servos:
         plant.model.actuator_gainprm[i, 0] = servo.kp
         plant.model.actuator_biasprm[i, 1:3] = -servo.kp, -servo.kv

@@ -77,7 +77,7 @@ def period_map(
     law: Law,
     *,
     timestep: float,
-    age_steps: int = 1,
+    age_steps: int = 0,
     share: complex = 1.0,
 ) -> np.ndarray:
     """The matrix that takes the loop from one control tick to the next.
@@ -88,7 +88,7 @@ def period_map(
         observer: A linear observer; None for the true rate in the law.
         law: The law; its rate limit does not count.
         timestep: Physics step [s].
-        age_steps: How old y1 is at a tick [physics steps]; accelerometers show the state one step before.
+        age_steps: How old y1 is at a tick [physics steps]: the latency of the accelerometers.
         share: What the gimbal's setpoint makes of the commanded rate: 1, or the describing function of a gap.
 
     Returns:

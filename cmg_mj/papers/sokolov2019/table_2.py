@@ -81,7 +81,9 @@ def claim(found: Tuned) -> Claim:
             f"For a push of {'; '.join(best)}. The paper gives neither push nor noise."
             + (f" The best {' and '.join(worse)} are farther from the gyro than zero is." if worse else "")
         ),
-        otherwise="In none of these settings are all three printed lines the best: they were not found on such a recording.",
+        otherwise=(
+            "In none of these settings are all three printed lines the best: they were not found on such a recording."
+        ),
         figures={
             push: {
                 name: {
