@@ -1,4 +1,4 @@
-"""Sections 1, 2 and 4: inequalities, theorems and remarks, checked by numbers."""
+"""Sections 1, 2 and 4: inequalities, theorems and remarks, checked by numbers; here (13), (21) and (22)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import math
 
 import numpy as np
 
-from cmg_mj.elementwise import signed_power
 from cmg_mj.observers.high_gain import updated_gain
+from cmg_mj.papers.andrieu2009 import equations_11_12, equations_19_20
 from cmg_mj.papers.andrieu2009.bi_limit import largest_b, violated_conditions
 from cmg_mj.papers.andrieu2009.chain_of_integrators import theorem_2
 from cmg_mj.papers.andrieu2009.finite_escape import no_observer_beyond_1
+from cmg_mj.papers.andrieu2009.increments import exponent_of_6, increments, linear_increments
 from cmg_mj.papers.andrieu2009.paper import B, P
 from cmg_mj.papers.andrieu2009.theorem_1 import theorem_1
 from cmg_mj.papers.claim import Claim, OnShare
@@ -19,43 +20,19 @@ from cmg_mj.papers.claim import Claim, OnShare
 
 def claims(on_share: OnShare) -> list[Claim]:
     """Sections 1, 2 and 4."""
-    parts = [increments, no_observer_beyond_1, scaling_conditions, gain_tracking, theorem_2, theorem_1]
-    found = []
+    parts = [
+        lambda: [linear_increments(), increments(), exponent_of_6()],
+        lambda: [no_observer_beyond_1(), scaling_conditions(), gain_tracking()],
+        lambda: [theorem_2()],
+        lambda: [equations_19_20.claim()],
+        lambda: [theorem_1()],
+        equations_11_12.claims,
+    ]
+    found: list[Claim] = []
     for i, part in enumerate(parts):
         on_share(i / len(parts))
-        found.append(part())
+        found += part()
     return found
-
-
-def largest_increment(p: float) -> float:
-    """Worst quotient of the two sides of (3) for g = 0, over both signs and sizes from 1e-4 to 1e4.
-
-    g adds |g| |x2 - x2_hat| to both sides at most.
-    """
-    positive = np.geomspace(1e-4, 1e4, 161)
-    x2 = np.concatenate([-positive, [0.0], positive])
-    x2, x2_hat = np.meshgrid(x2, x2)
-    d = np.abs(x2 - x2_hat)
-    left = np.abs(signed_power(x2, 1.0 + p) - signed_power(x2_hat, 1.0 + p))
-    right = (1.0 + p) * np.abs(x2_hat) ** p * d + d ** (1.0 + p)
-    apart = d > 1e-6 * np.maximum(np.abs(x2), np.abs(x2_hat))  # nearer, the left side is rounding errors
-    return float((left[apart] / right[apart]).max())
-
-
-def increments() -> Claim:
-    """(2), (3)."""
-    worst = {p: largest_increment(p) for p in (0.1, 0.5, 0.9, 1.0, 1.5, 2.0)}
-    inside = max(quotient for p, quotient in worst.items() if p < 1.0)
-    return Claim(
-        place="Section 1, (3)",
-        says="For 0 < p < 1 the increments of f2 = g(x1) x2 + x2^(1+p) + u are bounded by (|g| + (1+p) |x2_hat|^p) "
-        "|x2 - x2_hat| + |x2 - x2_hat|^(1+p).",
-        found=f"Over both signs and sizes from 1e-4 to 1e4 the left side is at most {inside:.6f} of the right side "
-        f"for p = 0.1, 0.5, 0.9. The check can fail: for p = 1.5 and 2 the quotient is {worst[1.5]:.3f} and "
-        f"{worst[2.0]:.3f}.",
-        holds=inside <= 1.0 + 1e-9,
-        figures={"worst_quotient_by_p": {str(p): quotient for p, quotient in worst.items()}},
-    )
 
 
 def scaling_conditions() -> Claim:

@@ -20,6 +20,14 @@ from cmg_mj.papers.dao2023.study import (
 from cmg_mj.picture import Line, Panel, Picture
 
 
+TESTED = (
+    "It holds for the three weights tested, not as a rule: past some hundreds a larger Sigma is slower. One output is "
+    "corrected. Once that correction is much faster than the regressor C2 T turns, the estimates slide along the "
+    "directions that the output does not see, the more slowly the stiffer it is. A finer step makes 10000 slower still: "
+    "this is no effect of sampling."
+)
+
+
 def claims(found: Study) -> list[Claim]:
     """(a) to (c), what (b) comes to, and the conclusion."""
     return [settling_order(found), parameters(found), larger_gains(found)]
@@ -111,12 +119,9 @@ def larger_gains(found: Study) -> Claim:
         found="For one T, (9) is linear in Sigma. Median settling times: "
         + ", ".join(f"{words_of_time(medians[SIGMAS[i]])} at {SIGMAS[i]:g}" for i in order)
         + ".",
-        holds=rises and goes_on,
-        conditions=UNSTATED,
-        otherwise=f"{UNSTATED} True from 0.1 to 1000, wrong as a rule: past some hundreds a larger Sigma is slower. "
-        "One output is corrected; once that correction is much faster than the regressor C2 T turns, the estimates "
-        "slide along the directions that the output does not see, and the more slowly the stiffer it is. A finer step "
-        "makes 10000 slower still: this is no effect of sampling.",
+        holds=rises,
+        conditions=UNSTATED if goes_on else f"{UNSTATED} {TESTED}",
+        otherwise=f"{UNSTATED} The settling times are not in order at the three weights tested either.",
         figures={
             f"median_settle_sigma_{sigma:g}_s": value if math.isfinite(value) else None
             for sigma, value in medians.items()
