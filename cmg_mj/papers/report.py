@@ -13,6 +13,7 @@ from typing import Any
 from cmg_mj import markdown
 from cmg_mj.papers import BEYOND, PAPERS, Reproduced
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.sentences import Once
 from cmg_mj.plots import draw
 from cmg_mj.trajectory import whole_file
 
@@ -49,9 +50,8 @@ def _figures_of_claim(claim: Claim) -> dict[str, Any]:
 
 def verdict_table(entries: Sequence[Reproduced]) -> str:
     """Every claim and its verdict, as a Markdown table."""
-    whose = {False: "", True: " (not the paper's)"}
     rows = [
-        (entry.paper, claim.place + whose[claim.ours], claim.says, verdict_words(claim))
+        (entry.paper, claim.place + _whose(claim), claim.says, verdict_words(claim))
         for entry in entries
         for claim in entry.claims
     ]
@@ -73,13 +73,44 @@ def verdict_words(claim: Claim) -> str:
 
 def report_text(entries: Sequence[Reproduced]) -> str:
     """The whole report in Markdown."""
-    parts = [f"# {_title(entries)}", _count_of_verdicts(entries), verdict_table(entries)]
+    parts = [f"# {_title(entries)}", *_opening(entries), "## All claims", verdict_table(entries)]
     for entry in entries:
         parts.append(f"## {entry.paper}: {(PAPERS | BEYOND)[entry.paper]}")
         if not entry.complete:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
-        parts += [part for claim in entry.claims for part in _parts_of_claim(claim)]
+        once = Once()
+        parts += [part for claim in entry.claims for part in _parts_of_claim(claim, once)]
     return "\n\n".join(parts) + "\n"
+
+
+MEANINGS = {
+    "reproduced": "what was obtained bears the claim out, as the paper says it",
+    "reproduced within stated conditions": "it does under conditions that the paper does not name, or with a misprint "
+    "mended; they stand below the claim",
+    "not reproduced": "it does not, and the reason stands below the claim",
+}
+"""What the verdicts say."""
+
+
+def _opening(entries: Sequence[Reproduced]) -> list[str]:
+    """What the verdicts mean, how many there are of each, and which claims were not reproduced."""
+    parts = [
+        "Each claim stands beside what this software obtains. Its verdict is computed from the figures behind it, "
+        "and no parameter was tuned to bring one about.",
+        "\n".join(f"- *{verdict}*: {meaning}." for verdict, meaning in MEANINGS.items()),
+        _count_of_verdicts(entries),
+    ]
+    failed = [
+        f"- {entry.paper}, {claim.place}{_whose(claim)}: {claim.says}"
+        for entry in entries
+        for claim in entry.claims
+        if not claim.holds
+    ]
+    return [*parts, "Not reproduced:", "\n".join(failed)] if failed else parts
+
+
+def _whose(claim: Claim) -> str:
+    return " (not the paper's)" if claim.ours else ""
 
 
 def _title(entries: Sequence[Reproduced]) -> str:
@@ -88,8 +119,8 @@ def _title(entries: Sequence[Reproduced]) -> str:
     return title if all(entry.complete for entry in entries) else f"{title} (interrupted: not all of it)"
 
 
-def _parts_of_claim(claim: Claim) -> list[str]:
-    """A claim's paragraphs."""
+def _parts_of_claim(claim: Claim, once: Once) -> list[str]:
+    """A claim's paragraphs; conditions that an earlier claim of the paper had are not said again."""
     parts = [
         f"### {claim.place}: {verdict_words(claim)}",
         f"**{'Ours' if claim.ours else 'The paper'}:** {claim.says}",
@@ -98,7 +129,7 @@ def _parts_of_claim(claim: Claim) -> list[str]:
     if claim.table:
         parts.append(claim.table)
     if claim.why:
-        parts.append(f"**{'Conditions' if claim.holds else 'Why not'}:** {claim.why}")
+        parts.append(f"**{'Conditions' if claim.holds else 'Why not'}:** {once.of(claim.why, claim.place)}")
     return parts + [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]
 
 
@@ -109,7 +140,8 @@ def _count_of_verdicts(entries: Sequence[Reproduced]) -> str:
     for ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
         counts = Counter(verdict_words(claim) for claim in claims if claim.ours is ours)
         if counts:
-            listed = ", ".join(f"{n} {v}" for v, n in counts.most_common())
+            order = [OURS[v] if ours else v for v in OURS]
+            listed = ", ".join(f"{counts[v]} {v}" for v in order if counts[v])
             sentences.append(f"{sum(counts.values())} {words}: {listed}.")
     return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
 

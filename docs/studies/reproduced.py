@@ -1,18 +1,42 @@
-"""Writes docs/reproduced.md, the report without its plots.
+"""Writes docs/reproduced.md, the report, and its pictures, made small, into docs/reproduced/.
 
 cmg-mj reproduce all && python docs/studies/reproduced.py runs/reproduce-all
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
-FILE = Path(__file__).resolve().parents[1] / "reproduced.md"
-SAYS = (
-    "The report of `cmg-mj reproduce all`, without its plots. Microseconds and their ratios are those of one machine."
-)
+from PIL import Image
 
-title, *paragraphs = (Path(sys.argv[1]) / "report.md").read_text(encoding="utf-8").split("\n\n")
-kept = [title, SAYS, *(paragraph for paragraph in paragraphs if not paragraph.startswith("!["))]
-FILE.write_text("\n\n".join(kept).rstrip("\n") + "\n", encoding="utf-8")
+DOCS = Path(__file__).resolve().parents[1]
+FILE, PICTURES = DOCS / "reproduced.md", DOCS / "reproduced"
+SAYS = "The report of `cmg-mj reproduce all`, its pictures made small. Microseconds and their ratios are those of one machine."
+WIDTH, COLOURS = 900, 24
+"""Of the small pictures: [px], and so many of a palette."""
+
+
+def small(source: Path, target: Path) -> None:
+    """Write a plot with fewer pixels and colours."""
+    with Image.open(source) as image:
+        height = round(image.height * WIDTH / image.width)
+        image.convert("RGB").resize((WIDTH, height), Image.Resampling.LANCZOS).quantize(
+            COLOURS, dither=Image.Dither.NONE
+        ).save(target, optimize=True)
+
+
+def main(run: Path) -> None:
+    """Write both."""
+    title, *paragraphs = (run / "report.md").read_text(encoding="utf-8").split("\n\n")
+    text = "\n\n".join([title, SAYS, *paragraphs]).rstrip("\n") + "\n"
+    PICTURES.mkdir(exist_ok=True)
+    for old in PICTURES.glob("*.png"):
+        old.unlink()
+    for name in re.findall(r"!\[[^\]]*\]\(([^)]+\.png)\)", text):
+        small(run / name, PICTURES / name)
+    FILE.write_text(re.sub(r"(!\[[^\]]*\]\()([^)]+\.png\))", r"\1reproduced/\2", text), encoding="utf-8")
+
+
+main(Path(sys.argv[1]))

@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.sentences import too_long
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if Path(__file__).parent in item.path.parents:
             item.add_marker(pytest.mark.papers)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _short_sentences() -> Iterator[None]:
+    """Every claim that a test makes, whatever its figures are, must be readable."""
+    given = Claim.__post_init__
+
+    def checked(claim: Claim) -> None:
+        given(claim)
+        for text in (claim.says, claim.found, claim.conditions, claim.otherwise):
+            for sentence in too_long(text):
+                raise AssertionError(f"{claim.place}: a sentence is too long: {sentence}")
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Claim, "__post_init__", checked)
+        yield

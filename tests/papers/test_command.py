@@ -61,7 +61,7 @@ def test_all_papers_make_one_report() -> None:
     assert said.status == 0, said
     folder = Path("runs/reproduce-all")
     report = (folder / "report.md").read_text()
-    assert "3 claims of the papers: 1 reproduced, 1 not reproduced, 1 reproduced within stated conditions." in report
+    assert "3 claims of the papers: 1 reproduced, 1 reproduced within stated conditions, 1 not reproduced." in report
     table = [
         ["aranovskiy2020", "Fig. 1", "it falls \\| or not", "reproduced"],
         ["sokolov2019", "Section V", "best", "not reproduced"],
@@ -70,6 +70,9 @@ def test_all_papers_make_one_report() -> None:
     ]
     assert rows(report)[2:] == table
     assert rows(said.out)[2:] == table
+    opening = report.partition("## All claims")[0]
+    assert "- sokolov2019, Section V: best\n- andrieu2009, On the rig (not the paper's): it stands\n" in opening
+    assert "Fig. 1" not in opening  # what holds is in the table
     assert "### Section V: not reproduced" in report
     assert "**Why not:** The noise is another." in report
     assert "**Conditions:** It is above 100 Hz." in report

@@ -19,12 +19,11 @@ from cmg_mj.papers.dao2023.study import (
 )
 from cmg_mj.picture import Line, Panel, Picture
 
-
 TESTED = (
     "It holds for the three weights tested, not as a rule: past some hundreds a larger Sigma is slower. One output is "
     "corrected. Once that correction is much faster than the regressor C2 T turns, the estimates slide along the "
-    "directions that the output does not see, the more slowly the stiffer it is. A finer step makes 10000 slower still: "
-    "this is no effect of sampling."
+    "directions that the output does not see, the more slowly the stiffer it is. A finer step makes 10000 slower "
+    "still: this is no effect of sampling."
 )
 
 

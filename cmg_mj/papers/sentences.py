@@ -1,0 +1,53 @@
+"""The sentences of a claim's words: how long they are, and which have been said before."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+LONGEST = 40
+"""Words that a sentence may have: whatever has a letter or a digit in it, between spaces."""
+
+_END = re.compile(r"(?<=[.!?])(?<!\bFig\.)(?<!\be\.g\.)(?<!\bi\.e\.)\s+")
+
+
+def sentences(text: str) -> list[str]:
+    """The sentences of a text, in their order."""
+    return [part for part in _END.split(text.strip()) if part]
+
+
+def words(sentence: str) -> int:
+    """How many words a sentence has."""
+    return sum(any(letter.isalnum() for letter in part) for part in sentence.split())
+
+
+def too_long(text: str) -> Iterator[str]:
+    """The sentences of a text that have more words than `LONGEST`."""
+    return (sentence for sentence in sentences(text) if words(sentence) > LONGEST)
+
+
+class Once:
+    """Says a sentence once; where it stood before is said instead of saying it again."""
+
+    def __init__(self) -> None:
+        self._said: dict[str, str] = {}
+
+    def of(self, text: str, place: str) -> str:
+        """A text without the sentences that earlier places had, which are named first.
+
+        Args:
+            text: Whole sentences.
+            place: Whose they are.
+
+        Returns:
+            The rest, after `As at Fig. 2.` where something is left out.
+        """
+        new, before = [], []
+        for sentence in sentences(text):
+            where = self._said.setdefault(sentence, place)
+            if where == place:
+                new.append(sentence)
+            elif where not in before:
+                before.append(where)
+        said = [f"As at {' and '.join(before)}."] if before else []
+        return " ".join([*said, *new])
