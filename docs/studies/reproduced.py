@@ -13,7 +13,10 @@ from PIL import Image
 
 DOCS = Path(__file__).resolve().parents[1]
 FILE, PICTURES = DOCS / "reproduced.md", DOCS / "reproduced"
-SAYS = "The report of `cmg-mj reproduce all`, its pictures made small. Microseconds and their ratios are those of one machine."
+SAYS = (
+    "The report of `cmg-mj reproduce all`, its pictures made small. Microseconds and their ratios are those of one "
+    "machine."
+)
 WIDTH, COLOURS = 900, 24
 """Of the small pictures: [px], and so many of a palette."""
 

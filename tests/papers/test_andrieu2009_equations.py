@@ -1,0 +1,163 @@
+"""andrieu2009: W of (19), (20) against differences and motions; (11), (12); (2) and the exponent of (6)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from cmg_mj.papers.andrieu2009 import equations_11_12, equations_19_20, increments
+from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection
+from cmg_mj.papers.andrieu2009.lyapunov import Lyapunov, States, decay, states
+
+WITHIN = "reproduced within stated conditions"
+
+
+def lyapunov(d_inf: float, l1: float = 8.0, sigma: float = 3.0) -> Lyapunov:
+    return Lyapunov(BiLimitCorrection((l1, 1.0), d_inf), sigma, 2.0 + d_inf)
+
+
+def at(W: Lyapunov, e1: float, e2: float) -> States:
+    """s1 and s2 of a state, q1 inverted by bisection."""
+    low, high = -abs(e2) - 1.0, abs(e2) + 1.0
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if float(W.q1(np.array(middle))) < e2 else (low, middle)
+    return States(np.array([W.K.l[0] * e1]), np.array([0.5 * (low + high)]))
+
+
+# --- (19), (20) ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("d_inf", [0.0, 0.3, 0.5])
+def test_w_is_its_integral_and_the_gradient_its_derivative(d_inf: float) -> None:
+    W = lyapunov(d_inf)
+    for e1, e2 in ((0.3, -0.8), (-0.2, -0.1), (0.01, 1.5)):
+        here = at(W, e1, e2)
+        middle = W.h(here.s2)[0]
+        first = quad(lambda s, middle=middle: float(W.h(np.array(s)) - middle), here.s2[0], here.s1[0])[0]
+        assert W.W(here)[0] == pytest.approx(first + W.sigma * abs(e2) ** W.d_W / W.d_W, rel=1e-9)
+        step = 1e-6
+        by_e1 = (W.W(at(W, e1 + step, e2)) - W.W(at(W, e1 - step, e2)))[0] / (2.0 * step)
+        by_e2 = (W.W(at(W, e1, e2 + step)) - W.W(at(W, e1, e2 - step)))[0] / (2.0 * step)
+        assert [float(part[0]) for part in W.gradient(here)] == pytest.approx([by_e1, by_e2], rel=1e-4, abs=1e-7)
+
+
+@pytest.mark.parametrize("d_inf", [0.25, 0.75])
+def test_w_is_homogeneous_in_the_bi_limit(d_inf: float) -> None:
+    """Of degree d_W with the weights (1, 1) near 0 and (1 - d_inf, 1) far out, and positive."""
+    W = lyapunov(d_inf)
+    near, far = at(W, 0.4e-9, -0.7e-9), at(W, 0.4 * (1e12) ** (1.0 - d_inf), -0.7e12)
+    twice_near, twice_far = at(W, 0.8e-9, -1.4e-9), at(W, 0.4 * (2e12) ** (1.0 - d_inf), -1.4e12)
+    assert W.W(twice_near)[0] / W.W(near)[0] == pytest.approx(2.0**W.d_W, rel=1e-3)
+    assert W.W(twice_far)[0] / W.W(far)[0] == pytest.approx(2.0**W.d_W, rel=1e-3)
+    assert (W.W(states()) > 0.0).all()
+
+
+@pytest.mark.parametrize("d_inf", [0.0, 0.5, 0.9])
+def test_w_falls_along_motions_as_19_says(d_inf: float) -> None:
+    """Integrated, with A1 and A2 that swing within (17), from other states than those of the grid."""
+    found = equations_19_20.search(d_inf)
+    assert found is not None
+    W = lyapunov(d_inf, found.l1, found.sigma)
+
+    def slope(tau: float, e: np.ndarray) -> list[float]:
+        k1, k2 = W.K(float(e[0]))
+        spread = equations_19_20.SPREAD
+        return [(1.0 + spread * np.sin(7.0 * tau)) * (e[1] + k1), (1.0 + spread * np.cos(3.0 * tau)) * k2]
+
+    for start in ([1.0, -2.0], [-30.0, 5.0], [0.01, 0.02]):
+        tau = np.linspace(0.0, 2.0, 401)
+        motion = solve_ivp(slope, (0.0, 2.0), start, "LSODA", tau, rtol=1e-9, atol=1e-12).y
+        values = np.array([W.W(at(W, *e))[0] for e in motion.T])
+        fall = -np.diff(values) / np.diff(tau)
+        bound = values + values ** ((W.d_W + d_inf) / W.d_W)
+        assert (fall > 0.95 * found.decay.c1 * np.minimum(bound[1:], bound[:-1]) - 1e-12).all()
+
+
+def test_constants_hold_on_a_finer_grid() -> None:
+    claim = equations_19_20.claim()
+    assert claim.verdict == WITHIN
+    for d_inf in (0.0, 0.5, 0.9):
+        found = equations_19_20.search(d_inf)
+        assert found is not None
+        finer = decay(
+            lyapunov(d_inf, found.l1, found.sigma),
+            found.b,
+            equations_19_20.SPREAD,
+            states(np.geomspace(1e-9, 1e8, 501), 97),
+        )
+        assert min(finer) > 0.0
+        assert finer.c1 == pytest.approx(found.decay.c1, rel=0.1)
+
+
+def test_a_poor_w_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Too little weight on e2 fails (20), too little l1 (19)."""
+    assert decay(lyapunov(0.5, sigma=0.03), 0.5).c2 < 0.0
+    assert decay(lyapunov(0.5, l1=0.5), 0.5, 0.3).c1 < 0.0
+    monkeypatch.setattr(equations_19_20, "L1", (0.5,))
+    assert equations_19_20.claim().verdict == "not reproduced"
+
+
+# --- (11), (12) ---------------------------------------------------------------------------------------------
+
+
+def test_disturbances_and_starts() -> None:
+    error, gain = equations_11_12.claims()
+    assert error.verdict == gain.verdict == WITHIN
+    for row in error.figures["late_scaled_error"].values():  # a tenth of the disturbance, about a tenth of the error
+        assert row[1] / row[2] == pytest.approx(10.0, rel=0.1)
+    assert np.all(np.diff(gain.figures["largest_gain_by_error"]) > 0.0)
+    assert np.all(np.diff(gain.figures["largest_late_gain_by_amplitude"]) > 1.0)
+
+
+def test_the_disturbed_solution_is_one_of_the_system() -> None:
+    """Without an error at the start, and with exact measurements of y, what is left is what was put in."""
+    quiet = equations_11_12.follow([equations_11_12.Column()])
+    assert quiet.scaled.max() < 1e-5
+    assert quiet.gain[0, 0] == 2.0  # phi2
+
+
+def test_11_and_12_can_fail() -> None:
+    balls = np.array([[1.0, 0.1, 0.01], [1.0, 0.1, 0.01], [1.0, 0.1, 0.05]])
+    fades = np.full((3, 4), 1e-8)
+    assert equations_11_12.scaled_error(balls, fades).verdict == "not reproduced"
+    balls[2, 2] = 0.01
+    assert equations_11_12.scaled_error(balls, fades).verdict == WITHIN
+    assert equations_11_12.scaled_error(balls, np.full((3, 4), 1e-3)).verdict == "not reproduced"
+    L = np.full((3, 4), 12.0)
+    three, late = np.full(3, 12.0), np.array([False, True, True])
+    assert equations_11_12.gain_bound(L, three, three, late).verdict == WITHIN
+    L[1:, 3] = 13.0  # it remembers the largest error
+    assert equations_11_12.gain_bound(L, three, three, late).verdict == "not reproduced"
+    remembers = np.array([12.0, 12.0, 14.0])
+    assert equations_11_12.gain_bound(np.full((3, 4), 12.0), remembers, three, late).verdict == "not reproduced"
+
+
+# --- (2), (6) -----------------------------------------------------------------------------------------------
+
+
+def test_linear_increments() -> None:
+    claim = increments.linear_increments()
+    assert claim.verdict == "reproduced"
+    assert increments.increments_of_2(0.0, seed=5) == pytest.approx(1.0, abs=1e-9)
+    assert increments.increments_of_2(0.2, seed=5) > 2.0
+
+
+def test_exponent_of_6() -> None:
+    """n = 2: 1 + p by section 2.1, 1 as printed, which bounds no power; the two differ for every n."""
+    claim = increments.exponent_of_6()
+    assert claim.verdict == WITHIN
+    assert increments.exponent_of_section_2_1(2, 2, 2, 0.4) == pytest.approx(1.4)
+    assert increments.exponent_printed(2, 2, 2, 0.4) == pytest.approx(1.0)
+    assert increments.exponent_of_section_2_1(4, 3, 2, 0.2) == pytest.approx(1.0 / 0.6)
+    grown = [increments.quotient_of_6(1.0, 0.5, size) for size in (1e2, 1e4, 1e6)]
+    assert grown[1] / grown[0] == pytest.approx(10.0, rel=0.1)
+    assert grown[2] / grown[1] == pytest.approx(10.0, rel=0.1)
+
+
+def test_exponent_of_6_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(increments, "exponent_printed", increments.exponent_of_section_2_1)
+    assert increments.exponent_of_6().verdict == "reproduced"
+    monkeypatch.setattr(increments, "exponent_of_section_2_1", lambda *args: 1.0)
+    assert increments.exponent_of_6().verdict == "not reproduced"
