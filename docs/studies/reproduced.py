@@ -17,7 +17,7 @@ SAYS = (
     "The report of `cmg-mj reproduce all`, its pictures made small. Microseconds and their ratios are those of one "
     "machine."
 )
-WIDTH, COLOURS = 900, 24
+WIDTH, COLOURS = 820, 40
 """Of the small pictures: [px], and so many of a palette."""
 
 

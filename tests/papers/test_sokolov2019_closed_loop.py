@@ -95,6 +95,22 @@ def test_every_figure_shows_its_own_observers_runs(found: Loops, lags: Lags, cyc
     assert claims["luenberger"].figures["fell_fraction"] == {"0_deg": 0.0, "0.25_deg": 0.0, "0.5_deg": 1.0}
 
 
+def test_only_the_runs_behind_a_gap_have_one(found: Loops) -> None:
+    """There the gimbal rests at many ticks; without a gap the command is never exactly zero."""
+    for name in OBSERVERS:
+        for result in (found.by_bias[e][name] for e in found.by_bias):
+            assert result.trajectory is not None
+            assert not (result.trajectory["u_rad_s"][1:] == 0.0).any()
+        assert found.gap[name].trajectory is not None
+        assert (found.gap[name].trajectory["u_rad_s"] == 0.0).mean() > 0.1
+    # The same seeds: until the push the rigs differ by their bias alone.
+    one, other = (found.by_bias[e]["homogeneous"].trajectory for e in (0.0, 0.5))
+    assert one is not None
+    assert other is not None
+    noise = one["y1_rad"] - one["x1_rad"], other["y1_rad"] - other["x1_rad"]
+    assert np.corrcoef(noise[0][:100, 0], noise[1][:100, 0])[0, 1] > 0.9
+
+
 def test_the_late_window_does_not_hold_the_pushs_tail(found: Loops) -> None:
     for name in OBSERVERS:
         late = deviation(found.by_bias[0.25][name])

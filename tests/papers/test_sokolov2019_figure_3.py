@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmg_mj.intervals import Interval
 from cmg_mj.papers.sokolov2019 import figure_3
 from cmg_mj.papers.sokolov2019.rig import estimator
 from cmg_mj.replay import replay
@@ -48,3 +49,28 @@ def test_9_and_its_form_with_y2_are_one_at_small_angles(tuning: figure_3.Tuning)
         for observer in (estimator("luenberger", tuning.prepared), figure_3.nine_with_y2(tuning.prepared))
     )
     np.testing.assert_allclose(other, one, atol=2e-4 * np.abs(one).max())
+
+
+def test_a_failure_must_be_beyond_chance(tuning: figure_3.Tuning) -> None:
+    """The lower end of (9)'s interval above one and above the upper ends of the others."""
+    relative = figure_3.relative_errors(tuning)
+
+    def verdict(nine: tuple[float, float], ten: tuple[float, float] = (0.4, 0.6)) -> str:
+        intervals = {"luenberger": nine, "homogeneous": ten, "linear": (0.4, 0.6)}
+        return figure_3.misses_the_push(
+            tuning,
+            relative | {name: Interval(0.5 * (low + high), low, high) for name, (low, high) in intervals.items()},
+        ).verdict
+
+    assert verdict((1.1, 1.5)) == "reproduced"
+    assert verdict((0.9, 1.5)) == "not reproduced"
+    assert verdict((1.1, 2.0), ten=(0.9, 1.2)) == "not reproduced"
+    assert verdict((1.3, 2.0), ten=(0.9, 1.2)) == "reproduced"
+    assert verdict((1.3, 2.0), ten=(1.1, 1.2)) == "reproduced within stated conditions"
+
+
+def test_with_y2_it_must_be_better_than_zero_beyond_chance(tuning: figure_3.Tuning) -> None:
+    relative = figure_3.relative_errors(tuning)
+    for ends, verdict in (((0.7, 0.9), "reproduced"), ((0.8, 1.1), "not reproduced")):
+        changed = relative | {figure_3.WITH_Y2: Interval(0.85, *ends)}
+        assert figure_3.ignores_y2(tuning, changed).verdict == verdict

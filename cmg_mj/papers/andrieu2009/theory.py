@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from cmg_mj import markdown
 from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.papers.andrieu2009 import equations_11_12, equations_19_20
 from cmg_mj.papers.andrieu2009.bi_limit import largest_b, violated_conditions
@@ -43,7 +44,8 @@ def scaling_conditions() -> Claim:
         place="Section 4.3, (21), (22)",
         says=f"b satisfies (21), (22), and section 3.1 uses b = {B} with p = {P}.",
         found=f"For n = 2 both ask for b < (1 - p)/p = {bound:.4f}. With the printed values {len(lines)} inequalities "
-        f"do not hold: {'; '.join(lines)}.",
+        "do not hold.",
+        table=markdown.table(("inequality", "is not so"), [line.split(": ", 1) for line in lines], text_columns=2),
         holds=not lines,
         otherwise="The parameters of the simulation are outside the theorem's proof. It does no harm there: the "
         "argument of the correction is so small that b and p have no effect (see the claim on the correction). With "

@@ -114,21 +114,21 @@ def claim(found: Study) -> Claim:
         for case, result in found.free.items()
     }
     told = "; ".join(
-        f"{case}: {share:.0%} fall" + (f", at {ends[case].mean:.2f} s" if share == 1.0 else "")
+        f"{case} {share:.0%} fall" + (f", at {ends[case].mean:.2f} s" if share == 1.0 else "")
         for case, share in falls.items()
     )
     return Claim(
         place="Fig. 2, the bearing",
         says="The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
         found=(
-            f"One gimbal leaves a torque about the vertical, dH/dt with H = J_d w_d cos x3 cos q_b and smaller terms, "
-            f"which MuJoCo's inverse dynamics confirm to {error:.0e} N m. A locked bearing carries up to "
-            f"{plus_minus(peak, 3)} N m at a push ({worlds} seeds; {of_mean:.3f} in their mean), and "
-            f"{plus_minus(rest, 3)} N m RMS that the tilt's noise makes before it; a scissored pair's carries "
-            f"{pair:.0e} N m. On a free bearing, with the exact rate in the law: {told}. There the yaw takes up the "
-            f"tilt: (J_d w_d)^2/(2 I_z) = {k.gyroscopic:.2f} N m/rad against gravity's {k.gravity:.2f}, so little is "
-            "left to bring the gimbal back with, and of the wrong sign: the linearised law has a pole at "
-            f"{np.real(k.poles).max():+.3f} 1/s, and a start off the upright makes the gimbal run away."
+            "One gimbal leaves a torque about the vertical, dH/dt with H = J_d w_d cos x3 cos q_b and smaller terms; "
+            f"MuJoCo's inverse dynamics confirm it to {error:.0e} N m. A locked bearing carries up to "
+            f"{plus_minus(peak, 3)} N m at a push ({worlds} seeds; {of_mean:.3f} in their mean). Noise makes "
+            f"{plus_minus(rest, 3)} N m RMS of it before; a scissored pair's bearing carries {pair:.0e} N m. A free "
+            f"bearing, with the exact rate in the law: {told}. There the yaw takes up the tilt: (J_d w_d)^2/(2 I_z) is "
+            f"{k.gyroscopic:.2f} N m/rad against gravity's {k.gravity:.2f}. So little is left to bring the gimbal back "
+            f"with, and of the wrong sign: the linearised law has a pole at {np.real(k.poles).max():+.3f} 1/s, and a "
+            "start off the upright makes the gimbal run away."
         ),
         holds=error < 1e-9 and pair < 1e-6 * peak.mean,
         conditions=(

@@ -151,7 +151,7 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
         place="Section V, (9) and y2",
         says="(9) ignores y2 completely, and thus is not robust against external disturbances.",
         found=(
-            f"y2 does not reach its rate at all: noise of 1 rad on y2 changes it by {reach:.0e} rad/s. But with every "
+            f"y2 does not reach its rate: noise of 1 rad on y2 changes it by {reach:.0e} rad/s. But with every "
             f"term in y2 put back in its relative error at the push is {with_y2.mean:.2f} instead of "
             f"{without.mean:.2f}. What (9) lacks is the push: d/J1 through (s + 20)/(s^2 + 20 s + "
             f"{stiffness(tuning.prepared.plant.reduced):.1f}) explains {explained:.0%} of its error's variance there "

@@ -73,8 +73,8 @@ def figure_4(found: Loops, lags: Lags, cycles: Cycles) -> Claim:
         conditions=(
             ""
             if by_itself
-            else f"{HELD} Without it noise keeps the loop ringing, which is no oscillation by itself; that takes a "
-            f"servo lag of {in_ms(begins)}, and the model's is {in_ms(lags.own_lag_s)}."
+            else f"{HELD} Without backlash noise keeps the loop ringing, which is no oscillation by itself; that takes "
+            f"a servo lag of {in_ms(begins)}, and the model's is {in_ms(lags.own_lag_s)}."
         ),
         otherwise="Without noise it comes to rest, with backlash too.",
         figures=_figures(found, "linear", cycles)
@@ -101,8 +101,8 @@ def figure_5(found: Loops, lags: Lags, cycles: Cycles) -> Claim:
         conditions=(
             ""
             if by_itself
-            else f"{HELD} Without it the loop is well damped (damping ratio {prediction.damping:.2f}) and misses the "
-            "push: it falls, if the bias adds to that."
+            else f"{HELD} Without backlash the loop is well damped (damping ratio {prediction.damping:.2f}) and misses "
+            "the push: it falls, if the bias adds to that."
         ),
         otherwise="Without noise it comes to rest, with backlash too.",
         figures=_figures(found, "luenberger", cycles)
@@ -170,7 +170,7 @@ def figure_6_at_rest(lags: Lags, cycles: Cycles) -> Claim:
         place="Fig. 6, beside Figs 4 and 5",
         says="With (10) in the loop the oscillations of Figs 4 and 5 are not there.",
         found=(
-            f"Let go without noise, with backlash: (8) {eight.words}, (9) {nine.words}, (10) {ten.words}. "
+            f"Let go without noise, with backlash, (10) {ten.words}. (8) {eight.words}. (9) {nine.words}. "
             f"Without backlash (10) comes to rest at {len(slow) - slow.sum()} of {len(slow)} servo lags up to "
             f"{in_ms(float(lags.sweeps['homogeneous'].lags_s[-1]))}."
         ),

@@ -34,7 +34,11 @@ def picture(name: str, found: Loops) -> Picture:
         rows[0].append(Panel("tilt [deg]", tilt, title, shaded=shaded))
         rows[1].append(Panel("tilt rate [rad/s]", rates, shaded=shaded))
         rows[2].append(
-            Panel("gimbal rate\nasked for [rad/s]", [Line(t, one["u_rad_s"], "u", color=3, width=0.6)], shaded=shaded)
+            Panel(
+                "rate the gimbal is\nturned at [rad/s]",
+                [Line(t, one["u_rad_s"], "u", color=3, width=0.6)],
+                shaded=shaded,
+            )
         )
     number = NUMBERS[name]
     title = f"sokolov2019, Fig. {number}: {OBSERVERS[name]} in the loop, a push at 1 s (e = {SHOWN_DEG} deg)"

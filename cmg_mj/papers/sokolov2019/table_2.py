@@ -15,11 +15,13 @@ WARM_UP_S = 0.5
 """Replayed before the window: many times the time constants of the three [s]."""
 NUMBERS = {"linear": ["tau"], "luenberger": ["L[0][0]", "L[1][0]"], "homogeneous": ["k1", "k2", "alpha"]}
 """What is tuned of each; the entry of L that corrects x3 does not reach the rate."""
-NOISES_UG_RTHZ = (100.0, 400.0, 1600.0)
-"""One list for all three: they were tuned on one recording."""
 GENTLE = ("push.0.torque_n_m=0.15", "plant.equilibrium_bias_deg=0.0")
 """A push of which the model knows more, on a rig without bias."""
-PUSHES: dict[str, Sequence[str]] = {"0.5 N m, e = 0.5 deg": (), "0.15 N m, e = 0": GENTLE}
+PUSHES: dict[str, tuple[Sequence[str], Sequence[float]]] = {
+    "0.5 N m, e = 0.5 deg": ((), (100.0, 400.0, 1600.0)),
+    "0.15 N m, e = 0": (GENTLE, (400.0,)),
+}
+"""What pushes, and at which noises [ug/sqrt(Hz)]: the same for all three, which were tuned on one recording."""
 
 Tuned = Mapping[str, Mapping[str, Sequence[Level]]]
 """Push -> observer -> what came out, one a noise."""
@@ -33,12 +35,10 @@ def levels_of(name: str, settings: Sequence[str], worlds: int, seed: int, noises
     ).levels
 
 
-def tuned(
-    on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, noises: Sequence[float] = NOISES_UG_RTHZ
-) -> dict[str, dict[str, Sequence[Level]]]:
+def tuned(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> dict[str, dict[str, Sequence[Level]]]:
     """Tune all three under both pushes."""
     found: dict[str, dict[str, Sequence[Level]]] = {push: {} for push in PUSHES}
-    for i, (push, settings) in enumerate(PUSHES.items()):
+    for i, (push, (settings, noises)) in enumerate(PUSHES.items()):
         for j, name in enumerate(OBSERVERS):
             found[push][name] = levels_of(name, settings, worlds, seed, noises)
             on_share((3 * i + j + 1) / 6.0)

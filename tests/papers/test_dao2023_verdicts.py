@@ -1,0 +1,104 @@
+"""dao2023's verdicts on made-up errors, each of which one part of a claim turns on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmg_mj.papers.dao2023 import as_printed, figure_2, figure_3
+from cmg_mj.papers.dao2023.pendulum_robot import Errors
+from cmg_mj.papers.dao2023.study import SIGMAS, Study
+
+T = np.linspace(0.0, 200.0, 401)
+WITHIN = "reproduced within stated conditions"
+
+
+def errors(settle: dict[float, float], state: float = 0.05) -> Errors:
+    """Two motions whose exogenous errors leave the band at a time a weight; the state's tail has one size."""
+    exogenous = np.zeros((len(T), len(SIGMAS), 2, 3))
+    for i, sigma in enumerate(SIGMAS):
+        exogenous[settle[sigma] > T, i] = 5.0
+    return Errors(T, np.full((len(T), len(SIGMAS), 2, 2), state / np.sqrt(2.0)), exogenous)
+
+
+def study(settle: dict[float, float], state: float = 0.05, plain: float = 0.3) -> Study:
+    conventional = Errors(T, np.full((len(T), 1, 2, 2), plain / np.sqrt(2.0)), np.zeros((len(T), 1, 2, 2)))
+    return Study(errors(settle, state), conventional, 1.0)
+
+
+AS_PRINTED = {10.0: 150.0, 1000.0: 50.0, 0.1: 190.0}
+
+
+def test_conclusion_holds_for_the_weights_tested() -> None:
+    def claim(**changed: float) -> tuple[str, bool]:
+        settle = AS_PRINTED | {10_000.0: 20.0} | {float(key[1:].replace("_", ".")): t for key, t in changed.items()}
+        found = figure_3.larger_gains(study(settle))
+        return found.verdict, figure_3.TESTED in found.conditions
+
+    assert claim() == (WITHIN, False)
+    assert claim(s10000=170.0) == (WITHIN, True)  # it turns round beyond them
+    assert claim(s1000=160.0)[0] == "not reproduced"
+    assert claim(s0_1=140.0)[0] == "not reproduced"
+
+
+def test_settling_order_needs_both_steps() -> None:
+    def verdict(settle: dict[float, float]) -> str:
+        return figure_3.settling_order(study(settle | {10_000.0: 20.0})).verdict
+
+    assert verdict(AS_PRINTED) == WITHIN
+    assert verdict(AS_PRINTED | {1000.0: 160.0}) == "not reproduced"
+    assert verdict(AS_PRINTED | {0.1: 100.0}) == "not reproduced"
+    assert verdict(dict.fromkeys(SIGMAS, 500.0)) == "not reproduced"  # none settles
+
+
+@pytest.mark.parametrize(
+    ("state", "plain", "two_a", "two_b"),
+    [
+        (0.05, 0.3, WITHIN, WITHIN),
+        (0.15, 0.3, WITHIN, "not reproduced"),
+        (0.05, 0.1, "not reproduced", WITHIN),
+        (0.05, 0.04, "not reproduced", "not reproduced"),
+    ],
+)
+def test_figure_2(state: float, plain: float, two_a: str, two_b: str) -> None:
+    found = study(AS_PRINTED | {10_000.0: 20.0}, state, plain)
+    assert figure_2.conventional(found).verdict == two_a
+    assert figure_2.proposed(found).verdict == two_b
+
+
+def test_figure_2_is_that_of_the_first_weight() -> None:
+    """Whatever the others do."""
+    made = errors(AS_PRINTED | {10_000.0: 20.0})
+    state = made.state.copy()
+    state[:, 1:] = 9.0
+    settled, _ = figure_2.state_settle_times(Errors(T, state, made.exogenous))
+    assert (settled == 0.0).all()
+    plain = study(AS_PRINTED | {10_000.0: 20.0}).conventional
+    assert figure_2.proposed(Study(Errors(T, state, made.exogenous), plain, 1.0)).verdict == WITHIN
+    state[:, 0] = 9.0
+    settled, _ = figure_2.state_settle_times(Errors(T, state, made.exogenous))
+    assert np.isinf(settled).all()
+
+
+def test_parameters_at_the_end() -> None:
+    found = study(AS_PRINTED | {10_000.0: 20.0})
+    assert figure_3.parameters(found).verdict == WITHIN
+    found.proposed.exogenous[-1, 1, 0, 1] = 2e-3
+    assert figure_3.parameters(found).verdict == "not reproduced"
+
+
+def test_what_the_observer_finds_decides_what_is_meant(monkeypatch: pytest.MonkeyPatch) -> None:
+    """(10) or (14): both are seen, a third is not."""
+    for amplitude, verdict, scaled in ((2.0, WITHIN, True), (1.0, WITHIN, False), (1.5, "not reproduced", True)):
+        monkeypatch.setattr(as_printed, "amplitude_found_if_10_holds", lambda a=amplitude: np.array([a, a]))
+        claim = as_printed.printed()
+        assert claim.verdict == verdict
+        assert ("(14), not (10), scales d." in claim.conditions) is scaled
+
+
+def test_an_explicit_step_that_stays_bounded_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(as_printed, "explicit_escape", lambda *args: np.inf)
+    monkeypatch.setattr(as_printed, "DURATION_S", 40.0)
+    claim = as_printed.sampled(lambda share: None)
+    assert claim.figures["explicit_step_escapes_after_s"] is None
+    assert "stays bounded" in claim.found
