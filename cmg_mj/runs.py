@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import json
 import math
-import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +13,11 @@ import numpy as np
 import tomli_w
 
 from cmg_mj.engine import quiet
-from cmg_mj.errors import InputError, raised
 from cmg_mj.experiment import Experiment, load_rig, prepare
 from cmg_mj.observers.protocol import BIAS, extra_signals
 from cmg_mj.plant import Plant
 from cmg_mj.plots import plot_run
+from cmg_mj.run_folder import write_result
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Outcome, Result
 from cmg_mj.trajectory import Trajectory, whole_file
@@ -147,48 +145,7 @@ def compare(
     return compared
 
 
-def output_folder(path: Path) -> Path:
-    """Make the folder a run writes to, and find out now whether it can be written.
-
-    Args:
-        path: The folder.
-
-    Returns:
-        The same.
-
-    Raises:
-        InputError: It cannot be made or written.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=path).close()
-    except OSError as error:
-        raise InputError(f"--out {path}: cannot be written: {error.strerror}") from error
-    return path
-
-
-def unused_folder(parent: Path, name: str, experiment: Experiment) -> Path:
-    """A folder that no other run has written: the name itself, or with a number behind it.
-
-    The same run again goes to the same folder.
-
-    Args:
-        parent: Where the folders are.
-        name: The name wanted.
-        experiment: What will be written there.
-
-    Returns:
-        The folder, which need not exist yet.
-    """
-    text = tomli_w.dumps(experiment.resolved())
-    for number in itertools.count(1):
-        folder = parent / (name if number == 1 else f"{name}-{number}")
-        scenario = folder / "scenario.toml"
-        if not folder.exists() or (scenario.is_file() and scenario.read_text(encoding="utf-8") == text):
-            return folder
-    raise AssertionError("count() does not end")
-
-
+@quiet()
 def save_run(folder: Path, experiment: Experiment, result: Result, *, plot: bool = False) -> None:
     """Write scenario.toml, summary.json, trajectory.parquet and recording.rrd, each whole or not at all.
 
@@ -204,7 +161,7 @@ def save_run(folder: Path, experiment: Experiment, result: Result, *, plot: bool
     trajectory = trajectory_with_metadata(experiment, result)
     scenario = experiment.scenario
     title = f"{scenario.title or 'Run'}: {scenario.observer.kind}, seed {scenario.seed}"
-    _write(
+    write_result(
         folder,
         {
             "trajectory.parquet": trajectory.save,
@@ -216,6 +173,7 @@ def save_run(folder: Path, experiment: Experiment, result: Result, *, plot: bool
     )
 
 
+@quiet()
 def save_comparison(folder: Path, compared: Sequence[Compared]) -> None:
     """Write summary.json, a trajectory an observer, scenario.toml and one recording of world 0 of all of them.
 
@@ -231,7 +189,7 @@ def save_comparison(folder: Path, compared: Sequence[Compared]) -> None:
         f"trajectory-{name}.parquet": trajectory_with_metadata(entry.experiment, entry.example).save
         for name, entry in zip(names, compared, strict=True)
     }
-    _write(
+    write_result(
         folder,
         {
             **trajectories,
@@ -240,27 +198,6 @@ def save_comparison(folder: Path, compared: Sequence[Compared]) -> None:
             "recording.rrd": lambda path: _record(path, [(entry.experiment, entry.example) for entry in compared]),
         },
     )
-
-
-def _write(folder: Path, files: Mapping[str, Callable[[Path], None]]) -> None:
-    """Write every file that can be written, then complain of those that cannot. What an earlier run left goes first."""
-    for pattern in ("trajectory*.parquet", "recording.rrd", "summary.json", "plot.png"):
-        for stale in folder.glob(pattern):
-            if stale.is_file():
-                stale.unlink()
-    wrong = {}
-    for name, write in files.items():
-        try:
-            with quiet():
-                write(folder / name)
-        except Exception as error:  # a title that no file can hold: the other files are kept all the same
-            wrong[name] = error
-    if wrong:
-        why = "; ".join(
-            f"{folder / name}: cannot be written: {getattr(error, 'strerror', None) or raised(error)}"
-            for name, error in wrong.items()
-        )
-        raise InputError(why)
 
 
 def with_own_observer(experiments: Sequence[Experiment]) -> Experiment:

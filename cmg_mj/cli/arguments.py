@@ -45,9 +45,13 @@ class Chosen:
 
     def folder(self, default: str, experiment: Experiment) -> Path:
         """The folder to write to."""
-        from cmg_mj.runs import unused_folder
+        import tomli_w
 
-        return made_folder(unused_folder(Path("runs"), default, experiment) if self.out is None else named(self.out))
+        from cmg_mj.run_folder import unused_folder
+
+        if self.out is not None:
+            return made_folder(named(self.out))
+        return made_folder(unused_folder(Path("runs"), default, tomli_w.dumps(experiment.resolved())))
 
 
 def of_a_run(command: Callable) -> Callable:
@@ -89,7 +93,7 @@ of_observers = click.option(
 
 def made_folder(path: Path) -> Path:
     """The same folder, made and found writable; taken away again at the end if nothing was written to it."""
-    from cmg_mj.runs import output_folder
+    from cmg_mj.run_folder import output_folder
 
     new = [folder for folder in (path, *path.parents) if not folder.exists()]
 
