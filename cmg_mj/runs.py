@@ -17,10 +17,10 @@ from cmg_mj.experiment import Experiment, load_rig, prepare
 from cmg_mj.observers.protocol import BIAS, extra_signals
 from cmg_mj.plant import Plant
 from cmg_mj.plots import plot_run
-from cmg_mj.run_folder import write_result
+from cmg_mj.run_folder import RunFolder, claimed, write_text
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Outcome, Result
-from cmg_mj.trajectory import Trajectory, whole_file
+from cmg_mj.trajectory import Trajectory
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,59 +145,72 @@ def compare(
     return compared
 
 
+def files_of_run(*, plot: bool = False) -> list[str]:
+    """Names of what a run writes."""
+    return ["trajectory.parquet", "summary.json", "scenario.toml", "recording.rrd", *(["plot.png"] if plot else [])]
+
+
 @quiet()
-def save_run(folder: Path, experiment: Experiment, result: Result, *, plot: bool = False) -> None:
-    """Write scenario.toml, summary.json, trajectory.parquet and recording.rrd, each whole or not at all.
+def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *, plot: bool = False) -> Path:
+    """Write scenario.toml, summary.json, trajectory.parquet and recording.rrd, all at once.
 
     Args:
-        folder: Where.
+        folder: Where. What is there and was not written by cmg_mj stays.
         experiment: What was run.
         result: One world's result, with its trajectory.
         plot: Write plot.png as well.
 
+    Returns:
+        Where they are: the folder, or one in it (see `RunFolder.write`).
+
     Raises:
-        InputError: The folder cannot be written any more.
+        InputError: The folder, or a file, cannot be written.
     """
     trajectory = trajectory_with_metadata(experiment, result)
     scenario = experiment.scenario
     title = f"{scenario.title or 'Run'}: {scenario.observer.kind}, seed {scenario.seed}"
-    write_result(
-        folder,
-        {
-            "trajectory.parquet": trajectory.save,
-            "summary.json": lambda path: _write_json(path, summary_of(experiment, result)),
-            "scenario.toml": experiment.save,
-            "recording.rrd": lambda path: _record(path, [(experiment, result)]),
-            **({"plot.png": lambda path: plot_run(path, trajectory, title)} if plot else {}),
-        },
+    writers = (
+        trajectory.save,
+        lambda path: _write_json(path, summary_of(experiment, result)),
+        experiment.save,
+        lambda path: _record(path, [(experiment, result)]),
+        lambda path: plot_run(path, trajectory, title),
     )
+    with claimed(folder) as it:
+        complete = result.outcomes[0].kind in ("done", "fell")
+        return it.write(dict(zip(files_of_run(plot=plot), writers, strict=False)), complete=complete)
+
+
+def files_of_comparison(kinds: Sequence[str]) -> list[str]:
+    """Names of what a comparison of these observers writes."""
+    trajectories = [f"trajectory-{name}.parquet" for name in file_names(kinds)]
+    return [*trajectories, "summary.json", "scenario.toml", "recording.rrd"]
 
 
 @quiet()
-def save_comparison(folder: Path, compared: Sequence[Compared]) -> None:
+def save_comparison(folder: RunFolder | Path, compared: Sequence[Compared], *, complete: bool = True) -> Path:
     """Write summary.json, a trajectory an observer, scenario.toml and one recording of world 0 of all of them.
 
     Args:
-        folder: Where.
+        folder: Where. What is there and was not written by cmg_mj stays.
         compared: What was run.
+        complete: Whether these are all observers that were to be compared.
+
+    Returns:
+        Where they are: the folder, or one in it (see `RunFolder.write`).
 
     Raises:
-        InputError: The folder cannot be written any more.
+        InputError: The folder, or a file, cannot be written.
     """
-    names = file_names([entry.kind for entry in compared])
-    trajectories = {
-        f"trajectory-{name}.parquet": trajectory_with_metadata(entry.experiment, entry.example).save
-        for name, entry in zip(names, compared, strict=True)
-    }
-    write_result(
-        folder,
-        {
-            **trajectories,
-            "summary.json": lambda path: _write_json(path, [entry.summary for entry in compared]),
-            "scenario.toml": with_own_observer([entry.experiment for entry in compared]).save,
-            "recording.rrd": lambda path: _record(path, [(entry.experiment, entry.example) for entry in compared]),
-        },
+    writers = (
+        *(trajectory_with_metadata(entry.experiment, entry.example).save for entry in compared),
+        lambda path: _write_json(path, [entry.summary for entry in compared]),
+        with_own_observer([entry.experiment for entry in compared]).save,
+        lambda path: _record(path, [(entry.experiment, entry.example) for entry in compared]),
     )
+    names = files_of_comparison([entry.kind for entry in compared])
+    with claimed(folder) as it:
+        return it.write(dict(zip(names, writers, strict=True)), complete=complete)
 
 
 def with_own_observer(experiments: Sequence[Experiment]) -> Experiment:
@@ -246,8 +259,7 @@ def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
 
 
 def _write_json(path: Path, value: Any) -> None:
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(value, indent=2) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(value, indent=2))
 
 
 def _finite(value: Any) -> Any:

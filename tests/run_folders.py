@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rerun.chunk import RrdReader
 
+from cmg_mj.run_folder.manifest import HIDDEN
 from cmg_mj.trajectory import Trajectory
 
 FILES = ["recording.rrd", "scenario.toml", "summary.json", "trajectory.parquet"]
@@ -21,7 +22,8 @@ def write(text: str, path: str = "my.toml") -> str:
 
 
 def names(place: str) -> list[str]:
-    return sorted(path.name for path in Path(place).iterdir())
+    """What is in a folder, but for cmg_mj's own list of it."""
+    return sorted(path.name for path in Path(place).iterdir() if path.name != HIDDEN)
 
 
 def assert_whole(place: str) -> Trajectory:
@@ -31,3 +33,11 @@ def assert_whole(place: str) -> Trajectory:
     tomllib.loads((Path(place) / "scenario.toml").read_text())
     assert list(RrdReader(Path(place) / "recording.rrd").stream().to_chunks())
     return Trajectory.load(Path(place) / "trajectory.parquet")
+
+
+def recorded_scenario(place: Path) -> str:
+    """The scenario, as TOML, that a recording shows."""
+    stream = RrdReader(place / "recording.rrd").stream()
+    (chunk,) = list(stream.filter(content="/scenario", components="TextDocument:text", is_static=True))
+    ((page,),) = chunk.to_record_batch().column("TextDocument:text").to_pylist()
+    return page.partition("```toml\n")[2].removesuffix("```\n")

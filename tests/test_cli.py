@@ -21,6 +21,7 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.report import columns_of, comparison_table
 from cmg_mj.resources import bundled
 from tests.command import COMMAND, cmg_mj, cmg_mj_process, environment
+from tests.run_folders import assert_whole
 
 SUMMARY = [
     "observer",
@@ -314,7 +315,7 @@ def test_a_reader_that_has_had_enough_is_no_error(quick: str) -> None:
     os.close(write)
     assert "Traceback" not in done.stderr
     assert "Error" not in done.stderr
-    assert len(list(Path("it").iterdir())) == 4
+    assert_whole("it")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")

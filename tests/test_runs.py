@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tomli_w
 
-from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare, run_folder, runs
+from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare, runs
 from cmg_mj.errors import InputError
 from cmg_mj.resources import folder
 from cmg_mj.simulate import Outcome
@@ -117,12 +116,6 @@ def test_a_folder_is_written_over() -> None:
     assert_whole("it")
 
 
-def test_looking_whether_a_folder_can_be_written_leaves_nothing() -> None:
-    write("mine", "it/.writable")
-    run_folder.output_folder(Path("it"))
-    assert names("it") == [".writable"]
-
-
 def test_a_fall_is_a_result() -> None:
     said = cmg_mj("run", write("duration_s = 3.0\n[plant]\nequilibrium_bias_deg = 20.0"), "--out", "it", "--json")
     summary = json.loads(said.out)
@@ -149,7 +142,7 @@ def test_a_run_without_a_tick_can_be_written() -> None:
     assert result.trajectory is not None
     none = replace(result.trajectory, columns={name: column[:0] for name, column in result.trajectory.columns.items()})
     empty = dataclasses.replace(result, trajectory=none, outcomes=[Outcome("interrupted", 0.0)])
-    runs.save_run(run_folder.output_folder(Path("it")), experiment, empty, plot=True)
+    runs.save_run(Path("it"), experiment, empty, plot=True)
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 0
     assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
 
@@ -215,15 +208,6 @@ def test_observers_of_one_name_from_two_places_do_not_overwrite_each_other() -> 
     assert runs.file_names(["ltv", "a.b:Mine", "c:Mine", "c:Yours"]) == ["ltv", "a.b.Mine", "c.Mine", "Yours"]
 
 
-def test_another_run_does_not_take_the_folder_of_one_that_is_there() -> None:
-    first = prepare(parse_scenario({"duration_s": 0.05}))
-    other = prepare(parse_scenario({"duration_s": 0.05, "plant": {"equilibrium_bias_deg": 0.2}}))
-    folder = run_folder.output_folder(run_folder.unused_folder(Path("runs"), "mine", tomli_w.dumps(first.resolved())))
-    runs.save_run(folder, first, first.run())
-    assert run_folder.unused_folder(Path("runs"), "mine", tomli_w.dumps(first.resolved())) == folder
-    assert run_folder.unused_folder(Path("runs"), "mine", tomli_w.dumps(other.resolved())) == Path("runs/mine-2")
-
-
 def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
     """Those without one run untrimmed; alone, they are refused (tests/bad_input/)."""
     scenario = load_scenario("bias_estimation", ["duration_s=0.5"])
@@ -256,5 +240,5 @@ def test_a_title_that_no_file_can_hold_loses_nothing_else() -> None:
     experiment = prepare(parse_scenario({"duration_s": 0.2, "title": "ok"}))
     bad = replace(experiment, scenario=experiment.scenario.model_copy(update={"title": "\udcff"}))
     with pytest.raises(InputError, match="cannot be written: UnicodeEncodeError"):
-        runs.save_run(run_folder.output_folder(Path("it")), bad, bad.run())
+        runs.save_run(Path("it"), bad, bad.run())
     assert {"summary.json", "trajectory.parquet"} <= {path.name for path in Path("it").iterdir()}

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +14,7 @@ from cmg_mj.errors import InputError, nearest
 
 if TYPE_CHECKING:
     from cmg_mj.experiment import Experiment
+    from cmg_mj.run_folder import RunFolder
     from cmg_mj.schema import Scenario
 
 
@@ -43,15 +43,15 @@ class Chosen:
         scenario = load_scenario(self.name, self.settings, observer)
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
-    def folder(self, default: str, experiment: Experiment) -> Path:
-        """The folder to write to."""
+    def folder(self, default: str, names: Sequence[str], experiment: Experiment) -> RunFolder:
+        """The folder to write these files to."""
         import tomli_w
 
         from cmg_mj.run_folder import unused_folder
 
         if self.out is not None:
-            return made_folder(named(self.out))
-        return made_folder(unused_folder(Path("runs"), default, tomli_w.dumps(experiment.resolved())))
+            return claim(named(self.out), names)
+        return released_at_the_end(unused_folder(Path("runs"), default, names, tomli_w.dumps(experiment.resolved())))
 
 
 def of_a_run(command: Callable) -> Callable:
@@ -91,19 +91,17 @@ of_observers = click.option(
 )
 
 
-def made_folder(path: Path) -> Path:
-    """The same folder, made and found writable; taken away again at the end if nothing was written to it."""
-    from cmg_mj.run_folder import output_folder
+def claim(path: Path, names: Sequence[str] = ()) -> RunFolder:
+    """The folder for what a command writes: no other may write to it until the command is done."""
+    from cmg_mj.run_folder import RunFolder
 
-    new = [folder for folder in (path, *path.parents) if not folder.exists()]
+    return released_at_the_end(RunFolder(path, names))
 
-    def take_away() -> None:
-        with suppress(OSError):  # what holds something stays
-            for folder in new:
-                folder.rmdir()
 
-    click.get_current_context().call_on_close(take_away)
-    return output_folder(path)
+def released_at_the_end(folder: RunFolder) -> RunFolder:
+    """The same, until the command is done; a folder it has made and has written nothing to goes with it."""
+    click.get_current_context().call_on_close(folder.release)
+    return folder
 
 
 def named(out: str) -> Path:

@@ -18,6 +18,7 @@ from cmg_mj.cli.terminal import (
     say_written,
     show,
     users_code,
+    where,
 )
 from cmg_mj.errors import InputError, RunStopped
 
@@ -48,25 +49,25 @@ def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
     scenario = chosen.scenario(observer)
     experiment = prepare(scenario)
     kind = runs.file_name(scenario.observer.kind)
-    folder = chosen.folder(f"{Path(chosen.name).stem}-{kind}-{scenario.seed}", experiment)
+    default = f"{Path(chosen.name).stem}-{kind}-{scenario.seed}"
+    folder = chosen.folder(default, runs.files_of_run(plot=plot), experiment)
     with CtrlC() as ctrl_c:
         with progress(scenario.title or chosen.name, scenario.duration_s, ctrl_c) as on_progress:
             result = experiment.run(driver=driver, on_progress=on_progress)  # type: ignore[arg-type]
         summary = runs.summary_of(experiment, result)
         try:
-            runs.save_run(folder, experiment, result, plot=plot)
+            place = runs.save_run(folder, experiment, result, plot=plot)
         finally:
             show(summary, report.summary_table(summary), chosen.as_json)
-    if not chosen.as_json:
-        say_written(folder)
+    say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", chosen.as_json)
     outcome = result.outcomes[0]
     if outcome.kind == "stopped":
-        raise RunStopped(f"{outcome.reason}; what was recorded until then is in {folder}")
+        raise RunStopped(f"{outcome.reason}; what was recorded until then is in {where(folder, place)}")
     if outcome.kind == "interrupted":
-        say(f"interrupted at {outcome.time_s:g} s; what was recorded until then is in {folder}")
+        say(f"interrupted at {outcome.time_s:g} s; what was recorded until then is in {where(folder, place)}")
         sys.exit(INTERRUPTED)
     if ctrl_c.noted:
-        say(f"interrupted when all was done; it is in {folder}")
+        say(f"interrupted when all was done; it is in {where(folder, place)}")
         sys.exit(INTERRUPTED)
 
 
@@ -100,7 +101,7 @@ def compare(chosen: Chosen, observers: str, worlds: int, markdown: bool) -> None
             )
     experiments = runs.prepare_comparison(scenario, names)
     own = runs.with_own_observer(experiments)
-    folder = chosen.folder(f"{Path(chosen.name).stem}-compare-{scenario.seed}", own)
+    folder = chosen.folder(f"{Path(chosen.name).stem}-compare-{scenario.seed}", runs.files_of_comparison(names), own)
     with CtrlC() as ctrl_c:
         with progress(f"{scenario.title or chosen.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
             compared = runs.compare(experiments, worlds, on_progress)
@@ -109,18 +110,17 @@ def compare(chosen: Chosen, observers: str, worlds: int, markdown: bool) -> None
             sys.exit(INTERRUPTED)
         summaries = [entry.summary for entry in compared]
         try:
-            runs.save_comparison(folder, compared)
+            place = runs.save_comparison(folder, compared, complete=len(compared) == len(names))
         finally:
             title = f"{scenario.title or chosen.name}: {worlds} worlds an observer, seed {scenario.seed}"
             table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
             show(summaries, table, chosen.as_json)
-    if not chosen.as_json:
-        say_written(folder)
+    say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", chosen.as_json)
     for entry in compared:
         if entry.stopped:
             say(f"{entry.kind}: {len(entry.stopped)} of {worlds} worlds stopped: {entry.stopped[0].reason}")
     if ctrl_c.noted or len(compared) < len(names):
-        say(f"interrupted; {len(compared)} of {len(names)} observers are in {folder}")
+        say(f"interrupted; {len(compared)} of {len(names)} observers are in {where(folder, place)}")
         sys.exit(INTERRUPTED)
     if any(entry.stopped for entry in compared):
         sys.exit(WRONG_INPUT)

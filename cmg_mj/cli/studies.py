@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from cmg_mj.cli.arguments import Chosen, check_observer, made_folder, named, names_of, of_a_run, of_observers
-from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, show, users_code
+from cmg_mj.cli.arguments import Chosen, check_observer, claim, named, names_of, of_a_run, of_observers
+from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code, where
 from cmg_mj.errors import InputError, nearest
 
 
@@ -44,23 +44,22 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     """
     from cmg_mj.papers import BEYOND, PAPERS, check_installed
     from cmg_mj.papers import reproduce as obtain
-    from cmg_mj.papers.report import figures_of, save_report, verdict_table
+    from cmg_mj.papers.report import REPORT_FILES, figures_of, save_report, verdict_table
 
     names = (*PAPERS, *BEYOND, "all")
     if paper not in names:
         raise InputError(f"{paper!r}: no such paper; {nearest(paper, names)}")
     papers = list(PAPERS) if paper == "all" else [paper]
     check_installed(papers)  # before a folder is made
-    folder = made_folder(named(out) if out is not None else Path("runs") / f"reproduce-{paper}")
+    folder = claim(named(out) if out is not None else Path("runs") / f"reproduce-{paper}", REPORT_FILES)
     with CtrlC() as ctrl_c:
         with progress(f"reproduce {paper}", 1.0, ctrl_c) as on_progress:
             entries = obtain(papers, lambda now, done: on_progress(done, now))
-        save_report(folder, entries)
+        place = save_report(folder, entries)
         show(figures_of(entries), verdict_table(entries), as_json)
-    if not as_json:
-        click.echo(f"Written to {folder}. Read {folder / 'report.md'}", err=True)
+    say_written(folder, place, f"Read {place / 'report.md'}", as_json)
     if ctrl_c.noted:
-        say(f"interrupted; what was obtained until then is in {folder}")
+        say(f"interrupted; what was obtained until then is in {where(folder, place)}")
         sys.exit(INTERRUPTED)
 
 
@@ -98,17 +97,17 @@ def tune(
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """
     from cmg_mj.runs import file_name
-    from cmg_mj.tuning import figures_of, save_study, tuning_table
+    from cmg_mj.tuning import figures_of, files_of_study, save_study, tuning_table
     from cmg_mj.tuning import tune as fit
 
     if observer is not None:
         check_observer("--observer", observer)
     scenario = chosen.scenario(observer)
     default = Path("runs") / f"tune-{file_name(scenario.observer.kind)}-{scenario.seed}"
-    folder = made_folder(default if chosen.out is None else named(chosen.out))
     densities = [_density(text) for text in noise.split(",") if text.strip()]
     if noise and not densities:
         raise InputError(f"--noise {noise!r}: give numbers with commas between")
+    folder = claim(default if chosen.out is None else named(chosen.out), files_of_study(densities))
     with CtrlC() as ctrl_c:
         with progress(f"{scenario.title or chosen.name}: {scenario.observer.kind}", 1.0, ctrl_c) as on_progress:
             study = fit(
@@ -120,11 +119,12 @@ def tune(
                 on_share=on_progress,
             )
         show(figures_of(study), tuning_table(study), chosen.as_json)
-        files = save_study(folder, study)
-    if not chosen.as_json:
-        click.echo(f"Written to {folder}. Run with the tuned observer: cmg-mj run {files[1]}", err=True)
+        wanted = len(densities) or 1
+        files = save_study(folder, study, complete=len(study.levels) == wanted)
+    place = files[0].parent
+    say_written(folder, place, f"Run with the tuned observer: cmg-mj run {files[1]}", chosen.as_json)
     if ctrl_c.noted:
-        say(f"interrupted; {len(study.levels)} of {len(densities) or 1} noise densities are in {folder}")
+        say(f"interrupted; {len(study.levels)} of {wanted} noise densities are in {where(folder, place)}")
         sys.exit(INTERRUPTED)
 
 

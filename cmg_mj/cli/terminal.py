@@ -10,9 +10,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import click
+
+if TYPE_CHECKING:
+    from cmg_mj.run_folder import RunFolder
 
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 """Exit statuses."""
@@ -92,9 +95,15 @@ def say(message: str) -> None:
     click.echo(f"cmg-mj: {' '.join(message.split())}", err=True)
 
 
-def say_written(folder: Path) -> None:
-    """Where the files are, and how to open the recording."""
-    click.echo(f"Written to {folder}. Open the recording: rerun {folder / 'recording.rrd'}", err=True)
+def where(folder: RunFolder, place: Path) -> str:
+    """Where a result is, and why if it is not where the user wanted it."""
+    return str(place) if place == folder.path else f"{place}; what {folder.path} has held stays as it was"
+
+
+def say_written(folder: RunFolder, place: Path, open_it: str, as_json: bool) -> None:
+    """Where the files are, and how to open them; with JSON on standard output only what is not as expected."""
+    if not as_json or place != folder.path:
+        click.echo(f"Written to {where(folder, place)}. {open_it}", err=True)
 
 
 def show(value: Any, table: Any, as_json: bool) -> None:

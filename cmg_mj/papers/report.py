@@ -15,7 +15,7 @@ from cmg_mj.papers import BEYOND, PAPERS, Reproduced
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.sentences import Once
 from cmg_mj.plots import draw
-from cmg_mj.trajectory import whole_file
+from cmg_mj.run_folder import RunFolder, Writers, claimed, write_text
 
 
 def figures_of(entries: Sequence[Reproduced]) -> dict[str, Any]:
@@ -146,18 +146,28 @@ def _count_of_verdicts(entries: Sequence[Reproduced]) -> str:
     return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
 
 
-def save_report(folder: Path, entries: Sequence[Reproduced]) -> None:
-    """Write report.md, figures.json and the plots, each whole or not at all.
+REPORT_FILES = ["report.md", "figures.json"]
+"""What every report has; its pictures are beside them."""
+
+
+def save_report(folder: RunFolder | Path, entries: Sequence[Reproduced]) -> Path:
+    """Write report.md, figures.json and the plots, all at once.
 
     Args:
-        folder: Where; it exists.
+        folder: Where. What is there and was not written by cmg_mj stays.
         entries: What was obtained.
+
+    Returns:
+        Where they are: the folder, or one in it (see `RunFolder.write`).
+
+    Raises:
+        InputError: The folder, or a file, cannot be written.
     """
-    for entry in entries:
-        for claim in entry.claims:
-            for picture in claim.pictures:
-                draw(folder / f"{picture.name}.png", picture)
-    texts = {"figures.json": json.dumps(figures_of(entries), indent=2), "report.md": report_text(entries)}
-    for name, text in texts.items():
-        with whole_file(folder / name) as temporary:
-            temporary.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+    pictures = [picture for entry in entries for claim in entry.claims for picture in claim.pictures]
+    writers: Writers = {
+        "report.md": lambda path: write_text(path, report_text(entries)),
+        "figures.json": lambda path: write_text(path, json.dumps(figures_of(entries), indent=2)),
+        **{f"{picture.name}.png": lambda path, picture=picture: draw(path, picture) for picture in pictures},
+    }
+    with claimed(folder) as it:
+        return it.write(writers, complete=all(entry.complete for entry in entries))

@@ -6,7 +6,7 @@ are fitted on one set of worlds and scored on another.
 
 from cmg_mj.tuning.recorded import Recorded, record
 from cmg_mj.tuning.study import BestNoise, Level, Study, best_noise, tune, tuned_scenario
-from cmg_mj.tuning.written import figures_of, save_study, tuning_table
+from cmg_mj.tuning.written import figures_of, files_of_study, save_study, tuning_table
 
 __all__ = [
     "BestNoise",
@@ -15,6 +15,7 @@ __all__ = [
     "Study",
     "best_noise",
     "figures_of",
+    "files_of_study",
     "record",
     "save_study",
     "tune",

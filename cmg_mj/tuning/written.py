@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich import box
 from rich.table import Table
 
-from cmg_mj.errors import InputError
 from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval
-from cmg_mj.trajectory import whole_file
+from cmg_mj.run_folder import RunFolder, claimed, write_text
 from cmg_mj.tuning.study import Level, Study, best_noise, tuned_scenario
 
 
@@ -144,27 +143,31 @@ def _best(study: Study) -> str:
     return f"Of these noises the given parameters lose least at {best.noise_ug_rthz:g} ug/rtHz."
 
 
-def save_study(folder: Path, study: Study) -> list[Path]:
+def files_of_study(noises_ug_rthz: Sequence[float]) -> list[str]:
+    """Names of what a study writes: one noise makes scenario.toml, several make scenario-NOISE.toml."""
+    several = [f"scenario-{noise:g}.toml" for noise in noises_ug_rthz] if len(noises_ug_rthz) > 1 else ["scenario.toml"]
+    return ["tuned.json", *several]
+
+
+def save_study(folder: RunFolder | Path, study: Study, *, complete: bool = True) -> list[Path]:
     """Write tuned.json and a scenario a sensor noise, which runs with the tuned observer.
 
     Args:
-        folder: Where; it exists.
+        folder: Where. What is there and was not written by cmg_mj stays.
         study: What to write.
+        complete: Whether these are all noises that were asked for.
 
     Returns:
-        The files. One noise makes scenario.toml, several make scenario-NOISE.toml.
+        The files.
 
     Raises:
         InputError: A file cannot be written.
     """
-    files = [folder / "tuned.json"]
-    try:
-        with whole_file(files[0]) as temporary:
-            temporary.write_text(json.dumps(figures_of(study), indent=2) + "\n", encoding="utf-8")
-        for level in study.levels:
-            one = len(study.levels) == 1
-            files.append(folder / ("scenario.toml" if one else f"scenario-{level.noise_ug_rthz:g}.toml"))
-            prepare(tuned_scenario(study, level)).save(files[-1])
-    except OSError as error:
-        raise InputError(f"{files[-1]}: cannot be written: {error.strerror or error}") from error
-    return files
+    names = files_of_study([level.noise_ug_rthz for level in study.levels])
+    writers = (
+        lambda path: write_text(path, json.dumps(figures_of(study), indent=2)),
+        *(prepare(tuned_scenario(study, level)).save for level in study.levels),
+    )
+    with claimed(folder) as it:
+        place = it.write(dict(zip(names, writers, strict=True)), complete=complete)
+    return [place / name for name in names]

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from cmg_mj import Estimate, Measurement
-from cmg_mj.trajectory import Trajectory
 from tests.bad_input.complaints import assert_in_order, table
 from tests.command import cmg_mj
+from tests.run_folders import assert_whole
 
 
 class Mine:
@@ -177,13 +177,7 @@ def test_an_observer_that_fails_in_a_run(given: type, fragments: list[str], driv
     written, complaint = said.err.splitlines()
     assert written.startswith("Written to it. ")
     assert_in_order(["cmg-mj: ", *fragments, "what was recorded until then is in it"], complaint)
-    assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 30
-    assert sorted(path.name for path in Path("it").iterdir()) == [
-        "recording.rrd",
-        "scenario.toml",
-        "summary.json",
-        "trajectory.parquet",
-    ]
+    assert len(assert_whole("it")) == 30
 
 
 def test_an_observer_that_fails_among_others(quick: str) -> None:
