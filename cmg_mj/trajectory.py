@@ -122,8 +122,9 @@ class Trajectory:
         stored = {"layout": asdict(self.layout), **self.metadata}
         metadata = {b"cmg_mj": json.dumps(stored).encode()}
         table = pa.table(self.columns).replace_schema_metadata(metadata)
-        with whole_file(path) as temporary:
-            pq.write_table(table, temporary)
+        # Opened here: Arrow takes no path with bytes that are no UTF-8.
+        with whole_file(path) as temporary, temporary.open("wb") as file:
+            pq.write_table(table, file)
 
     @staticmethod
     def load(path: Path) -> Trajectory:
@@ -142,7 +143,8 @@ class Trajectory:
         import pyarrow.parquet as pq
 
         try:
-            table = pq.read_table(path)
+            with open(path, "rb") as file:
+                table = pq.read_table(file)
         except (OSError, pa.ArrowException) as error:
             raise InputError(f"{path}: not a trajectory: {' '.join(str(error).split())}") from error
         text = (table.schema.metadata or {}).get(b"cmg_mj")

@@ -42,6 +42,18 @@ class Waits(Interrupts):
         Path('waiting').touch()
         while not Path('pressed').exists():
             time.sleep(0.01)
+
+class Slow(Interrupts):
+    '''Takes 0.1 s a sample; presses it at the fourth.'''
+    def step(self, k, y, u):
+        time.sleep(0.1)
+        if k == 2:
+            Path('after').write_text('')
+            self.press()
+        elif k > 2:
+            with Path('after').open('a') as after:
+                after.write('.')
+        return k + 1, Estimate(y.y1, 0.0 * y.y1, y.y2)
 """
 LONG = "duration_s = 600.0\n[controller]\nfeedback = 'truth'\n[observer]\nkind = 'pressing:Interrupts'"
 
@@ -79,6 +91,20 @@ def test_twice_ends_a_run_at_once() -> None:
     assert said.status == 130, said
     assert said.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
     assert len(assert_whole("it")) == 599
+
+
+@pytest.mark.parametrize("command", [["run"], ["compare", "--observers", "pressing:Slow", "--worlds", 2]])
+def test_is_heard_after_the_tick_however_slow_an_observer_is(command: list) -> None:
+    """An observer of 0.1 s a sample: not one more sample is taken."""
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process(
+        command[0], write(LONG.replace("Interrupts", "Slow")), *command[1:], "--out", "it", cwd=Path()
+    )
+    assert said.status == 130, said
+    assert Path("after").read_text() == ""
+    if command == ["run"]:
+        assert said.err.splitlines()[-1].startswith("cmg-mj: interrupted at 0.015 s; ")
+        assert len(assert_whole("it")) == 4
 
 
 WRITING = """
@@ -171,6 +197,17 @@ def test_from_outside() -> None:
     assert len(assert_whole("it")) == 600
     verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", "it/recording.rrd"], capture_output=True)
     assert verified.returncode == 0, verified
+
+
+def test_leaves_the_complete_result_of_a_run_before() -> None:
+    write(OBSERVER, "pressing.py")
+    assert cmg_mj_process("run", write("duration_s = 0.1"), "--out", "it", cwd=Path()).status == 0
+    said = cmg_mj_process("run", write(LONG), "--out", "it", cwd=Path())
+    assert said.err.splitlines()[-1] == (
+        "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it/incomplete; what it has held stays as it was"
+    )
+    assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 20
+    assert len(assert_whole("it/incomplete")) == 600
 
 
 def test_a_study_that_cannot_begin_leaves_no_folder() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.run_folder import RunFolder, Writers, swap
+from cmg_mj.run_folder import RunFolder, Writers, swap, write_text
 from cmg_mj.run_folder.manifest import HIDDEN, Manifest
 from tests.command import cmg_mj
 from tests.run_folders import FILES, assert_whole, names, write
@@ -28,7 +28,7 @@ def either_way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) 
 
 
 def writers(text: str, *files: str) -> Writers:
-    return {name: lambda path: path.write_text(text) and None for name in files}
+    return dict.fromkeys(files, lambda path: write_text(path, text))
 
 
 def fill(path: str, text: str, *files: str, complete: bool = True) -> Path:
@@ -40,7 +40,7 @@ def fill(path: str, text: str, *files: str, complete: bool = True) -> Path:
 def holds(path: str) -> dict[str, str]:
     """Every file that a user sees in a folder, and what is in it."""
     files = [file for file in sorted(Path(path).rglob("*")) if file.is_file() and HIDDEN not in file.parts]
-    return {str(file.relative_to(path)): file.read_text() for file in files}
+    return {str(file.relative_to(path)): file.read_text().rstrip() for file in files}
 
 
 def everything(path: str) -> list[str]:
