@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from cmg_mj.errors import nearest, shown
+from cmg_mj.plausible import path_of
 
 
 def expected(annotation: Any) -> str:
@@ -32,7 +33,7 @@ def expected(annotation: Any) -> str:
     if base is bool:
         return "true or false"
     if base is str:
-        return "text in quotes"
+        return " ".join(["text in quotes", *_text_bounds(bounds)])
     if base in (int, float):
         kind = "a whole number" if base is int else "a number"
         return " ".join([kind, " and ".join(_bounds(bounds))]).strip()
@@ -57,6 +58,11 @@ def _bounds(metadata: Iterable[Any]) -> list[str]:
         for name, words in names
         if getattr(bound, name, None) is not None
     ]
+
+
+def _text_bounds(metadata: Iterable[Any]) -> list[str]:
+    longest = [f"of at most {bound.max_length} characters" for bound in metadata if hasattr(bound, "max_length")]
+    return [*longest, *(["without control characters"] if any(hasattr(bound, "pattern") for bound in metadata) else [])]
 
 
 def _plural(phrase: str) -> str:
@@ -87,13 +93,13 @@ def complaint(root: Any, detail: Mapping[str, Any], fields: Mapping[str, Any]) -
     location = [part for part in detail["loc"] if not str(part).startswith(("list[", "literal["))]  # a union's members
     kind = detail["type"]
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
-        where = ".".join(str(part) for part in location)
+        where = path_of(location)
         return f"{where}: no such field; {nearest(str(location[-1]), _section(_type_at(root, location[:-1])))}"
     missing = kind in ("missing", "missing_argument")
     while location and isinstance(location[-1], int) and not fields_of(_type_at(root, location)):
         location.pop()  # what is wrong with an element is wrong with its list
         missing = False
-    where = ".".join(str(part) for part in location)
+    where = path_of(location)
     annotation = _type_at(root, location)
     if missing:
         return f"{where}: missing; must be {expected(annotation)}"

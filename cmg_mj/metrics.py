@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.fields import STRICT, Positive
+from cmg_mj.fields import STRICT, Instant, Positive
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -25,7 +25,7 @@ class MetricsSettings:
 
     settle_band_deg: Positive = 1.0
     fall_angle_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 30.0
-    bias_from_s: Annotated[float, Field(ge=0.0)] = 5.0
+    bias_from_s: Instant = 5.0
 
 
 class Metrics:

@@ -24,7 +24,7 @@ def override(fields: dict[str, Any], setting: str) -> None:
         raise InputError(f"--set {setting!r}: write section.field=value, for example plant.equilibrium_bias_deg=1.0")
     try:
         (value,) = tomllib.loads(f"value = {text}").values()
-    except (tomllib.TOMLDecodeError, ValueError):
+    except (ValueError, RecursionError):  # TOMLDecodeError is a ValueError
         value = text.strip()  # a bare word is a string
     *sections, field = parts
     place: Any = fields

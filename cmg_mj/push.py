@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.fields import STRICT, NonNegative, Positive
+from cmg_mj.fields import STRICT, Duration, Instant
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -17,8 +17,8 @@ class Push:
         torque_n_m: Torque about the tilt axis [N m].
     """
 
-    start_s: NonNegative
-    duration_s: Positive = 0.1
+    start_s: Instant
+    duration_s: Duration = 0.1
     torque_n_m: float = 1.0
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -14,8 +15,17 @@ from pydantic import ValidationError
 from cmg_mj.complaint import complaint
 from cmg_mj.errors import InputError
 from cmg_mj.overrides import override
+from cmg_mj.plausible import out_of_size, unreadable
 from cmg_mj.resources import find
 from cmg_mj.schema import ObserverSettings, Scenario
+
+LARGEST_FILE = 1_000_000
+"""Bytes of a scenario file; the longest that a run writes has three thousand."""
+MOST_PARTS = 100
+_PART = r"""(?:"[^"\n]*+"|'[^'\n]*+'|[\w-]++)[ \t]*+\.[ \t]*+"""
+_ENDLESS_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{MOST_PARTS}}}")  # tomllib takes a minute over 50,000 parts
+MOST_CLAUSES = 20
+"""So many wrong fields are named in one line."""
 
 
 def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None = None) -> Scenario:
@@ -33,14 +43,7 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
         InputError: The file does not exist, is no TOML, or has a field that is unknown or not allowed.
     """
     path = find("scenarios", name, ".toml", "scenario")
-    try:
-        fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{name}: not valid TOML: not UTF-8 text (at byte {error.start})") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{name}: not valid TOML: {error}") from error
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read: {error.strerror}") from error
+    fields = _read(path, name)
     changes = []
     if observer is not None:
         changes.append(f"--observer {observer}")
@@ -55,6 +58,31 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in overrides):
         scenario = _find_model(scenario, path.parent)
     return scenario
+
+
+def _read(path: Path, name: str) -> dict[str, Any]:
+    """The content of a TOML file."""
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(f"{name}: larger than {LARGEST_FILE // 1000} kB, which no scenario is")
+        text = path.read_text(encoding="utf-8-sig")
+        if text.lstrip().startswith("<"):
+            raise InputError(f"{name}: is XML, not a scenario; a scenario names its model with plant.model")
+        if _ENDLESS_KEY.search(text):
+            raise InputError(f"{name}: not valid TOML: a key of more than {MOST_PARTS} parts")
+        return tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        raise InputError(f"{name}: not valid TOML: not UTF-8 text (at byte {error.start})") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{name}: not valid TOML: {error}") from error
+    except RecursionError as error:
+        raise InputError(f"{name}: not valid TOML: brackets in one another without end") from error
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{name}: not valid TOML: a number of too many digits, or no date") from error
 
 
 def _find_model(scenario: Scenario, beside: Path) -> Scenario:
@@ -79,14 +107,27 @@ def parse_scenario(fields: Mapping[str, Any], where: str = "") -> Scenario:
     Raises:
         InputError: A field is unknown or not allowed. All wrong fields are named, on one line.
     """
+    wrong = list(unreadable(fields))
+    if wrong:
+        raise InputError(located(where, _clauses(wrong)))
     try:
         # By way of JSON, pydantic takes a list for a tuple and still no text or true for a number.
         scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True)
     except ValidationError as error:
         complaints = [complaint(Scenario, detail, fields) for detail in error.errors()]
-        raise InputError(located(where, "; ".join(dict.fromkeys(complaints)))) from error
+        raise InputError(located(where, _clauses(complaints))) from error
+    wrong = list(out_of_size(fields))
+    if wrong:
+        raise InputError(located(where, _clauses(wrong)))
     scenario._where = where
     return scenario
+
+
+def _clauses(wrong: Iterable[str]) -> str:
+    """All that is wrong, or the first of very much."""
+    each = list(dict.fromkeys(wrong))
+    more = [f"and {len(each) - MOST_CLAUSES} more"] if len(each) > MOST_CLAUSES else []
+    return "; ".join(each[:MOST_CLAUSES] + more)
 
 
 def as_json(value: Any) -> Any:

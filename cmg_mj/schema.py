@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from cmg_mj.controller import Angles, Feedback
-from cmg_mj.fields import NonNegative, Positive
+from cmg_mj.fields import Duration, Instant, Line, NonNegative, Positive, Rate
 from cmg_mj.law import TABLE_2_GAINS, Law, lqr_gains
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
@@ -33,7 +33,7 @@ class ControllerSettings(BaseModel):
     """The control law."""
 
     model_config = FORBID
-    rate_hz: Positive = 200.0
+    rate_hz: Rate = 200.0
     """Control ticks a second; divides the physics rate."""
     gains: tuple[float, float, float, float] | None = None
     """K_e on [x1, x2, x3, x_e]; Table 2's if neither gains nor lqr is given."""
@@ -45,7 +45,7 @@ class ControllerSettings(BaseModel):
     """Which rate the law uses."""
     angles: Angles = "measured"
     """Whether the law uses the measured angles, as (8), or the estimated ones, as the text after (10)."""
-    trim_s: NonNegative = 0.0
+    trim_s: Instant = 0.0
     """For so long from the start the integrator is held where the observer's bias estimate asks for it."""
 
     @model_validator(mode="after")
@@ -83,8 +83,8 @@ class Scenario(BaseModel):
     """One experiment."""
 
     model_config = FORBID
-    title: str = ""
-    duration_s: Positive = 15.0
+    title: Line = ""
+    duration_s: Duration = 15.0
     seed: Annotated[int, Field(ge=0)] = 0
     plant: PlantSettings = Field(default_factory=PlantSettings)
     controller: ControllerSettings = Field(default_factory=ControllerSettings)

@@ -16,7 +16,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, digitise
-from cmg_mj.fields import STRICT, NonNegative, Positive
+from cmg_mj.fields import STRICT, Instant, NonNegative, Positive, Rate
 from cmg_mj.timing import steps_until, whole_steps
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
@@ -51,12 +51,12 @@ class Accelerometer:
         latency_s: From sampling to delivery [s].
     """
 
-    rate_hz: Positive = 200.0
+    rate_hz: Rate = 200.0
     noise_density_ug_rthz: NonNegative = 400.0
     bias_mg: tuple[float, float] = (0.0, 0.0)
     range_g: Positive = 2.0
     counts_per_g: NonNegative = 16384.0
-    latency_s: NonNegative = 0.0
+    latency_s: Instant = 0.0
 
     channels = 4
 
@@ -105,9 +105,9 @@ class Encoder:
         latency_s: From sampling to delivery [s].
     """
 
-    rate_hz: Positive = 200.0
+    rate_hz: Rate = 200.0
     counts_per_revolution: NonNegative = 4096.0
-    latency_s: NonNegative = 0.0
+    latency_s: Instant = 0.0
 
     channels = 0
 
@@ -135,12 +135,12 @@ class Fog:
         latency_s: From sampling to delivery [s].
     """
 
-    rate_hz: Positive = 200.0
+    rate_hz: Rate = 200.0
     angle_random_walk_deg_rth: NonNegative = 0.02
     bias_deg_h: float = 0.0
     bandwidth_hz: NonNegative = 440.0
     range_deg_s: Positive = 490.0
-    latency_s: NonNegative = 0.0
+    latency_s: Instant = 0.0
 
     channels = 1
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import click
@@ -14,6 +14,7 @@ import click
 from cmg_mj.cli import scenarios, studies
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, say
 from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.plausible import is_text
 
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, real sensors, velocity observers.
 
@@ -31,20 +32,35 @@ Exit status: 0 done (a fall is a result), 2 the input is wrong or a run could no
 """
 
 
-class Interruptible(click.Group):
-    """Commands that Ctrl-C ends with one line and exit status 130."""
+class Commands(click.Group):
+    """Commands that Ctrl-C ends with one line and exit status 130, and whose output nobody has to read."""
+
+    def make_context(self, *arguments: Any, **others: Any) -> click.Context:
+        """Read the arguments, which prints what --help asks for."""
+        with _perhaps_unread():
+            return super().make_context(*arguments, **others)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""
         try:
-            return super().invoke(ctx)
+            with _perhaps_unread():
+                return super().invoke(ctx)
         except KeyboardInterrupt:
             say("interrupted")
             sys.exit(INTERRUPTED)
 
 
+@contextmanager
+def _perhaps_unread() -> Iterator[None]:
+    """A reader, such as head, who has had enough is no failure; to click it is one."""
+    try:
+        yield
+    except BrokenPipeError as error:
+        raise click.exceptions.Exit(DONE) from error
+
+
 @click.group(
-    cls=Interruptible, help=HELP, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+    cls=Commands, help=HELP, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
 )
 @click.version_option(package_name="cmg_mj", prog_name="cmg-mj")
 def cli() -> None:  # noqa: D103  (its help is HELP)
@@ -65,27 +81,59 @@ for command in (
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point of `cmg-mj`: wrong input ends in one line on standard error and exit status 2."""
+    _open_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a title's letters where the terminal has only ASCII
     if "" not in sys.path:
         sys.path.append("")  # a user's own observer in the current folder; last, so that it can hide nothing
-    if not (sys.argv[1:] if arguments is None else arguments):
-        click.echo(cli.make_context("cmg-mj", [], resilient_parsing=True).get_help(), err=True)
-        sys.exit(WRONG_INPUT)
     try:
-        cli.main(args=arguments, prog_name="cmg-mj", standalone_mode=False)
-        sys.stdout.flush()
+        status = _status(sys.argv[1:] if arguments is None else arguments)
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+    except OSError as error:
+        status = DONE if isinstance(error, BrokenPipeError) else WRONG_INPUT
+        _give_up_streams(error)
+    if status != DONE:
+        sys.exit(status)
+
+
+def _status(arguments: Sequence[str]) -> Any:
+    """Run a command: its exit status. What is wrong is said."""
+    if not arguments:
+        click.echo(cli.make_context("cmg-mj", [], resilient_parsing=True).get_help(), err=True)
+        return WRONG_INPUT
+    for argument in arguments:
+        if not is_text(argument):  # it would end up in files, which are UTF-8
+            say(f"{argument!r}: not UTF-8 text; settings and names of files and folders must be")
+            return WRONG_INPUT
+    try:
+        cli.main(args=list(arguments), prog_name="cmg-mj", standalone_mode=False)
+    except SystemExit as exit:
+        return exit.code
     except (InputError, RunStopped, click.ClickException) as error:
         say(error.format_message() if isinstance(error, click.ClickException) else str(error))
-        sys.exit(WRONG_INPUT)
+        return WRONG_INPUT
     except (KeyboardInterrupt, click.Abort):  # before or after a command
         say("interrupted")
-        sys.exit(INTERRUPTED)
-    except OSError as error:
-        with suppress(OSError):  # so that Python does not try again to write what it still has
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if isinstance(error, BrokenPipeError):  # the reader, such as head, has had enough
-            sys.exit(DONE)
+        return INTERRUPTED
+    return DONE
+
+
+def _open_streams() -> None:
+    """What a shell has closed (`>&-`) takes all and shows nothing; else the next file written would get its number."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
+
+
+def _give_up_streams(error: OSError) -> None:
+    """Nothing more is written to a stream that takes nothing, by Python at its end either; say why if that can be."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            with suppress(OSError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    if not isinstance(error, BrokenPipeError):
         say(f"{error.filename or 'standard output'}: {error.strerror}")
-        sys.exit(WRONG_INPUT)

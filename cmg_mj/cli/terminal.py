@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, redirect_stdout
+from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -91,8 +91,9 @@ def own_stdout() -> Any:
 
 
 def say(message: str) -> None:
-    """One line on standard error."""
-    click.echo(f"cmg-mj: {' '.join(message.split())}", err=True)
+    """One line on standard error, if anybody reads it."""
+    with suppress(OSError):
+        click.echo(f"cmg-mj: {' '.join(message.split())}", err=True)
 
 
 def where(folder: RunFolder, place: Path) -> str:

@@ -1,0 +1,77 @@
+"""What no field of a scenario takes, whatever its type: text that is none, sizes no rig has, sections without end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from cmg_mj.errors import LONGEST_SHOWN, shown
+
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Sizes of numbers. Products of a few numbers within them stay finite, and nothing a person can lift needs more."""
+MOST_DIGITS = 63  # binary ones, as TOML's whole numbers have
+DEEPEST = 12
+"""So many sections and lists may lie in one another; the scenario's own are four deep."""
+
+
+def is_text(text: str) -> bool:
+    """Whether a string is text, and not bytes that Python could not read as UTF-8."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def path_of(parts: Any) -> str:
+    """Where a field is, `plant.model`, shortened."""
+    path = ".".join(str(part) for part in parts)
+    return path if len(path) <= LONGEST_SHOWN else f"{path[:LONGEST_SHOWN]}..."
+
+
+def unreadable(fields: Mapping[str, Any]) -> Iterator[str]:
+    """What cannot be read as a scenario, whatever the fields are called.
+
+    Args:
+        fields: The TOML file's content.
+
+    Yields:
+        Clauses for an error message.
+    """
+    for path, value in _walk(fields):
+        where = path_of(path)
+        if len(path) > DEEPEST:
+            yield f"{where}: more than {DEEPEST} sections and lists in one another"
+        elif not is_text("".join(map(str, path))):
+            yield f"{where!r}: not UTF-8 text"
+        elif isinstance(value, str) and not is_text(value):
+            yield f"{where} = {shown(value)}: not UTF-8 text"
+        elif isinstance(value, int) and value.bit_length() > MOST_DIGITS:
+            yield f"{where}: must be within 64 bits, from {-(2**MOST_DIGITS)} to {2**MOST_DIGITS - 1}"
+
+
+def out_of_size(fields: Mapping[str, Any]) -> Iterator[str]:
+    """Numbers so large or small that formulas overflow.
+
+    Args:
+        fields: The TOML file's content, which is readable.
+
+    Yields:
+        Clauses for an error message.
+    """
+    for path, value in _walk(fields):
+        if isinstance(value, float) and (not abs(value) <= LARGEST or 0.0 < abs(value) < SMALLEST):
+            yield f"{path_of(path)} = {value:g}: sizes are from {SMALLEST:g} to {LARGEST:g}, or 0"
+
+
+def _walk(fields: Mapping[str, Any]) -> Iterator[tuple[tuple, Any]]:
+    """Every value with its place, and what lies too deep."""
+    waiting: list[tuple[tuple, Any]] = [((), fields)]
+    while waiting:  # no recursion: it would end before the sections do
+        path, value = waiting.pop()
+        if hasattr(value, "tolist"):
+            value = value.tolist()
+        yield path, value
+        if isinstance(value, (Mapping, list, tuple)) and len(path) <= DEEPEST:
+            inside = value.items() if isinstance(value, Mapping) else enumerate(value)
+            waiting += [((*path, name), item) for name, item in reversed(list(inside))]
