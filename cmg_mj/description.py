@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
-
-import numpy as np
 
 from cmg_mj.design import Design
 from cmg_mj.grid import physics_step
 from cmg_mj.known_rigs import RigFacts
-from cmg_mj.law import closed_loop_poles
+from cmg_mj.loop_check import closed_loop, hints
 from cmg_mj.resolved import resolved
 from cmg_mj.schema import Scenario
-from cmg_mj.stability import MARGIN, is_hurwitz
 
 
 def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) -> str:
@@ -33,18 +30,20 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
     timestep = physics_step(scenario, rig.largest_step)
     fields = resolved(scenario, design, rig.path, timestep)
     steps = f"{round(scenario.duration_s / timestep)} physics steps of {timestep:g} s"
-    poles = closed_loop_poles(rig.reduced, law.gains)
-    slowest = float(np.max(np.real(poles)))
-    stability = "stable" if is_hurwitz(poles) else "MARGINAL" if slowest < MARGIN else "UNSTABLE"
+    loop = closed_loop(scenario, law, rig.reduced)
+    coarse = (
+        f"; figures are accurate up to {rig.largest_step:g} s" if timestep > rig.largest_step * (1.0 + 1e-9) else ""
+    )
     observer = {key: value for key, value in fields["observer"].items() if key != "kind"}
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
     rows = [
-        ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}), seed {scenario.seed}"),
+        ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
         ("plant", f"{fields['plant']['model']}, cubes: {', '.join(rig.cubes)}"),
         ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
         ("law", f"K_e = {number(law.gains)} at {scenario.controller.rate_hz:g} Hz, at most {law.rate_limit:g} rad/s"),
         ("", f"tilt rate from the {scenario.controller.feedback}, {scenario.controller.angles} angles"),
-        ("", f"{stability} with the reduced model and its true state, slowest pole {slowest:.3g} 1/s"),
+        ("", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"),
+        ("", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"),
         ("observer", f"{scenario.observer.kind}  {assignments(observer)}".rstrip()),
         *(
             [("", "your own code, which was imported and tried on two samples")]
@@ -55,7 +54,38 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
         *(("push", f"{p.torque_n_m:g} N m from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
-    return "\n".join([f"{name}: valid", *(f"  {label:10}  {text}" for label, text in rows)])
+    return lines(f"{name}: valid", [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))])
+
+
+def rig_description(name: str, scenario: Scenario, design: Design, rig: RigFacts) -> str:
+    """What `cmg-mj check` prints of a model file by itself.
+
+    Args:
+        name: What the user called it.
+        scenario: One with this model and all defaults.
+        design: What the defaults amount to.
+        rig: What the model amounts to.
+
+    Returns:
+        Lines of text.
+    """
+    reduced = rig.reduced
+    share = f", for one of {reduced.gimbals} gimbals" if reduced.gimbals > 1 else ""
+    rows = [
+        ("cubes", ", ".join(rig.cubes)),
+        ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
+        ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
+        ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
+        ("law", f"Table 2's gains, K_e = {number(design.law.gains)}"),
+        *(("hint", hint) for hint in hints(scenario, design, rig)),
+        ("run it", f"cmg-mj run push_recovery --set plant.model={name}"),
+    ]
+    return lines(f"{name}: a rig", rows)
+
+
+def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:
+    """A title, and rows of a label and a text."""
+    return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows)])
 
 
 def assignments(values: Mapping[str, Any]) -> str:

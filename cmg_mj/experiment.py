@@ -13,8 +13,9 @@ import tomli_w
 from cmg_mj.controller import Controller
 from cmg_mj.design import Design, design
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.grid import common_period
+from cmg_mj.grid import check_steps, common_period
 from cmg_mj.law import Law
+from cmg_mj.loop_check import hints
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.resolved import resolved
 from cmg_mj.scenario import located
@@ -154,6 +155,11 @@ class Experiment:
             **options,
         )
 
+    @property
+    def hints(self) -> list[str]:
+        """What is no mistake and yet likely to make the rig fall, in clauses."""
+        return hints(self.scenario, self.design, self.plant.facts)
+
     def rehearse(self, worlds: int | None = None) -> None:
         """Try every observer once, on floats or on arrays of so many worlds: see `Design.rehearse`."""
         self.design.rehearse(worlds)
@@ -176,7 +182,9 @@ def load_rig(scenario: Scenario) -> Plant:
     """
     try:
         period = common_period(scenario) if scenario.plant.timestep_s is None else None
-        return load_plant(scenario.plant, period_s=period)
+        plant = load_plant(scenario.plant, period_s=period)
+        check_steps(scenario, plant.timestep)
+        return plant
     except InputError as error:
         raise InputError(located(scenario._where, str(error))) from error
 

@@ -14,6 +14,10 @@ from cmg_mj.timing import whole_steps
 SENSORS = ("accelerometer", "encoder", "fog")
 FINEST_S = 1e-4
 """A scenario whose rates and times leave only a smaller step than this must name the step itself [s]."""
+MOST_TICKS = 2_000_000
+"""Of a run; one takes about 1.5 kB of memory until the recording is written."""
+MOST_STEPS = 1_000_000_000
+"""Of a run; so many take hours."""
 _LARGEST_DENOMINATOR = 10**9  # 1/3 s as a float is the fraction 1/3
 
 
@@ -24,9 +28,16 @@ def check_times(scenario: Scenario) -> None:
         InputError: One does not; the nearest that would is named.
     """
     timestep = scenario.plant.timestep_s
+    duration, control = scenario.duration_s, scenario.controller.rate_hz
+    if duration * control > MOST_TICKS:
+        raise InputError(
+            f"duration_s = {duration:g}: {duration * control:.3g} control ticks at controller.rate_hz = {control:g}; "
+            f"at most {MOST_TICKS} are kept, {MOST_TICKS / control:g} s"
+        )
     if timestep is None:
         common_period(scenario)
     else:
+        check_steps(scenario, timestep)
         for field, rate in _rates(scenario):
             _check_grid(1.0 / rate, timestep, field, f"{rate:g} Hz", lambda steps: f"{1.0 / (steps * timestep):g} Hz")
         for field, time in _times(scenario):
@@ -37,6 +48,20 @@ def check_times(scenario: Scenario) -> None:
                 f"push.{i}.start_s = {push.start_s:g}: must be less than duration_s = {scenario.duration_s:g}, "
                 "where the run ends"
             )
+
+
+def check_steps(scenario: Scenario, timestep: float) -> None:
+    """A run must come to its end.
+
+    Raises:
+        InputError: It has too many physics steps.
+    """
+    steps = scenario.duration_s / timestep
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"duration_s = {scenario.duration_s:g}: {steps:.3g} physics steps of {timestep:g} s; at most {MOST_STEPS:g} "
+            f"are taken, {MOST_STEPS * timestep:g} s"
+        )
 
 
 def common_period(scenario: Scenario) -> float:

@@ -28,12 +28,14 @@ class RigFacts(NamedTuple):
         cubes: Names of its modules.
         reduced: Its reduced model.
         largest_step: The largest physics step that is accurate enough [s].
+        hints: What on it is not what the reduced model takes it for, in clauses.
     """
 
     path: Path
     cubes: tuple[str, ...]
     reduced: ReducedModel
     largest_step: float
+    hints: tuple[str, ...]
 
 
 def name_of(model: str, *, locked: bool) -> str:
@@ -71,13 +73,16 @@ def known_rig(settings: PlantSettings) -> RigFacts | None:
     if settings.timestep_s is None and _moves_otherwise(settings):
         return None
     kept = folder("models") / FILE
+    if settings.changes_of_physics():
+        return None  # only MuJoCo can say whether it goes with them
     # What a linked model includes, MuJoCo looks for beside the link.
     if path.is_symlink() or path.resolve().parent != folder("models").resolve():
         return None
     try:
         known = json.loads(kept.read_text(encoding="utf-8"))
         rig = known["rigs"][name_of(path.name, locked=settings.lock_thrust_bearing)]
-        facts = RigFacts(path, tuple(rig["cubes"]), ReducedModel(**rig["reduced"]), float(rig["largest_step_s"]))
+        reduced, step = ReducedModel(**rig["reduced"]), float(rig["largest_step_s"])
+        facts = RigFacts(path, tuple(rig["cubes"]), reduced, step, tuple(rig["hints"]))
         return facts if known["sha256"] == hash_of_models() else None
     except (OSError, ValueError, LookupError, TypeError):  # not there, or not as `read_off` writes it
         return None

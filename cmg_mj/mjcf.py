@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
 
-from cmg_mj.errors import InputError, nearest
-
-KEYFRAME = "equilibrium"
+from cmg_mj.errors import InputError
+from cmg_mj.model_files import check_files
+from cmg_mj.rig_check import Placement, numbers_that_are_none
+from cmg_mj.rig_parts import NEEDS, lacks
 
 
 def _one_line(error: Exception) -> str:
@@ -22,17 +22,16 @@ def _one_line(error: Exception) -> str:
 
 
 def parse(path: Path) -> mujoco.MjSpec:
-    """Read a model file and see that it is a rig.
+    """Read a model file.
 
     Raises:
-        InputError: It is no MJCF, or lacks a named element.
+        InputError: It is no MJCF.
     """
+    check_files(path)
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
+        return mujoco.MjSpec.from_file(str(path))
+    except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
-    require(spec, path)
-    return spec
 
 
 def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
@@ -43,55 +42,43 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     """
     try:
         return spec.compile()
-    except ValueError as error:
+    except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{path}: does not compile: {_one_line(error)}") from error
 
 
-def require(spec: mujoco.MjSpec, path: Path) -> None:
-    """A rig has certain joints, actuators, sensors and a keyframe, by name.
+def load_rig(path: Path, *, lock: bool) -> tuple[mujoco.MjModel, list[str]]:
+    """Read and compile a model, without what is only seen, and see that it is a rig.
 
-    The compiler, which comes after this, would only say that the keyframe has the wrong size.
+    Args:
+        path: The model's file.
+        lock: Whether to take the yaw joint out.
+
+    Returns:
+        The model, and what is right on it and yet not what the reduced model takes it for, in clauses.
+
+    Raises:
+        InputError: It is no rig. All that is missing or wrong is named.
     """
-    elements = {
-        "joint": {joint.name: joint for joint in spec.joints},
-        "actuator": {actuator.name: actuator for actuator in spec.actuators},
-        "sensor": {sensor.name: sensor for sensor in spec.sensors},
-        "keyframe": {key.name: key for key in spec.keys},
-    }
-
-    def get(kind: str, name: str) -> Any:
-        if name not in elements[kind]:
-            raise InputError(
-                f"{path}: the model has no {kind} {name!r}; {nearest(name, elements[kind], 'its ' + kind + 's')}"
-            )
-        return elements[kind][name]
-
-    def check(is_right: bool, what: str) -> None:
-        if not is_right:
-            raise InputError(f"{path}: {what}")
-
-    for joint in spec.joints:
-        check(bool(joint.name), f"the joint of body {joint.parent.name!r} has no name")
-        check(int(joint.type) == int(mujoco.mjtJoint.mjJNT_HINGE), f"joint {joint.name!r} must be a hinge")
-    axis = np.array(get("joint", "tilt").axis)
-    check(bool(axis[1] > 0.0 and axis[0] == axis[2] == 0.0), "joint 'tilt' must turn about y (axis=\"0 1 0\")")
-    suffixes = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
-    names = [name for kind in elements.values() for name in kind]
-    cubes = [name.rpartition("/")[0] for name in names if name.endswith(suffixes)]
-    for cube in dict.fromkeys(cubes or ["cube1"]):
-        for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
-            get("joint", f"{cube}/{name}")
-            drive = get("actuator", f"{cube}/{actuator}")
-            drives = drive.target == f"{cube}/{name}" and int(drive.trntype) == int(mujoco.mjtTrn.mjTRN_JOINT)
-            check(drives, f"actuator '{cube}/{actuator}' must drive the joint '{cube}/{name}'")
-        encoder = get("sensor", f"{cube}/gimbal_encoder")
-        is_one = int(encoder.type) == int(mujoco.mjtSensor.mjSENS_JOINTPOS) and encoder.objname == f"{cube}/gimbal"
-        check(is_one, f"sensor '{cube}/gimbal_encoder' must be the jointpos of '{cube}/gimbal'")
-    sensors = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
-    for name, kind in sensors.items():
-        is_one = int(get("sensor", name).type) == int(getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"))
-        check(is_one, f"sensor {name!r} must be of the kind {kind!r}")
-    get("keyframe", KEYFRAME)
+    spec = parse(path)
+    missing, hints = lacks(spec), []
+    wrong = list(missing)
+    if lock and not missing:
+        lock_thrust_bearing(spec, path)
+    spec.compiler.discardvisual = True
+    try:
+        model = compile_model(spec, path)
+        numbers = numbers_that_are_none(model)
+        placement = Placement(model) if not numbers else None
+        wrong += numbers if placement is None else placement.wrong
+        hints = [] if placement is None else placement.hints
+    except InputError as error:
+        if not missing:
+            raise
+        if "keyframe" not in str(error):  # whose sizes are wrong because something is missing
+            wrong.append(str(error).removeprefix(f"{path}: "))
+    if wrong:
+        raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([NEEDS] if missing else [])]))
+    return model, hints
 
 
 def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:

@@ -20,18 +20,19 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.grid import fitting_step
 from cmg_mj.known_rigs import RigFacts
 from cmg_mj.law import Law
-from cmg_mj.mjcf import KEYFRAME, compile_model, lock_thrust_bearing, parse
+from cmg_mj.mjcf import compile_model, load_rig, lock_thrust_bearing, parse
 from cmg_mj.observers import Observer, make_observer
-from cmg_mj.plant_settings import PlantSettings
+from cmg_mj.plant_settings import FINEST_STEP_S, PlantSettings
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
+from cmg_mj.rig_check import starts
+from cmg_mj.rig_parts import KEYFRAME
 from cmg_mj.sensors import Accelerometer, Ideal, Sensors
 from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.variations import vary
 
 QUARTER_TURN = math.pi / 2.0
-UPRIGHT = math.cos(math.radians(30.0))  # sensors farther off than this are mounted otherwise, not inaccurately
 
 
 @plain_dataclass(frozen=True)
@@ -67,6 +68,7 @@ class Plant:
         model: The compiled model, without what is only seen. Do not change it: the plant may be shared.
         reduced: Parameters of the reduced model, read off the file as it is, without bias or friction, which
             the controller does not know.
+        hints: What on the model is not what the reduced model takes it for, in clauses.
         cubes: Addresses of the modules.
         tilt: Address of q_b in qpos and qvel.
         yaw: Address of q_a, or None if the thrust bearing is locked.
@@ -80,7 +82,7 @@ class Plant:
         self.settings = settings
         self.path = path
         self.bias = math.radians(settings.equilibrium_bias_deg)
-        self.model = self._compiled(discard_visual=True)
+        self.model, self.hints = load_rig(path, lock=settings.lock_thrust_bearing)
         own = float(self.model.opt.timestep)
         self._resolve()
         self.reduced = self._read_reduced()
@@ -93,20 +95,32 @@ class Plant:
             flywheels=[cube.flywheel for cube in self.cubes],
         )
         self.largest_step = largest_step(self.model, self.key, own)
+        if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
+            raise InputError(
+                f"{self._blamed}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
+                f"{FINEST_STEP_S:g} s; soften it, or set plant.timestep_s"
+            )
         self.model.opt.timestep = fitting_step(settings, self.largest_step, period_s)
+        if not starts(self.model, self.new_data()):
+            raise InputError(
+                f"{self._blamed}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, damping "
+                "and servos must be of sizes that go together"
+            )
 
-    def _compiled(self, *, discard_visual: bool) -> mujoco.MjModel:
-        spec = parse(self.path)
-        if self.settings.lock_thrust_bearing:
-            lock_thrust_bearing(spec, self.path)
-        spec.compiler.discardvisual = discard_visual
-        return compile_model(spec, self.path)
+    @property
+    def _blamed(self) -> str:
+        """What is wrong if the physics is: the settings that change it, if there are, or else the file."""
+        changes = [f"plant.{name} = {value:g}" for name, value in self.settings.changes_of_physics().items()]
+        return ", ".join(changes) or str(self.path)
 
     @cached_property
     def drawn_model(self) -> mujoco.MjModel:
         """The model with all that is only seen: the same bodies and joints, and geoms that physics does without."""
         with control_callback(None), quiet():  # compiling a model runs it
-            return self._compiled(discard_visual=False)
+            spec = parse(self.path)
+            if self.settings.lock_thrust_bearing:
+                lock_thrust_bearing(spec, self.path)
+            return compile_model(spec, self.path)
 
     # --- names ---------------------------------------------------------------------------------------------
 
@@ -121,12 +135,8 @@ class Plant:
         self.frame = int(model.jnt_bodyid[self.tilt])
         self._accelerometers = [self._accelerometer(f"accelerometer_{which}") for which in ("inner", "outer")]
         radii = [radius for _, radius in self._accelerometers]
-        if not 0.0 < radii[0] < radii[1]:
-            raise InputError(
-                f"{self.path}: accelerometer_outer must lie farther from the tilt axis than accelerometer_inner"
-            )
         self.radial_tilt = RadialTilt(*radii)
-        self._gyro = self._gyro_axis("fog")
+        self._gyro = int(model.sensor_adr[self._id("sensor", "fog")]) + 1  # its y axis
         self.cubes = tuple(self._cube(prefix) for prefix in prefixes)
         self.servos = [cube.servo for cube in self.cubes]
         self.directions = [cube.direction for cube in self.cubes]
@@ -136,39 +146,15 @@ class Plant:
         self._specific_forces = [address + axis for address, _ in self._accelerometers for axis in (0, 2)]
 
     def _id(self, kind: str, name: str) -> int:
-        """Address of an element that `mjcf.require` has found."""
+        """Address of an element that `rig_parts.lacks` has found."""
         return int(mujoco.mj_name2id(self.model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
-
-    def _site_of(self, name: str) -> tuple[int, int, np.ndarray]:
-        """Of a sensor on the frame: its address in sensordata, its site, and the site's axes in the frame, (9,)."""
-        model = self.model
-        sensor = self._id("sensor", name)
-        site = int(model.sensor_objid[sensor])
-        if model.site_bodyid[site] != self.frame:
-            raise InputError(f"{self.path}: sensor {name!r} must be at a site of the body with the joint 'tilt'")
-        axes = np.zeros(9)
-        mujoco.mju_quat2Mat(axes, model.site_quat[site])
-        return int(model.sensor_adr[sensor]), site, axes
-
-    def _gyro_axis(self, name: str) -> int:
-        """Address of the gyro's y axis in sensordata."""
-        address, _, axes = self._site_of(name)
-        if axes[4] < UPRIGHT:
-            raise InputError(f"{self.path}: the site of sensor {name!r} must have its y axis along the tilt axis")
-        return address + 1
 
     def _accelerometer(self, name: str) -> tuple[int, float]:
         """Address in sensordata, and distance of the site from the tilt axis."""
         model = self.model
-        address, site, axes = self._site_of(name)
-        x, _, z = model.site_pos[site] - model.jnt_pos[self.tilt]
-        radius = float(math.hypot(x, z))
-        if axes[4] < UPRIGHT or axes[2] * x + axes[8] * z < UPRIGHT * radius:
-            raise InputError(
-                f"{self.path}: the site of sensor {name!r} must have its y axis along the tilt axis and its z axis "
-                "pointing away from it"
-            )
-        return address, radius
+        sensor = self._id("sensor", name)
+        x, _, z = model.site_pos[model.sensor_objid[sensor]] - model.jnt_pos[self.tilt]
+        return int(model.sensor_adr[sensor]), float(math.hypot(x, z))
 
     def _cube(self, prefix: str) -> Cube:
         model = self.model
@@ -178,8 +164,6 @@ class Plant:
         motor = self._id("actuator", f"{prefix}/flywheel_motor")
         zero = float(model.key_qpos[self.key, gimbal])
         speed = float(model.key_ctrl[self.key, motor])
-        if speed == 0.0 or not math.isfinite(speed):
-            raise InputError(f"{self.path}: keyframe {KEYFRAME!r} must give '{prefix}/flywheel_motor' a speed")
         # A quarter turn back, the flywheel's momentum lies along the tilt axis; u > 0 turns it away from there.
         inertia = self._mass_matrix({gimbal: zero - QUARTER_TURN})
         direction = math.copysign(1.0, inertia[self.tilt, flywheel] * speed)
@@ -214,10 +198,6 @@ class Plant:
         data.qpos[self.tilt] = self.tilt_zero + QUARTER_TURN
         mujoco.mj_forward(self.model, data)
         gravity_torque = -data.qfrc_bias[self.tilt] / n
-        if gravity_torque <= 0.0:
-            raise InputError(
-                f"{self.path}: at the keyframe {KEYFRAME!r} the rig must stand upright, its mass above the tilt axis"
-            )
         return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n)
 
     # --- running -------------------------------------------------------------------------------------------
@@ -272,7 +252,8 @@ class Plant:
     @property
     def facts(self) -> RigFacts:
         """What a scenario's controller and observers are made from."""
-        return RigFacts(self.path, tuple(cube.name for cube in self.cubes), self.reduced, self.largest_step)
+        cubes = tuple(cube.name for cube in self.cubes)
+        return RigFacts(self.path, cubes, self.reduced, self.largest_step, tuple(self.hints))
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
         """What an observer of the bias should find: e less the tilt that the accelerometers' own bias makes.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -9,6 +10,8 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.fields import STRICT, NonNegative
 
+FINEST_STEP_S = 1e-6
+"""The smallest physics step [s]."""
 Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
 
 
@@ -35,7 +38,7 @@ class PlantSettings:
     model: str = "scissored_pair.xml"
     equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 0.5
     initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 1.0
-    timestep_s: Annotated[float, Field(ge=1e-6, le=0.1)] | None = None
+    timestep_s: Annotated[float, Field(ge=FINEST_STEP_S, le=0.1)] | None = None
     integrator: Integrator = "RK4"
     lock_thrust_bearing: bool = False
     gimbal_armature_kg_m2: NonNegative | None = None
@@ -44,3 +47,10 @@ class PlantSettings:
     tilt_friction_n_m: NonNegative | None = None
     tilt_damping_n_m_s: NonNegative | None = None
     flywheel_imbalance_kg_m: float = 0.0
+
+    def changes_of_physics(self) -> dict[str, float]:
+        """What is given of friction, damping, inertia and imbalance."""
+        names = [
+            field.name for field in dataclasses.fields(self) if field.name.startswith(("gimbal", "tilt", "flywheel"))
+        ]
+        return {name: value for name in names if (value := getattr(self, name))}

@@ -27,6 +27,7 @@ def read_off() -> dict[str, Any]:
             rigs[name_of(name, locked=locked)] = {
                 "cubes": cubes,
                 "largest_step_s": plant.largest_step,
+                "hints": plant.hints,
                 "reduced": dataclasses.asdict(plant.reduced),
             }
     return {"sha256": hash_of_models(), "rigs": rigs}

@@ -53,3 +53,5 @@ def rehearse(observer: Observer, worlds: int | None) -> None:
         if number.dtype.kind not in "fiu" or number.shape != np.shape(u):
             wanted = "a number" if worlds is None else f"an array of {worlds} numbers"
             raise InputError(f"{call} must return {wanted} for {name}, not {shown(value)}{hint}")
+        if not np.all(np.isfinite(number)):
+            raise InputError(f"{call} returned {shown(value)} for {name} at a tilt of 0.011 rad")

@@ -22,7 +22,8 @@ def whole_steps(duration: float, timestep: float, field: str, shown: str) -> int
     Raises:
         InputError: The duration is no whole number of physics steps.
     """
-    steps = round(duration / timestep)
+    ratio = duration / timestep
+    steps = round(ratio) if math.isfinite(ratio) else 0
     if abs(steps * timestep - duration) > 1e-9 * max(duration, timestep) + 1e-12 or (duration > 0 and steps == 0):
         raise InputError(
             f"{field} = {shown}: not a whole number of physics steps of {timestep:g} s; "

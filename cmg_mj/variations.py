@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.mjcf import KEYFRAME
 from cmg_mj.plant_settings import PlantSettings
+from cmg_mj.rig_parts import KEYFRAME
 
 _INTEGRATORS = {
     "RK4": int(mujoco.mjtIntegrator.mjINT_RK4),

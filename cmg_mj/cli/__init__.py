@@ -114,6 +114,9 @@ def _status(arguments: Sequence[str]) -> Any:
     except (InputError, RunStopped, click.ClickException) as error:
         say(error.format_message() if isinstance(error, click.ClickException) else str(error))
         return WRONG_INPUT
+    except MemoryError:
+        say("there is not enough memory for this; take a shorter run or fewer worlds")
+        return WRONG_INPUT
     except (KeyboardInterrupt, click.Abort):  # before or after a command
         say("interrupted")
         return INTERRUPTED

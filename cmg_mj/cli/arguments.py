@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from cmg_mj.schema import Scenario
 
 
+MOST_WORLDS = 10_000
+"""One takes about 0.1 MB of memory."""
+
+
 @dataclass(frozen=True)
 class Chosen:
     """What the arguments of every command that runs a scenario say.

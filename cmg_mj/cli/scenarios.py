@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from cmg_mj.cli.arguments import Chosen, check_observer, names_of, of_a_run, of_observers
+from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, check_observer, names_of, of_a_run, of_observers
 from cmg_mj.cli.terminal import (
     INTERRUPTED,
     WRONG_INPUT,
@@ -15,6 +15,7 @@ from cmg_mj.cli.terminal import (
     own_stdout,
     progress,
     say,
+    say_hints,
     say_written,
     show,
     users_code,
@@ -48,6 +49,7 @@ def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
         check_observer("--observer", observer)
     scenario = chosen.scenario(observer)
     experiment = prepare(scenario)
+    say_hints(experiment.hints)
     kind = runs.file_name(scenario.observer.kind)
     default = f"{Path(chosen.name).stem}-{kind}-{scenario.seed}"
     folder = chosen.folder(default, runs.files_of_run(plot=plot), experiment)
@@ -76,7 +78,7 @@ def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
 @of_a_run
 @click.option(
     "--worlds",
-    type=click.IntRange(min=1),
+    type=click.IntRange(1, MOST_WORLDS),
     default=20,
     show_default=True,
     metavar="N",
@@ -101,6 +103,7 @@ def compare(chosen: Chosen, observers: str, worlds: int, markdown: bool) -> None
             )
     experiments = runs.prepare_comparison(scenario, names)
     own = runs.with_own_observer(experiments)
+    say_hints(own.hints)
     folder = chosen.folder(f"{Path(chosen.name).stem}-compare-{scenario.seed}", runs.files_of_comparison(names), own)
     with CtrlC() as ctrl_c:
         with progress(f"{scenario.title or chosen.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
@@ -143,20 +146,22 @@ def list_names(what: str | None) -> None:
         click.echo(report.observer_list())
 
 
-@click.command(short_help="Check a scenario file without running it.")
+@click.command(short_help="Check a scenario file, or a model file, without running it.")
 @click.argument("file")
 @users_code()
 def check(file: str) -> None:
-    """Check a scenario file without running it, and say what it amounts to."""
-    from cmg_mj.description import description
+    """Check a scenario file, or a model file (.xml), without running it, and say what it amounts to."""
+    from cmg_mj.description import description, rig_description
     from cmg_mj.design import design
     from cmg_mj.known_rigs import known_rig
-    from cmg_mj.scenario import load_scenario
+    from cmg_mj.scenario import load_scenario, parse_scenario
 
-    scenario = load_scenario(file)
+    is_model = Path(file).suffix.lower() == ".xml"
+    scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file)
     rig = known_rig(scenario.plant)
     if rig is None:
         from cmg_mj.experiment import load_rig  # MuJoCo, which a bundled rig does without
 
         rig = load_rig(scenario).facts
-    click.echo(description(file, scenario, design(scenario, rig.reduced), rig), file=own_stdout())
+    words = (rig_description if is_model else description)(file, scenario, design(scenario, rig.reduced), rig)
+    click.echo(words, file=own_stdout())

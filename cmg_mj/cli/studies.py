@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from cmg_mj.cli.arguments import Chosen, check_observer, claim, named, names_of, of_a_run, of_observers
+from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, check_observer, claim, named, names_of, of_a_run, of_observers
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code, where
 from cmg_mj.errors import InputError, nearest
 
@@ -16,7 +16,12 @@ from cmg_mj.errors import InputError, nearest
 @click.command(short_help="Time the closed loop against bare MuJoCo.")
 @of_observers
 @click.option(
-    "--worlds", type=click.IntRange(min=1), default=256, show_default=True, metavar="N", help="Worlds of the batch."
+    "--worlds",
+    type=click.IntRange(1, MOST_WORLDS),
+    default=256,
+    show_default=True,
+    metavar="N",
+    help="Worlds of the batch.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 @users_code()
@@ -68,7 +73,7 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
 @of_a_run
 @click.option(
     "--worlds",
-    type=click.IntRange(min=2),
+    type=click.IntRange(2, MOST_WORLDS // 10),  # whose trajectories are kept
     default=20,
     show_default=True,
     metavar="N",

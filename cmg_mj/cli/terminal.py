@@ -6,7 +6,7 @@ import json
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from contextvars import ContextVar
 from pathlib import Path
@@ -94,6 +94,12 @@ def say(message: str) -> None:
     """One line on standard error, if anybody reads it."""
     with suppress(OSError):
         click.echo(f"cmg-mj: {' '.join(message.split())}", err=True)
+
+
+def say_hints(hints: Iterable[str]) -> None:
+    """What is no mistake and yet likely to make the rig fall, before it does."""
+    for hint in hints:
+        say(f"hint: {hint}")
 
 
 def where(folder: RunFolder, place: Path) -> str:

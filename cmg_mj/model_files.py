@@ -1,0 +1,75 @@
+"""What a model file includes, looked at before MuJoCo opens it: a pipe would never end, and a circle of files crashes."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from cmg_mj.errors import InputError
+
+LARGEST = 50_000_000
+"""Bytes of an XML file."""
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_ELEMENT = re.compile(r"<(\w+)\b([^<>]*)>")
+_NAMED = re.compile(r"""\b(file\w*|meshdir|texturedir|assetdir)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+_XML = ("include", "model")
+
+
+def check_files(path: Path) -> None:
+    """Refuse a model that names what is no ordinary file, or that contains itself.
+
+    Args:
+        path: The model's file.
+
+    Raises:
+        InputError: It does.
+    """
+    _check(path, path, ())
+
+
+def _check(path: Path, root: Path, within: tuple[Path, ...]) -> None:
+    here = path.resolve()
+    if here in within:
+        raise InputError(
+            f"{root}: contains itself: {' in '.join(p.name for p in (*within[within.index(here) :], here))}"
+        )
+    text = _COMMENT.sub("", _text(path, root))
+    named = [(element, *pair) for element, attributes in _ELEMENT.findall(text) for pair in _attributes(attributes)]
+    folders = [value for _, name, value in named if name.endswith("dir")]
+    for element, name, value in named:
+        if name.endswith("dir"):
+            continue
+        for file in _places(value, path, root, folders):
+            if file.is_dir():
+                continue  # MuJoCo says so
+            if file.exists() and not file.is_file():
+                raise InputError(f"{root}: <{element} {name}={value!r}>: is no ordinary file")
+            if element in _XML and file.is_file():
+                _check(file, root, (*within, here))
+                break
+
+
+def _places(value: str, path: Path, root: Path, folders: list[str]) -> Iterator[Path]:
+    """Where MuJoCo may look for a file."""
+    for base in dict.fromkeys((path.parent, root.parent)):
+        yield base / value
+        for folder in folders:
+            yield base / folder / value
+
+
+def _attributes(text: str) -> Iterator[tuple[str, str]]:
+    for name, double, single in _NAMED.findall(text):
+        yield name, html.unescape(double or single)
+
+
+def _text(path: Path, root: Path) -> str:
+    try:
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"{root}: {path.name} is larger than {LARGEST // 1_000_000} MB")
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{root}: {path.name} is not UTF-8 text (at byte {error.start})") from error
+    except OSError as error:
+        raise InputError(f"{root}: {path.name} cannot be read: {error.strerror}") from error

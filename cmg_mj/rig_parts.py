@@ -1,0 +1,94 @@
+"""What a rig consists of, by name and kind, and what a model lacks of it: all of it, not the first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+
+from cmg_mj.errors import nearest
+
+KEYFRAME = "equilibrium"
+SENSORS = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
+NEEDS = (
+    "a rig needs the joints tilt, CUBE/gimbal, CUBE/flywheel, the actuators CUBE/gimbal_servo, CUBE/flywheel_motor, "
+    f"the sensors CUBE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe {KEYFRAME}, for one CUBE or more"
+)
+
+
+def lacks(spec: mujoco.MjSpec) -> list[str]:
+    """What a parsed model lacks: a rig has certain joints, actuators, sensors and a keyframe, by name.
+
+    The compiler, which comes after this, would only say that the keyframe has the wrong size.
+
+    Args:
+        spec: The parsed model.
+
+    Returns:
+        Clauses for an error message.
+    """
+    elements = {
+        "joint": {joint.name: joint for joint in spec.joints},
+        "actuator": {actuator.name: actuator for actuator in spec.actuators},
+        "sensor": {sensor.name: sensor for sensor in spec.sensors},
+        "keyframe": {key.name: key for key in spec.keys},
+    }
+    missing: dict[str, list[str]] = {kind: [] for kind in elements}
+    wrong = []
+
+    def check(kind: str, name: str, is_right: Callable[[Any], bool], what: str) -> None:
+        if name not in elements[kind]:
+            missing[kind].append(name)
+        elif not is_right(elements[kind][name]):
+            wrong.append(what)
+
+    for joint in spec.joints:
+        if not joint.name:
+            wrong.append(f"the joint of body {joint.parent.name!r} has no name")
+        if int(joint.type) != int(mujoco.mjtJoint.mjJNT_HINGE):
+            wrong.append(f"joint {joint.name!r} must be a hinge")
+    check("joint", "tilt", _turns_about_y, "joint 'tilt' must turn about y (axis=\"0 1 0\")")
+    for cube in cubes_in([name for kind in elements.values() for name in kind]) or ["cube1"]:
+        for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
+            joint, drive = f"{cube}/{name}", f"{cube}/{actuator}"
+            check("joint", joint, lambda _: True, "")
+            check("actuator", drive, _drives(joint), f"actuator {drive!r} must drive the joint {joint!r}")
+        joint, encoder = f"{cube}/gimbal", f"{cube}/gimbal_encoder"
+        check("sensor", encoder, _reads(joint), f"sensor {encoder!r} must be the jointpos of {joint!r}")
+    for name, kind in SENSORS.items():
+        check("sensor", name, _is_a(kind), f"sensor {name!r} must be of the kind {kind!r}")
+    check("keyframe", KEYFRAME, lambda _: True, "")
+    return [_missing(kind, names, list(elements[kind])) for kind, names in missing.items() if names] + wrong
+
+
+def cubes_in(names: list[str]) -> list[str]:
+    """Prefixes of the modules that elements' names speak of."""
+    suffixes = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
+    return list(dict.fromkeys(name.rpartition("/")[0] for name in names if name.endswith(suffixes)))
+
+
+def _missing(kind: str, names: list[str], known: list[str]) -> str:
+    """`the model has no joint 'tilt'; did you mean 'tlit'? its joints: tlit, yaw`."""
+    hints = [nearest(name, known, f"its {kind}s") for name in names]
+    meant = [hint.removeprefix("did you mean ").partition("? ")[0] for hint in hints if "? its " in hint]
+    listing = hints[0].rpartition("? ")[2]
+    guess = f"did you mean {', '.join(dict.fromkeys(meant))}? " if meant else ""
+    return f"the model has no {kind} {', '.join(map(repr, names))}; {guess}{listing}"
+
+
+def _turns_about_y(joint: Any) -> bool:
+    x, y, z = joint.axis
+    return y > 0.0 and x == z == 0.0
+
+
+def _drives(joint: str) -> Callable[[Any], bool]:
+    return lambda drive: drive.target == joint and int(drive.trntype) == int(mujoco.mjtTrn.mjTRN_JOINT)
+
+
+def _reads(joint: str) -> Callable[[Any], bool]:
+    return lambda sensor: sensor.objname == joint and int(sensor.type) == int(mujoco.mjtSensor.mjSENS_JOINTPOS)
+
+
+def _is_a(kind: str) -> Callable[[Any], bool]:
+    return lambda sensor: int(sensor.type) == int(getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"))
