@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -9,7 +10,8 @@ from cmg_mj.errors import LONGEST_SHOWN, shown
 
 SMALLEST, LARGEST = 1e-30, 1e30
 """Sizes of numbers. Products of a few numbers within them stay finite, and nothing a person can lift needs more."""
-MOST_DIGITS = 63  # binary ones, as TOML's whole numbers have
+MOST_BITS = 128
+"""Of a whole number; seeds that NumPy makes have so many."""
 DEEPEST = 12
 """So many sections and lists may lie in one another; the scenario's own are four deep."""
 
@@ -46,8 +48,8 @@ def unreadable(fields: Mapping[str, Any]) -> Iterator[str]:
             yield f"{where!r}: not UTF-8 text"
         elif isinstance(value, str) and not is_text(value):
             yield f"{where} = {shown(value)}: not UTF-8 text"
-        elif isinstance(value, int) and value.bit_length() > MOST_DIGITS:
-            yield f"{where}: must be within 64 bits, from {-(2**MOST_DIGITS)} to {2**MOST_DIGITS - 1}"
+        elif isinstance(value, int) and value.bit_length() > MOST_BITS:
+            yield f"{where}: a whole number of {value.bit_length()} bits; at most {MOST_BITS} are allowed"
 
 
 def out_of_size(fields: Mapping[str, Any]) -> Iterator[str]:
@@ -60,7 +62,8 @@ def out_of_size(fields: Mapping[str, Any]) -> Iterator[str]:
         Clauses for an error message.
     """
     for path, value in _walk(fields):
-        if isinstance(value, float) and (not abs(value) <= LARGEST or 0.0 < abs(value) < SMALLEST):
+        is_number = isinstance(value, (int, float)) and path != ("seed",) and math.isfinite(value)
+        if is_number and (abs(value) > LARGEST or 0.0 < abs(value) < SMALLEST):
             yield f"{path_of(path)} = {value:g}: sizes are from {SMALLEST:g} to {LARGEST:g}, or 0"
 
 

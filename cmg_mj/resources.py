@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.plausible import is_text
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -45,6 +46,8 @@ def find(kind: str, name: str, suffix: str, field: str, beside: Path | None = No
     try:
         for path in candidates:
             if path.is_file():
+                if kind == "models" and not is_text(str(path.resolve())):  # which a scenario names in UTF-8
+                    raise InputError(f"{field} {name!r}: lies in a folder whose name is not UTF-8 text")
                 return path
         if name and any(path.is_dir() for path in candidates):
             raise InputError(f"{field} {name!r}: is a folder, not a file")

@@ -64,7 +64,7 @@ class Placement:
         self.hints: list[str] = []
         self.wrong: list[str] = []
         key, self.tilt = _id(model, "key", KEYFRAME), _id(model, "joint", "tilt")
-        if min(key, self.tilt) < 0:
+        if min(key, self.tilt) < 0 or any(model.jnt_type != mujoco.mjtJoint.mjJNT_HINGE):
             return
         self.model, self.data = model, mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, self.data, key)

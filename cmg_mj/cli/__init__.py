@@ -139,4 +139,5 @@ def _give_up_streams(error: OSError) -> None:
             with suppress(OSError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     if not isinstance(error, BrokenPipeError):
-        say(f"{error.filename or 'standard output'}: {error.strerror}")
+        nameless = "the current folder" if isinstance(error, FileNotFoundError) else "standard output"
+        say(f"{error.filename or nameless}: {error.strerror}")

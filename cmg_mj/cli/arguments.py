@@ -75,7 +75,7 @@ def of_a_run(command: Callable) -> Callable:
                 metavar="FIELD=VALUE",
                 help="Replace a field of the scenario, such as plant.initial_tilt_deg=2.0; may be given again.",
             ),
-            click.option("--seed", type=click.IntRange(0, 2**63 - 1), metavar="N", help="Seed of the sensors' noise."),
+            click.option("--seed", type=click.IntRange(0, 2**128 - 1), metavar="N", help="Seed of the sensors' noise."),
             click.option("--out", metavar="FOLDER", help="Folder to write to; by default one in runs/."),
             click.option(
                 "--json", "as_json", is_flag=True, help="Print the summary alone, as JSON, on standard output."

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.bad_input.complaints import FROM_0, GRID, OVER_0, WHOLE, assert_in_order, check, table
+from tests.bad_input.complaints import FROM_0, GRID, OVER_0, RATE, WHOLE, assert_in_order, check, table
 from tests.command import cmg_mj
 
 
@@ -88,12 +88,12 @@ def test_plant(given: str, fragments: list[str]) -> None:
 
 @table(
     ("typo", "rate = 200", "controller.rate: no such field; did you mean 'rate_hz'? allowed: angles, feedback, gains"),
-    ("no rate", "rate_hz = 0", f"controller.rate_hz = 0: {OVER_0}"),
-    ("a negative rate", "rate_hz = -200", f"controller.rate_hz = -200: {OVER_0}"),
-    ("nan", "rate_hz = nan", "controller.rate_hz = nan: must be a finite number greater than 0"),
-    ("infinite", "rate_hz = inf", "controller.rate_hz = inf: must be a finite number greater than 0"),
-    ("in quotes", "rate_hz = '200'", f"controller.rate_hz = '200': {OVER_0}"),
-    ("true", "rate_hz = true", f"controller.rate_hz = true: {OVER_0}"),
+    ("no rate", "rate_hz = 0", f"controller.rate_hz = 0: {RATE}"),
+    ("a negative rate", "rate_hz = -200", f"controller.rate_hz = -200: {RATE}"),
+    ("nan", "rate_hz = nan", "controller.rate_hz = nan: must be a finite number greater than or equal to 0.1"),
+    ("infinite", "rate_hz = inf", "controller.rate_hz = inf: must be a finite number greater than or equal to 0.1"),
+    ("in quotes", "rate_hz = '200'", f"controller.rate_hz = '200': {RATE}"),
+    ("true", "rate_hz = true", f"controller.rate_hz = true: {RATE}"),
     (
         "no divisor",
         "rate_hz = 300\n[plant]\ntimestep_s = 0.001",
@@ -242,7 +242,7 @@ def test_observer(given: str, fragments: list[str]) -> None:
         "sensors.fog = 3: must be a section, written under [sensors.fog]",
     ),
     ("sensors that are text", "sensors = 'all'", "sensors = 'all': must be a section, written under [sensors]"),
-    ("a sensor's rate", "[sensors.fog]\nrate_hz = 0", f"sensors.fog.rate_hz = 0: {OVER_0}"),
+    ("a sensor's rate", "[sensors.fog]\nrate_hz = 0", f"sensors.fog.rate_hz = 0: {RATE}"),
     (
         "a rate that does not fit",
         "[sensors.fog]\nrate_hz = 300\n[plant]\ntimestep_s = 0.001",
