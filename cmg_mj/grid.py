@@ -59,8 +59,8 @@ def check_steps(scenario: Scenario, timestep: float) -> None:
     steps = scenario.duration_s / timestep
     if steps > MOST_STEPS:
         raise InputError(
-            f"duration_s = {scenario.duration_s:g}: {steps:.3g} physics steps of {timestep:g} s; at most {MOST_STEPS:g} "
-            f"are taken, {MOST_STEPS * timestep:g} s"
+            f"duration_s = {scenario.duration_s:g}: {steps:.3g} physics steps of {timestep:g} s; at most "
+            f"{MOST_STEPS:g} are taken, {MOST_STEPS * timestep:g} s"
         )
 
 

@@ -44,7 +44,7 @@ class Loop(NamedTuple):
     @property
     def slowest(self) -> float:
         """Real part of the slowest pole [1/s]."""
-        return float(np.max(self.poles.real))
+        return float(np.max(np.real(self.poles)))
 
     @property
     def words(self) -> str:
@@ -68,8 +68,8 @@ class Loop(NamedTuple):
             )
         if self.distance < POOR_DISTANCE:
             return (
-                f"controller: the closed loop has little margin {where} (its transfer comes within {self.distance:.2f} of "
-                f"-1, good is {POOR_DISTANCE:g} or more); {remedy}"
+                f"controller: the closed loop has little margin {where} (its transfer comes within {self.distance:.2f} "
+                f"of -1, good is {POOR_DISTANCE:g} or more); {remedy}"
             )
         return None
 

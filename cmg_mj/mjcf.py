@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 
 import mujoco
@@ -18,7 +19,9 @@ def _one_line(error: Exception) -> str:
     """MuJoCo's message without what tells a user nothing."""
     text = " ".join(str(error).split()).removeprefix("Error: ")
     syntax = re.match(r"XML parse error .*Line number=(\d+)", text)
-    return f"XML syntax error at line {syntax[1]}" if syntax else re.sub(r" The static bodies .* remain so\.", "", text)
+    return (
+        f"XML syntax error at line {syntax[1]}" if syntax else re.sub(r" The (static|visual) .* remain so\.", "", text)
+    )
 
 
 def parse(path: Path) -> mujoco.MjSpec:
@@ -41,9 +44,15 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
         InputError: MuJoCo's compiler refuses it.
     """
     try:
-        return spec.compile()
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{path}: does not compile: {_one_line(error)}") from error
+    for warning in warned:
+        if "singular" in str(warning.message):
+            raise InputError(f"{path}: does not compile: its masses and inertias are of too different sizes")
+    return model
 
 
 def load_rig(path: Path, *, lock: bool) -> tuple[mujoco.MjModel, list[str]]:
@@ -60,23 +69,25 @@ def load_rig(path: Path, *, lock: bool) -> tuple[mujoco.MjModel, list[str]]:
         InputError: It is no rig. All that is missing or wrong is named.
     """
     spec = parse(path)
-    missing, hints = lacks(spec), []
-    wrong = list(missing)
+    missing = lacks(spec)
     if lock and not missing:
         lock_thrust_bearing(spec, path)
     spec.compiler.discardvisual = True
+    model, hints = None, []
+    wrong = list(missing)
     try:
         model = compile_model(spec, path)
-        numbers = numbers_that_are_none(model)
-        placement = Placement(model) if not numbers else None
-        wrong += numbers if placement is None else placement.wrong
-        hints = [] if placement is None else placement.hints
     except InputError as error:
         if not missing:
             raise
         if "keyframe" not in str(error):  # whose sizes are wrong because something is missing
             wrong.append(str(error).removeprefix(f"{path}: "))
-    if wrong:
+    else:
+        numbers = numbers_that_are_none(model)
+        placement = None if numbers else Placement(model)
+        wrong += numbers if placement is None else placement.wrong
+        hints = [] if placement is None else placement.hints
+    if wrong or model is None:
         raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([NEEDS] if missing else [])]))
     return model, hints
 

@@ -1,4 +1,4 @@
-"""What a model file includes, looked at before MuJoCo opens it: a pipe would never end, and a circle of files crashes."""
+"""What a model file includes, before MuJoCo opens it: a pipe would never end, and a circle of files crashes it."""
 
 from __future__ import annotations
 

@@ -103,8 +103,8 @@ class Plant:
         self.model.opt.timestep = fitting_step(settings, self.largest_step, period_s)
         if not starts(self.model, self.new_data()):
             raise InputError(
-                f"{self._blamed}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, damping "
-                "and servos must be of sizes that go together"
+                f"{self._blamed}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "
+                "damping and servos must be of sizes that go together"
             )
 
     @property

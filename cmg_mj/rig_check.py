@@ -13,9 +13,12 @@ from cmg_mj.plausible import LARGEST
 from cmg_mj.rig_parts import KEYFRAME, SENSORS, cubes_in
 
 TRUE_DEG = 0.05
-"""A keyframe that is off by more is no equilibrium: a tenth of the bias that the papers' observers are tried with [deg]."""
+"""A keyframe that is off by more is no equilibrium: a tenth of the bias that observers are tried with [deg]."""
 MOUNTED_DEG = 5.0
-"""A sensor or an axis farther off than this is mounted otherwise, not inaccurately: no observer stands so much [deg]."""
+"""A sensor or axis farther off is mounted otherwise, not inaccurately: no observer stands so much [deg]."""
+FIRST_S = 0.02
+"""So far physics is tried, within 4 to 100 steps [s]."""
+HUGE = 1e10  # MuJoCo's mjMAXVAL
 STEPS_S = 1e-6, 0.1
 """Physics steps that a model may ask for [s]."""
 
@@ -172,12 +175,15 @@ class Placement:
                 off = max(off, _degrees_between(axes[:, 2], radial) if radii[name] else 180.0)
             if off > MOUNTED_DEG:
                 away = " and its z axis pointing away from it" if kind == "accelerometer" else ""
-                yield f"the site of sensor {name!r} must have its y axis along the tilt axis{away}; it is {off:.3g} deg off"
+                yield (
+                    f"the site of sensor {name!r} must have its y axis along the tilt axis{away}; it is {off:.3g} deg "
+                    "off"
+                )
             beside = _degrees_between(arm, self.line) if kind == "accelerometer" and radii[name] else 0.0
             if beside > MOUNTED_DEG:
                 yield (
-                    f"the site of sensor {name!r} must lie on the radial line, from the tilt axis through the centre of "
-                    f"mass; it lies {beside:.3g} deg beside it"
+                    f"the site of sensor {name!r} must lie on the radial line, from the tilt axis through the centre "
+                    f"of mass; it lies {beside:.3g} deg beside it"
                 )
             elif TRUE_DEG < max(off, beside) <= MOUNTED_DEG:
                 self.hints.append(
@@ -200,8 +206,8 @@ class Placement:
         left = float(np.linalg.norm(np.sum(momenta, axis=0)))
         if left > 0.01 * sum(float(np.linalg.norm(momentum)) for momentum in momenta):
             self.hints.append(
-                "the flywheels' momenta do not cancel while the thrust bearing is free, which the reduced model does not "
-                "know: see plant.lock_thrust_bearing"
+                "the flywheels' momenta do not cancel while the thrust bearing is free, which the reduced model does "
+                "not know: see plant.lock_thrust_bearing"
             )
 
 
@@ -213,10 +219,10 @@ def starts(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
         data: Its initial state, which is changed.
 
     Returns:
-        Whether all joints still have finite angles and rates.
+        Whether all joints still have angles and rates that MuJoCo takes for sane.
     """
-    mujoco.mj_step(model, data, 4)
-    return bool(np.all(np.isfinite(data.qpos)) and np.all(np.isfinite(data.qvel)))
+    mujoco.mj_step(model, data, int(np.clip(FIRST_S / model.opt.timestep, 4, 100)))
+    return bool(np.all(np.abs(data.qpos) < HUGE) and np.all(np.abs(data.qvel) < HUGE))
 
 
 def _id(model: mujoco.MjModel, kind: str, name: str) -> int:

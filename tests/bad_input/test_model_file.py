@@ -132,7 +132,9 @@ def test_a_lock_without_a_bearing() -> None:
 
 def test_a_lock_where_the_keyframe_gives_no_rates() -> None:
     edited(rig=('qvel="[^"]*"', ""))
-    with pytest.raises(InputError, match="^rig.xml: keyframe 'equilibrium' must start 'cube1/flywheel' at its motor's"):
+    with pytest.raises(
+        InputError, match=r"^rig\.xml: keyframe 'equilibrium' must start 'cube1/flywheel' at its motor's"
+    ):
         load_plant(model="rig.xml", lock_thrust_bearing=True)
 
 
@@ -164,7 +166,7 @@ AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
         {"rig": (AT, "-0.78539816339744828 0 0 0")},
         "the axis of 'cube1/flywheel' must be at right angles to the tilt's; it is 90 deg off ('cube1/gimbal' = ",
         "the axis of 'cube2/flywheel'",
-        "keyframe 'equilibrium' must have the setpoint (act) of 'cube2/gimbal_servo' where its gimbal stands: 0, not 1.57",
+        "keyframe 'equilibrium' must have the setpoint (act) of 'cube2/gimbal_servo' where its gimbal stands: 0, not",
     ),
     ("no setpoints", {"rig": (' act="1[^"]*"', "")}, "must have the setpoint (act) of 'cube1/gimbal_servo' where"),
     (
@@ -187,7 +189,7 @@ AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
     (
         "an accelerometer before the line",
         {"rig": ('outer" pos="0.14250000000000004 0', 'outer" pos="0.14250000000000004 0.08')},
-        "'accelerometer_outer' must lie on the radial line, from the tilt axis through the centre of mass; it lies 21.7",
+        "'accelerometer_outer' must lie on the radial line, from the tilt axis through the centre of mass; it lies",
     ),
     ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml is not UTF-8 text (at byte "),
 )
