@@ -1,10 +1,12 @@
-"""Which test catches which wrong parameter? Writes docs/mutations.md.
+"""Which test catches which wrong parameter, and which wrong report? Writes docs/mutations.md.
 
 Each parameter of the law, the observers and the reduced model is multiplied by 0.8 and by 1.2 in a copy of the sources,
-and the tests are run until the first failure.
+and the tests are run until the first failure. Each line that tests/papers/mutants.py changes in the papers' reports
+must be caught by the test named there.
 
     python tests/mutations.py              # about twenty minutes on two cores
     python tests/mutations.py adaptive     # only the parameters with this in their names, printed and not written
+    python tests/mutations.py papers       # only the reports, printed and not written
 """
 
 from __future__ import annotations
@@ -15,11 +17,17 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from tests.papers import mutants  # noqa: E402
+from tests.papers.mutants import MUTANTS, Mutant  # noqa: E402
+
 FACTORS = (0.8, 1.2)
 NUMBER = r"(-?[0-9][0-9.e+-]*)"
 # Equations first: they name the culprit; the closed loop last.
@@ -124,44 +132,88 @@ def mutate(copy: Path, parameter: str, factor: float) -> None:
 
 def caught_by(parameter: str, factor: float) -> str:
     """The first test that fails with a parameter multiplied, or a dash."""
+    return first_failure(lambda copy: mutate(copy, parameter, factor), TESTS)
+
+
+def first_failure(change: Callable[[Path], None], tests: Sequence[str]) -> str:
+    """The first of some tests that fails in a changed copy of the sources, or a dash."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)
         for part in ("cmg_mj", "models", "scenarios", "tests", "docs"):
-            shutil.copytree(ROOT / part, copy / part, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(ROOT / part, copy / part, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
         shutil.copy(ROOT / "pyproject.toml", copy)
-        mutate(copy, parameter, factor)
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-o", "addopts=", *TESTS]
+        change(copy)
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-o", "addopts=", *tests]
         environment = os.environ | {"PYTHONPATH": str(copy)}
         output = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True).stdout
     failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", output, flags=re.MULTILINE)
+    if not failed and not re.search(r"^\d+ passed", output, flags=re.MULTILINE):
+        raise LookupError(f"{tests}: no test was run:\n{output[-2000:]}")
     return f"`{failed[0].removeprefix('tests/')}`" if failed else "-"
 
 
-def main() -> None:
-    """Run all mutations and write the table."""
-    if (failed := caught_by(MUTATIONS[0].parameter, 1.0)) != "-":
-        sys.exit(f"{failed} fails without any mutation: mend that first")
+def report_caught_by(mutant: Mutant) -> str:
+    """The test that fails with a line of a report changed, or a dash."""
+
+    def change(copy: Path) -> None:
+        path = copy / mutants.PAPERS / mutant.file
+        path.write_text(mutant.apply(path.read_text(encoding="utf-8")), encoding="utf-8")
+
+    return first_failure(change, [mutants.TESTS + mutant.test])
+
+
+PARAMETERS_SAY = (
+    "Each parameter multiplied in a copy of the sources, and the first test that then fails; a dash would be a\n"
+    "survivor. No test compares a default with a literal: each is caught by its effect."
+)
+REPORTS_SAY = (
+    "Each line of the papers' reports changed as `tests/papers/mutants.py` has it, and the test that then fails;\n"
+    "a dash would be a survivor."
+)
+
+
+def parameter_table(pool: ThreadPoolExecutor, wanted: str) -> tuple[str, list[str]]:
+    """The table of parameters, and those that no test caught."""
     parameters = [m.parameter for m in MUTATIONS] + [f"reduced: {name}" for name in REDUCED]
-    wanted = sys.argv[1] if len(sys.argv) > 1 else ""
     parameters = [name for name in parameters if wanted in name]
+    found = {(p, f): pool.submit(caught_by, p, f) for p in parameters for f in FACTORS}
+    rows = [f"| `{p}` | " + " | ".join(found[p, f].result() for f in FACTORS) + " |" for p in parameters]
+    survived = [f"{p} times {f}" for (p, f), future in found.items() if future.result() == "-"]
+    return "\n".join(["| parameter | times 0.8 | times 1.2 |", "|---|---|---|", *rows]), survived
+
+
+def report_table(pool: ThreadPoolExecutor) -> tuple[str, list[str]]:
+    """The table of wrong reports, and those that no test caught."""
+    found = [pool.submit(report_caught_by, mutant) for mutant in MUTANTS]
+    rows = [f"| {m.wrong} | `{m.file}` | {future.result()} |" for m, future in zip(MUTANTS, found, strict=True)]
+    survived = [m.wrong for m, future in zip(MUTANTS, found, strict=True) if future.result() == "-"]
+    return "\n".join(["| what is wrong | where, in cmg_mj/papers | caught by |", "|---|---|---|", *rows]), survived
+
+
+def main() -> None:
+    """Run all mutations and write the tables."""
+    wanted = sys.argv[1] if len(sys.argv) > 1 else ""
+    parts, survivors = ["# Which test catches what", "Written by `python tests/mutations.py`."], []
     with ThreadPoolExecutor(2) as pool:
-        found = {(p, f): pool.submit(caught_by, p, f) for p in parameters for f in FACTORS}
-        rows = [f"| `{p}` | " + " | ".join(found[p, f].result() for f in FACTORS) + " |" for p in parameters]
-    lines = [
-        "# Which test catches which wrong parameter",
-        "",
-        "Each parameter multiplied in a copy of the sources, and the first test that then fails; a dash would be a",
-        "survivor. No test compares a default with a literal: each is caught by its effect.",
-        "Written by `python tests/mutations.py`.",
-        "",
-        "| parameter | times 0.8 | times 1.2 |",
-        "|---|---|---|",
-        *rows,
-        "",
-    ]
+        if wanted != "papers":
+            if (failed := caught_by(MUTATIONS[0].parameter, 1.0)) != "-":
+                sys.exit(f"{failed} fails without any mutation: mend that first")
+            table, survived = parameter_table(pool, wanted)
+            parts += ["## Wrong parameters", PARAMETERS_SAY, table]
+            survivors += survived
+        if wanted in ("", "papers"):
+            whole = sorted({mutants.TESTS + mutant.test for mutant in MUTANTS})
+            if (failed := first_failure(lambda copy: None, whole)) != "-":
+                sys.exit(f"{failed} fails without any mutation: mend that first")
+            table, survived = report_table(pool)
+            parts += ["## Wrong reports", REPORTS_SAY, table]
+            survivors += survived
+    text = "\n\n".join(parts) + "\n"
     if not wanted:
-        (ROOT / "docs" / "mutations.md").write_text("\n".join(lines))
-    print("\n".join(lines))
+        (ROOT / "docs" / "mutations.md").write_text(text, encoding="utf-8")
+    print(text)
+    if survivors:
+        sys.exit(f"survived: {', '.join(survivors)}")
 
 
 if __name__ == "__main__":

@@ -75,6 +75,21 @@ def test_w_falls_along_motions_as_19_says(d_inf: float) -> None:
         assert (fall > 0.95 * found.decay.c1 * np.minimum(bound[1:], bound[:-1]) - 1e-12).all()
 
 
+@pytest.mark.parametrize("b", [0.1, 0.8])
+def test_20_with_a_b_of_its_own(b: float) -> None:
+    """dW/dE B E is the growth of W where e1 grows by b and e2 by 1 + b: c2 from differences along that."""
+    W = lyapunov(0.4)
+    grid = states(np.geomspace(1e-2, 1e2, 5), 7)
+    e1, e2 = W.E(grid)
+    step = 1e-5
+    quotients = []
+    for x, z in zip(e1.tolist(), e2.tolist(), strict=True):
+        ahead, behind = (at(W, x * (1.0 + b * s), z * (1.0 + (1.0 + b) * s)) for s in (step, -step))
+        growth = (W.W(ahead) - W.W(behind))[0] / (2.0 * step)
+        quotients.append(growth / W.W(at(W, x, z))[0])
+    assert decay(W, b, at=grid).c2 == pytest.approx(min(quotients), rel=1e-3)
+
+
 def test_constants_hold_on_a_finer_grid() -> None:
     claim = equations_19_20.claim()
     assert claim.verdict == WITHIN
