@@ -112,7 +112,7 @@ MUTANTS = [
     Mutant("the push's part in (9)'s error, its sign", S + "figure_3.py", "return -lsim(", "return lsim(",
            "sokolov2019_figure_3.py::test_the_push_explains_the_error_of_9"),
     Mutant("gravity's lever, its sign", S + "figure_3.py", "return L2 - model.gravity_torque",
-           "return L2 + model.gravity_torque", "sokolov2019_figure_3.py::test_9_and_its_form_with_y2"),
+           "return L2 + model.gravity_torque", "sokolov2019_figure_3.py::test_9_and_its_form_with_y2_are_one_at_small_angles"),
     Mutant("where the gimbal rests, its sign", S + "equations.py", "x3, x_e = K[0] / K[2]", "x3, x_e = -K[0] / K[2]",
            "sokolov2019_equations.py::test_signs_of_the_equilibria_on_the_nonlinear_model"),
     Mutant("the rest of (9), its sign", S + "paper.py", "@ [-e, 0.0])", "@ [e, 0.0])",
