@@ -26,6 +26,9 @@ TABLE_1 = {
 K_E = (35.0, 4.0, -1.0, 0.3)
 """Table 2: the gains of (8) on [x1, x2, x3, x_e]; the first three of them in (7)."""
 
+K_E_ROUNDING = (0.5, 0.5, 0.5, 0.05)
+"""Half a unit of the last digit that each of them is printed with."""
+
 TABLE_2: dict[str, dict[str, Any]] = {
     "linear": {"tau": 0.02},
     "ltv": {"Q": (1.0, 5e6, 1.0), "H0": (1.0, 1.0, 1.0)},
