@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from cmg_mj.intervals import Interval
 
 
@@ -19,3 +21,9 @@ def plus_minus(interval: Interval | None, digits: int = 4, *, signed: bool = Fal
     if interval is None:
         return "-"
     return f"{interval.mean:{'+' if signed else ''}.{digits}f} +- {interval.half:.{digits}f}"
+
+
+def listed_and(words: Sequence[str]) -> str:
+    """One or several things as a sentence lists them: `a`, `a and b`, `a, b and c`."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last

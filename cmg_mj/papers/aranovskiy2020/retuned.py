@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from cmg_mj.intervals import Interval, ratio_interval
@@ -18,43 +18,65 @@ WORLDS = 12
 DEFAULT_NOISE = 400.0
 WARM_UP_S = 0.5
 """Replayed before the window [s]: many times the time constants of the three."""
-GENTLE = ["push.0.torque_n_m=0.3", "plant.equilibrium_bias_deg=0.0"]
-"""A push of which (11) has less to learn, on a rig without bias."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """One push on one rig, recorded at several sensor noises.
+
+    Attributes:
+        words: How it is called.
+        settings: Settings `section.field=value` of the tuning experiment that differ.
+        noise_ug_rthz: Noise densities [ug/sqrt(Hz)], the same for every observer.
+        share: Of the time that all take.
+    """
+
+    words: str
+    settings: Sequence[str]
+    noise_ug_rthz: Sequence[float]
+    share: float
+
+
+def _gentle(torque_n_m: float) -> list[str]:
+    """A weaker push on a rig without bias, of which (11) has less to learn."""
+    return [f"push.0.torque_n_m={torque_n_m}", "plant.equilibrium_bias_deg=0.0"]
+
+
+STRONG = Push("1 N m, e = 0.5 deg", [], (100.0, 200.0, DEFAULT_NOISE, 800.0, 3200.0), 0.45)
+"""That of Figs 5 to 7."""
+PUSHES = (
+    STRONG,
+    Push("0.3 N m, e = 0", _gentle(0.3), (50.0, 100.0, 200.0, DEFAULT_NOISE), 0.37),
+    Push("0.1 N m, e = 0", _gentle(0.1), (25.0, 50.0), 0.18),
+)
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """What is tuned of an observer, and at which sensor noises.
+    """What is tuned of an observer.
 
     Attributes:
         observer: Its name.
         equation: Its number in the paper.
         parameters: What is tuned of it.
-        noise_ug_rthz: Noise densities [ug/sqrt(Hz)].
         printed: Table 2's line.
-        share: Of the time that all take.
+        share: Of the time that the three take.
     """
 
     observer: str
     equation: str
     parameters: Sequence[str]
-    noise_ug_rthz: Sequence[float]
     printed: str
     share: float
 
 
-LINEAR = Tuned("linear", "(9)", ["tau"], (100.0, 200.0, 400.0), "tau = 0.02", 0.1)
-LTV = Tuned("ltv", "(10)", ["Q[1]"], (200.0, 400.0, 800.0), "Q = diag(1, 5e6, 1)", 0.32)
-HOMOGENEOUS = Tuned(
-    "homogeneous",
-    "(11)",
-    ["k1", "k2", "alpha"],
-    (400.0, 1600.0, 3200.0, 6400.0),
-    "[k1, k2, alpha] = [20, 150, 0.85]",
-    0.45,
-)
+LINEAR = Tuned("linear", "(9)", ["tau"], "tau = 0.02", 0.15)
+LTV = Tuned("ltv", "(10)", ["Q[1]"], "Q = diag(1, 5e6, 1)", 0.4)
+HOMOGENEOUS = Tuned("homogeneous", "(11)", ["k1", "k2", "alpha"], "[k1, k2, alpha] = [20, 150, 0.85]", 0.45)
 CASES = (LINEAR, LTV, HOMOGENEOUS)
-GENTLE_SHARE = 1.0 - sum(case.share for case in CASES)
+
+Studies = Mapping[str, Mapping[str, Study]]
+"""Words of the push -> observer -> its study."""
 
 
 def recorder() -> Callable[..., Recorded]:
@@ -72,10 +94,9 @@ def recorder() -> Callable[..., Recorded]:
 
 def study_of(
     case: Tuned,
+    push: Push,
     seed: int,
     worlds: int,
-    noise_ug_rthz: Sequence[float] | None = None,
-    settings: Sequence[str] = (),
     recorded: Callable[..., Recorded] | None = None,
     on_share: OnShare | None = None,
 ) -> Study:
@@ -83,10 +104,9 @@ def study_of(
 
     Args:
         case: Which, and what of it.
+        push: The experiment, and at which noises.
         seed: Of the noise.
         worlds: How many are fitted, and as many held out.
-        noise_ug_rthz: Other noise densities [ug/sqrt(Hz)].
-        settings: Settings `section.field=value` of the tuning experiment that differ.
         recorded: Makes the recordings.
         on_share: Called with the share done.
 
@@ -94,10 +114,10 @@ def study_of(
         The study.
     """
     return tune(
-        load_scenario("observer_tuning", [f"seed={seed}", *settings], case.observer),
+        load_scenario("observer_tuning", [f"seed={seed}", *push.settings], case.observer),
         worlds=worlds,
         parameters=case.parameters,
-        noise_ug_rthz=case.noise_ug_rthz if noise_ug_rthz is None else noise_ug_rthz,
+        noise_ug_rthz=push.noise_ug_rthz,
         warm_up_s=WARM_UP_S,
         starts=1,
         recorded=recorded or recorder(),
@@ -105,26 +125,42 @@ def study_of(
     )
 
 
-def nearest(study: Study, noise_ug_rthz: float) -> Level:
-    """The level whose noise is nearest, by its logarithm."""
-    return min(study.levels, key=lambda level: abs(math.log(level.noise_ug_rthz / noise_ug_rthz)))
+def all_studies(
+    seed: int, worlds: int, on_share: OnShare, pushes: Sequence[Push] = PUSHES, cases: Sequence[Tuned] = CASES
+) -> dict[str, dict[str, Study]]:
+    """Tune every observer on the same recordings of every push."""
+    studies: dict[str, dict[str, Study]] = {}
+    recorded, done = recorder(), 0.0
+    for push in pushes:
+        studies[push.words] = {}
+        for case in cases:
+            whole = push.share * case.share
+
+            def share(part: float, before: float = done, whole: float = whole) -> None:
+                on_share(before + part * whole)
+
+            studies[push.words][case.observer] = study_of(case, push, seed, worlds, recorded, share)
+            done += whole
+    return studies
 
 
-def at_default(study: Study) -> Level:
-    """The level of the default noise, which every case has."""
-    return next(level for level in study.levels if level.noise_ug_rthz == DEFAULT_NOISE)
+def level_at(study: Study, noise_ug_rthz: float) -> Level:
+    """The level of one noise."""
+    return next(level for level in study.levels if level.noise_ug_rthz == noise_ug_rthz)
 
 
-def zero_is_closer(level: Level) -> bool:
-    """Whether an estimate of zero is closer to the gyro than either the given or the tuned parameters."""
-    return level.zero_rms < min(level.given_rms.mean(), level.rms.mean())
+def worth_it(level: Level) -> bool:
+    """Whether the tuned observer is closer to the gyro than an estimate of zero, on the held-out worlds."""
+    return float(level.rms.mean()) < level.zero_rms
 
 
-def in_the_loop(case: Tuned, level: Level, worlds: int, seed: int) -> Interval:
-    """Velocity RMS error in the closed loop, Table 2's by the tuned, world by world, after the push of Figs 5 to 7."""
-    tuned = [f"observer.{name}={size}" for name, size in level.sizes.items()]
+def in_the_loop(case: Tuned, level: Level, push: Push, worlds: int, seed: int) -> Interval:
+    """Velocity RMS error in the closed loop, Table 2's by the tuned, world by world, under that push and noise."""
+    noise = f"sensors.accelerometer.noise_density_ug_rthz={level.noise_ug_rthz}"
+    names = dict.fromkeys(name.partition("[")[0] for name in level.sizes)
+    tuned = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
     given_error, tuned_error = (
-        push_recovery(case.observer, seed, settings)
+        push_recovery(case.observer, seed, [*push.settings, noise, *settings])
         .run_many(worlds, keep_trajectory=False)
         .values("velocity_rms_error_rad_s")
         for settings in ([], tuned)

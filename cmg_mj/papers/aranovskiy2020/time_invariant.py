@@ -1,38 +1,64 @@
-"""The time-invariant observer with which the rig of aranovskiy2020 could not be stabilised."""
+"""The time-invariant observer with which the rig of aranovskiy2020 could not be stabilised: which gain, which model."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from cmg_mj.papers.aranovskiy2020.paper import printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.words import listed_and
 from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.simulate import Result
 from cmg_mj.summary_keys import written
 
 SEED = 72_002
+WORLDS = 5
+"""Seeds a bias."""
 BIASES_DEG = (0.0, 0.25, 0.5, 1.0)
-
-LUENBERGER, FROZEN, WHOLE = "luenberger", "(10), frozen gain", "(10)"
-
-
-class Case(NamedTuple):
-    """An observer in the loop."""
-
-    observer: str
-    settings: Sequence[str]
-    worlds: int
-    """Seeds a bias."""
+JUDGED_DEG = 0.5
+"""The bias of Figs 5 to 7, where (10) itself must stand and the time-invariant observer fall."""
 
 
-H11, H12 = settled_gains()
-CASES = {
-    LUENBERGER: Case("luenberger", [], 20),
-    # With alpha = 1, (11) is the first two states of (10) with a constant gain.
-    FROZEN: Case("homogeneous", [f"observer.k1={H11}", f"observer.k2={H12}", "observer.alpha=1"], 5),
-    WHOLE: Case("ltv", [], 5),
+class Gain(NamedTuple):
+    """Of e = x1 - y1: x1' has -l1 e, x2' has -l2 e, so that the error's poles without gravity are s^2 + l1 s + l2."""
+
+    l1: float
+    l2: float
+
+    @property
+    def speed(self) -> float:
+        """Of the error's poles, their distance from 0 [rad/s]."""
+        return math.sqrt(self.l2)
+
+
+def damped(speed: float) -> Gain:
+    """The gain whose poles lie 45 degrees off the real axis, as those of the frozen Riccati gain do [rad/s]."""
+    return Gain(math.sqrt(2.0) * speed, speed**2)
+
+
+PREDECESSOR, FROZEN = "predecessor's", "frozen"
+GAINS: dict[str, Gain] = {
+    "slow": damped(10.0),
+    PREDECESSOR: Gain(20.0, 150.0),
+    "medium": damped(20.0),
+    "fast": damped(30.0),
+    FROZEN: Gain(*settled_gains()),
 }
+"""From slow to fast. The predecessor's is printed in its Table II, the frozen one is where the Riccati equation settles."""
+PRINTED = (PREDECESSOR, FROZEN)
+"""Those that the authors could have run: what the verdict goes by."""
+
+LINEAR, MEASURED = "gravity at the estimate", "gravity at y1"
+MODELS = (LINEAR, MEASURED)
+"""The linearisation (6), as the predecessor's observer has it, and the model of (10) and (11)."""
+
+WHOLE = "(10)"
+
+Cell = tuple[str, str]
+"""Gain and model."""
 
 
 class Fate(NamedTuple):
@@ -44,116 +70,185 @@ class Fate(NamedTuple):
     """Mean velocity RMS error of those that stood [rad/s]; None if none did."""
 
 
-Fates = Mapping[str, Mapping[float, Fate]]
-"""Label -> bias [deg] -> fate."""
-
-
 def fates_of(
-    label: str, biases_deg: Sequence[float], worlds: int, seed: int, duration_s: float = DURATION_S
+    observer: str,
+    settings: Sequence[str],
+    biases_deg: Sequence[float],
+    worlds: int,
+    seed: int,
+    duration_s: float = DURATION_S,
 ) -> dict[float, Fate]:
-    """Run one of `CASES` at several biases, in the same worlds each, with the push of Figs 5 to 7."""
-    observer, settings, _ = CASES[label]
-    biases = [e for e in biases_deg for _ in range(worlds)]
-    numbers = [*range(worlds)] * len(biases_deg)
+    """Close the loop on an observer at several biases, in the same worlds each, with the push of Figs 5 to 7."""
     experiment = push_recovery(observer, seed, settings, duration_s)
-    result = experiment.run_many(numbers, vary={"equilibrium_bias_deg": biases}, keep_trajectory=False)
+    result: Result = experiment.run_many(
+        [*range(worlds)] * len(biases_deg),
+        vary={"equilibrium_bias_deg": [e for e in biases_deg for _ in range(worlds)]},
+        keep_trajectory=False,
+    )
     return {
         e: Fate(float(group.fell.mean()), group.mean("velocity_rms_error_rad_s"))
         for e, group in zip(biases_deg, result.groups(len(biases_deg)), strict=True)
     }
 
 
-def rate_biases() -> dict[str, float]:
-    """Of the rate that an observer estimates at rest, per radian of e, in closed form [1/s]."""
-    model = printed_model()
+def observer_of(cell: Cell) -> tuple[str, list[str]]:
+    """The observer with that gain and model, and its settings.
+
+    With alpha = 1, (11) is the first two states of (10) with a constant gain.
+    """
+    (l1, l2), model = GAINS[cell[0]], cell[1]
+    if model == LINEAR:
+        return "luenberger", [f"observer.L=[[{l1}, 0.0], [{l2}, 0.0], [0.0, 20.0]]"]
+    return "homogeneous", [f"observer.k1={l1}", f"observer.k2={l2}", "observer.alpha=1"]
+
+
+def rate_bias(cell: Cell) -> float:
+    """Of the rate estimated at rest, per radian of e, in closed form [1/s]."""
+    (l1, l2), model = GAINS[cell[0]], printed_model()
     lever = model.gravity_torque / model.J1
-    return {LUENBERGER: 20.0 * lever / (150.0 - lever), FROZEN: lever * H11 / H12}
+    return l1 * lever / (l2 - lever if cell[1] == LINEAR else l2)
 
 
-def luenberger_claim(found: Fates) -> Claim:
-    """The Luenberger observer of the predecessor in the loop."""
-    fates, biases = found[LUENBERGER], rate_biases()
-    fails = [e for e, fate in fates.items() if fate.fell == 1.0]
-    stands = [e for e, fate in fates.items() if fate.fell == 0.0]
-    listed = ", ".join(f"{fate.fell:.0%} at {e:g} deg" for e, fate in fates.items())
+class Factorial(NamedTuple):
+    """The fates by gain, model and bias, and those of (10)."""
+
+    cells: Mapping[Cell, Mapping[float, Fate]]
+    whole: Mapping[float, Fate]
+
+    def falls_at(self, cell: Cell) -> list[float]:
+        """The biases at which every world of a cell falls [deg]."""
+        return [e for e, fate in self.cells[cell].items() if fate.fell == 1.0]
+
+    def stands_everywhere(self, cell: Cell) -> bool:
+        """Whether no world of a cell falls at any bias."""
+        return all(fate.fell == 0.0 for fate in self.cells[cell].values())
+
+    @property
+    def failing(self) -> list[Cell]:
+        """The printed gains' cells that fall, at the bias of Figs 5 to 7, where (10) stands."""
+        if self.whole[JUDGED_DEG].fell > 0.0:
+            return []
+        return [c for c in self.cells if c[0] in PRINTED and self.cells[c][JUDGED_DEG].fell == 1.0]
+
+
+def remark(found: Factorial) -> Claim:
+    """The remark, over gain, model and bias.
+
+    Args:
+        found: The fates.
+
+    Returns:
+        The claim.
+    """
+    standing = [gain for gain in GAINS if all(found.stands_everywhere((gain, model)) for model in MODELS)]
     return Claim(
-        place="Section V, the predecessor's observer",
-        says="With a time-invariant (Luenberger) observer, as the predecessor's, the rig could not be stabilised.",
+        place="Section V, the time-invariant observer",
+        says="A linear time-invariant observer, which is a particular case of (10), could not stabilise the rig.",
         found=(
-            f"sokolov2019's Luenberger observer on the linearisation (6), {CASES[LUENBERGER].worlds} seeds, the same "
-            f"push: share of falls {listed}. At rest e biases its estimated rate by {biases[LUENBERGER]:.1f} e/s, that "
-            f"of (10) by {biases[FROZEN]:.1f} e/s."
+            f"{len(GAINS)} constant gains by 2 models by {len(found.whole)} biases, {WORLDS} seeds each, the push of "
+            f"Figs 5 to 7, the law on measured angles. {' '.join(_of_model(found, model) for model in MODELS)} "
+            f"{_stands(standing)} Velocity RMS error of the frozen gain with gravity at y1 at {JUDGED_DEG:g} deg "
+            f"{_error(found.cells[FROZEN, MEASURED][JUDGED_DEG])} rad/s, of (10) itself "
+            f"{_error(found.whole[JUDGED_DEG])}. At rest e biases the estimated rate by "
+            f"{rate_bias((PREDECESSOR, LINEAR)):.1f} e/s with the predecessor's gain on the linear model, by "
+            f"{rate_bias((FROZEN, MEASURED)):.1f} e/s with the frozen one and gravity at y1."
         ),
-        holds=bool(fails),
-        conditions=(
-            f"With the predecessor's gain and a bias of {min(fails, default=0.0):g} deg or more; it stands at "
-            f"{', '.join(f'{e:g}' for e in stands) or 'no other bias tried'} deg."
+        holds=bool(found.failing),
+        conditions=_conditions(found, standing),
+        otherwise=(
+            f"At e = {JUDGED_DEG:g} deg neither the predecessor's gain nor the frozen one of (10) falls in every "
+            "world, with either model, where (10) stands."
         ),
-        otherwise="It does not fall in every world at any bias tried.",
         figures={
-            "bias_deg": list(fates),
-            **_figures(LUENBERGER, found),
-            "rate_bias_luenberger_rad_s_per_rad": biases[LUENBERGER],
-            "rate_bias_10_rad_s_per_rad": biases[FROZEN],
+            "bias_deg": list(found.whole),
+            **{
+                f"{gain}, {model}": {
+                    "l1_1_s": GAINS[gain].l1,
+                    "l2_1_s2": GAINS[gain].l2,
+                    "rate_bias_rad_s_per_rad": rate_bias((gain, model)),
+                    "fell_fraction": [fate.fell for fate in fates.values()],
+                    "velocity_rms_error_rad_s": [fate.error for fate in fates.values()],
+                }
+                for (gain, model), fates in found.cells.items()
+            },
+            "fell_fraction (10)": [fate.fell for fate in found.whole.values()],
+            "velocity_rms_error (10)_rad_s": [fate.error for fate in found.whole.values()],
         },
         pictures=[_picture(found)],
     )
 
 
-def frozen_claim(found: Fates) -> Claim:
-    """(10) with a constant gain, which is the time-invariant particular case of it."""
-    frozen, whole = found[FROZEN], found[WHOLE]
-    fell = max(fate.fell for fate in frozen.values())
-    return Claim(
-        place="Section V, the time-invariant case of (10)",
-        says="A linear time-invariant observer, a particular case of (10), could not stabilise the rig.",
-        found=(
-            f"(10) with its gain frozen at the value at which the Riccati equation settles at rest, "
-            f"{CASES[FROZEN].worlds} seeds a bias, e from {min(frozen):g} to {max(frozen):g} deg: it falls in "
-            f"{fell:.0%} at most. Velocity RMS error at 0.5 deg {_error(frozen[0.5])} rad/s, (10) itself "
-            f"{_error(whole[0.5])}."
-        ),
-        holds=fell > 0.5,
-        otherwise=(
-            "J2 is so small that A' and with it H hardly vary: a constant gain of this size is (10) to the digits "
-            "given. What fails in the predecessor's observer is not that its gain is constant, but its size, and the "
-            "linear model, which takes gravity at the estimate."
-        ),
-        figures={"bias_deg": list(frozen), **_figures(FROZEN, found), **_figures(WHOLE, found)},
-    )
+def _of_model(found: Factorial, model: str) -> str:
+    """From which bias on each gain falls in every world."""
+    parts = []
+    for gain, (_, l2) in GAINS.items():
+        falls = found.falls_at((gain, model))
+        fate = f"from {min(falls):g} deg" if falls else "at none"
+        parts.append(f"{gain} ({math.sqrt(l2):.0f} rad/s) {fate}")
+    return f"With {model} it falls in every world: {', '.join(parts)}."
+
+
+def _stands(gains: Sequence[str]) -> str:
+    if not gains:
+        return "No gain stands at every bias with both models."
+    return f"At every bias and with both models it stands with the gains {listed_and(gains)}."
+
+
+def _conditions(found: Factorial, standing: Sequence[str]) -> str:
+    """What falls, and that it is not the constancy of the gain."""
+    cells = [f"the {gain} gain and {model}" for gain, model in found.failing]
+    sentences = [f"At e = {JUDGED_DEG:g} deg, with {listed_and(cells)}." if cells else "Nowhere."]
+    if FROZEN in standing:
+        sentences.append(
+            "It is not that the gain is constant: frozen at the value at which the Riccati equation settles, it "
+            "stands with either model at every bias tried."
+        )
+    slow = [model for model in MODELS if found.falls_at((PREDECESSOR, model))]
+    if len(slow) == 2:
+        first = {model: min(found.falls_at((PREDECESSOR, model))) for model in MODELS}
+        sentences.append(
+            f"It is that the gain is small, and then the model: the predecessor's falls from {first[LINEAR]:g} deg "
+            f"with {LINEAR}, from {first[MEASURED]:g} deg with {MEASURED}."
+        )
+    return " ".join(sentences)
 
 
 def _error(fate: Fate) -> str:
     return written("velocity_rms_error_rad_s", fate.error)
 
 
-def _figures(label: str, found: Fates) -> dict[str, Any]:
-    return {
-        f"fell_fraction_{label}": [fate.fell for fate in found[label].values()],
-        f"velocity_rms_error_{label}_rad_s": [fate.error for fate in found[label].values()],
-    }
-
-
-def _picture(found: Fates) -> Picture:
+def _picture(found: Factorial) -> Picture:
     shares, errors = [], []
-    for style, (label, fates) in zip(("o-", "s-", ".--"), found.items(), strict=True):
-        known = {e: fate.error for e, fate in fates.items() if fate.error is not None}
-        shares.append(Line(list(fates), [100.0 * fate.fell for fate in fates.values()], label, style))
-        errors.append(Line(list(known), list(known.values()), label, style))
+    for model in MODELS:
+        falls, velocities = [], []
+        for color, gain in enumerate(GAINS):
+            fates = found.cells[gain, model]
+            known = {e: fate.error for e, fate in fates.items() if fate.error is not None}
+            falls.append(Line(list(fates), [100.0 * fate.fell for fate in fates.values()], gain, "o-", color))
+            velocities.append(Line(list(known), list(known.values()), style="o-", color=color))
+        stood = {e: fate.error for e, fate in found.whole.items() if fate.error is not None}
+        velocities.append(Line(list(stood), list(stood.values()), WHOLE, "k--"))
+        shares.append(Panel("share of falls [%]", falls, y_range=(-5.0, 105.0)))
+        label = "velocity\nRMS error [rad/s]"
+        errors.append(Panel(label, velocities, "of those that stood", "equilibrium bias e [deg]", y_range=(0.0, 0.2)))
     return Picture(
         "aranovskiy2020-time-invariant",
-        "aranovskiy2020, Section V: a time-invariant observer in the loop, with the push",
-        [
-            Panel("share of falls [%]", shares, y_range=(-5.0, 105.0)),
-            Panel("velocity\nRMS error [rad/s]", errors, "of the worlds that stood", "equilibrium bias e [deg]"),
-        ],
+        "aranovskiy2020, Section V: time-invariant observers, gravity at the estimate (left) and at y1",
+        [*shares, *errors],
+        columns=2,
     )
 
 
+def factorial(worlds: int, seed: int, on_share: OnShare, duration_s: float = DURATION_S) -> Factorial:
+    """Run every cell, and (10)."""
+    cells = [(gain, model) for gain in GAINS for model in MODELS]
+    found: dict[Cell, dict[float, Fate]] = {}
+    for i, cell in enumerate(cells):
+        found[cell] = fates_of(*observer_of(cell), BIASES_DEG, worlds, seed, duration_s)
+        on_share((i + 1) / (len(cells) + 1))
+    return Factorial(found, fates_of("ltv", [], BIASES_DEG, worlds, seed, duration_s))
+
+
 def claims(on_share: OnShare) -> list[Claim]:
-    """The predecessor's observer, and the time-invariant case of (10)."""
-    found = {}
-    for i, (label, case) in enumerate(CASES.items()):
-        found[label] = fates_of(label, BIASES_DEG, case.worlds, SEED)
-        on_share((i + 1) / len(CASES))
-    return [luenberger_claim(found), frozen_claim(found)]
+    """The remark."""
+    return [remark(factorial(WORLDS, SEED, on_share))]
