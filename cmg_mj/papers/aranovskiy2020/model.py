@@ -10,7 +10,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.paper import printed_model
+from cmg_mj.papers.aranovskiy2020.paper import gimbal_torque, printed_model
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.reduced import ReducedModel
@@ -55,7 +55,7 @@ def table_1() -> Claim:
 
 
 class Residuals(NamedTuple):
-    """The six-body model's accelerations less the reduced model's, RMS over random states [rad/s^2]."""
+    """The six-body model's accelerations less the reduced model's, RMS over random states [rad/s^2]; then torques."""
 
     tilt: float
     """With the flywheels' own acceleration counted."""
@@ -67,6 +67,14 @@ class Residuals(NamedTuple):
     """Acceleration of body A, which Hypotheses 1 and 2 say is zero."""
     size: float
     """RMS of the tilt acceleration itself."""
+    torque: float
+    """The gimbal's torque less tau_c of (2) [N m]."""
+    torque_turned_J2: float
+    """With the sign of its last term turned [N m]."""
+    torque_without_flywheel: float
+    """Without the flywheel's term, which is what the servo has to bear [N m]."""
+    torque_size: float
+    """RMS of the torque itself [N m]."""
 
 
 def residuals(states: int, seed: int) -> Residuals:
@@ -90,13 +98,13 @@ def residuals(states: int, seed: int) -> Residuals:
         x1, x3 = rng.uniform(-0.4, 0.4), rng.uniform(-1.2, 1.2)
         x2, u = rng.uniform(-2.0, 2.0), rng.uniform(-4.7, 4.7)
         speed = rng.uniform(280.0, 340.0)
-        gimbal_torque, motor_torque = rng.uniform(-1.0, 1.0), rng.uniform(-0.2, 0.2)
+        gimbal_torque_n_m, motor_torque = rng.uniform(-1.0, 1.0), rng.uniform(-0.2, 0.2)
         mujoco.mj_resetDataKeyframe(model, data, plant.key)
         data.qpos[plant.tilt], data.qvel[plant.tilt] = plant.tilt_zero + x1, x2
         for cube in plant.cubes:
             data.qpos[cube.gimbal], data.qvel[cube.gimbal] = cube.gimbal_zero + cube.direction * x3, cube.direction * u
             data.qvel[cube.flywheel] = math.copysign(speed, cube.speed)
-            data.qfrc_applied[cube.gimbal] = cube.direction * gimbal_torque
+            data.qfrc_applied[cube.gimbal] = cube.direction * gimbal_torque_n_m
             data.qfrc_applied[cube.flywheel] = math.copysign(1.0, cube.speed) * motor_torque
         mujoco.mj_forward(model, data)
         spin_up = data.qacc[plant.cubes[0].flywheel] * math.copysign(1.0, plant.cubes[0].speed)
@@ -108,13 +116,20 @@ def residuals(states: int, seed: int) -> Residuals:
         # d/dt of J_d omega_d sin x3, of which (3) has the part with x3'.
         by_spin_up = reduced.J_d * math.sin(x3) * float(spin_up) / (reduced.J1 + reduced.J2 * math.sin(x3) ** 2)
         off, off_turned = q - f2(reduced.J2), q - f2(-reduced.J2)
-        rows.append((off - by_spin_up, off, off_turned - by_spin_up, data.qacc[plant.yaw], q))
+        cube = plant.cubes[0]
+        turning = cube.direction * float(data.qacc[cube.gimbal])
+        miss = gimbal_torque_n_m - gimbal_torque(x2, x3, turning, speed)
+        last = gimbal_torque(x2, x3, 0.0, 0.0)  # that of J2 alone
+        flywheel = gimbal_torque(x2, x3, 0.0, speed) - last
+        rows.append(
+            (off - by_spin_up, off, off_turned - by_spin_up, data.qacc[plant.yaw], q)
+            + (miss, miss + 2.0 * last, miss + flywheel, gimbal_torque_n_m)
+        )
     return Residuals(*(float(value) for value in np.sqrt(np.mean(np.square(rows), axis=0))))
 
 
-def equations_2_to_4(states: int = 500, seed: int = SEED) -> Claim:
+def equations_2_to_4(r: Residuals, states: int) -> Claim:
     """(3) and (4) against MuJoCo's six bodies."""
-    r = residuals(states, seed)
     return Claim(
         place="(2) to (4)",
         says="Under Hypotheses 1 to 3 the six bodies move as one pendulum with one gimbal, and body A stands still.",
@@ -126,10 +141,34 @@ def equations_2_to_4(states: int = 500, seed: int = SEED) -> Claim:
         ),
         holds=r.tilt < 1e-9 * r.size and r.yaw < 1e-9 * r.size and r.tilt_turned_J2 > 1e3 * r.tilt,
         otherwise="The six bodies move otherwise.",
-        figures={f"{name}_rad_s2": value for name, value in r._asdict().items()},
+        figures={
+            f"{name}_rad_s2": getattr(r, name) for name in ("tilt", "tilt_as_printed", "tilt_turned_J2", "yaw", "size")
+        },
+    )
+
+
+def gimbals_line(r: Residuals, states: int) -> Claim:
+    """The second line of (2), which the velocity servos make superfluous later."""
+    return Claim(
+        place="(2), tau_c",
+        says="The torque of a gimbal is (I_c + I_d) omega_c' + J_d omega_b omega_d sin q_c + J2 sin(2 q_c) omega_b^2/2.",
+        found=(
+            f"At the same {states} states, under gimbal torques of {r.torque_size:.2f} N m RMS, the six bodies have it "
+            f"to {r.torque:.1e} N m. With the sign of the last term turned it would be {r.torque_turned_J2:.1e} off. "
+            f"The flywheel's term, which a servo has to bear while the rig tilts, is {r.torque_without_flywheel:.2f} "
+            "N m RMS."
+        ),
+        holds=r.torque < 1e-9 * r.torque_size and r.torque_turned_J2 > 1e3 * r.torque,
+        otherwise="The gimbals need another torque.",
+        figures={
+            f"{name}_n_m": getattr(r, name)
+            for name in ("torque", "torque_turned_J2", "torque_without_flywheel", "torque_size")
+        },
     )
 
 
 def claims(on_share: OnShare) -> list[Claim]:
     """Table 1, and (2) to (4)."""
-    return [table_1(), equations_2_to_4()]
+    states = 500
+    found = residuals(states, SEED)
+    return [table_1(), equations_2_to_4(found, states), gimbals_line(found, states)]

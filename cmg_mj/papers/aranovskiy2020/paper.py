@@ -14,6 +14,7 @@ TABLE_1 = {
     "m": 2.62,
     "l": 0.19,
     "J_b": 13e-3,
+    "I_c": 10e-4,
     "J_c": 2.6e-4,
     "K_c": 9.9e-4,
     "I_d": 5.6e-4,
@@ -57,6 +58,24 @@ def printed_model() -> ReducedModel:
         omega_d=t["omega_d"],
         gravity_torque=t["m"] * t["g"] * t["l"] / math.sqrt(2.0),
     )
+
+
+def gimbal_torque(x2: float, x3: float, gimbal_acceleration: float, omega_d: float) -> float:
+    """tau_c, the second line of (2), with q_c = x3 + pi/2 [N m].
+
+    Args:
+        x2: omega_b [rad/s].
+        x3: Gimbal angle from upright [rad].
+        gimbal_acceleration: omega_c' [rad/s^2].
+        omega_d: The flywheel's speed [rad/s].
+
+    Returns:
+        The torque on one gimbal.
+    """
+    q_c = x3 + math.pi / 2.0
+    own = (TABLE_1["I_c"] + TABLE_1["I_d"]) * gimbal_acceleration
+    turned = 0.5 * printed_model().J2 * math.sin(2.0 * q_c) * x2**2
+    return own + TABLE_1["J_d"] * x2 * omega_d * math.sin(q_c) + turned
 
 
 def gimbal_rest(e: float) -> float:
