@@ -1,0 +1,165 @@
+"""Section II of aranovskiy2020: servos that track a velocity, and how far a deadband of theirs may go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from cmg_mj.intervals import Interval, known_interval, ratio_interval
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.recorded import trajectory_of
+from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.plant import Plant, load_plant
+from cmg_mj.simulate import Result
+
+SEED = 78_000
+WORLDS = 4
+LAG_S, SOFT_LAG_S = 0.001, 0.005
+"""I/kv, in which a free gimbal comes near a new velocity, of a stiff and of a soft servo [s]; the paper gives neither."""
+COMMAND_LAG_S = 0.0005
+"""Half a physics step: Runge-Kutta 4 follows nothing much faster [s]."""
+RESOLUTION = 0.0119
+"""0.114 rev/min, the unit in which the MX-106 is told a speed in wheel mode (e-Manual, MX-106) [rad/s]."""
+DEADBANDS = (0.0, RESOLUTION, 0.05, 0.1, 0.2, 0.4)
+"""Speeds below which the gimbal stands still [rad/s]; the paper says nothing of one."""
+MEANS_S = 0.1
+"""Over which rate and command are compared: the command's noise changes from period to period [s]."""
+POSITION = "the bench's servo"
+WITHIN = 0.1
+"""An estimate and a rig that change by less have not noticed."""
+
+
+def in_velocity_mode(plant: Plant, deadband: float, lag_s: float = LAG_S) -> None:
+    """Give both gimbals a servo with the torque kv (u - rate), and dry friction that makes a deadband of it.
+
+    With the friction kv times the deadband the gimbal stands while |u| is less, and turns slower by it otherwise.
+    MuJoCo's velocity servo has no state; here the state that the bench's has is the command, late by `COMMAND_LAG_S`.
+
+    Args:
+        plant: A rig of its own, nothing has run on it.
+        deadband: Speed below which the gimbal stands still [rad/s].
+        lag_s: I/kv [s].
+    """
+    model = plant.model
+    for cube in plant.cubes:
+        i = cube.servo
+        dof = int(model.jnt_dofadr[cube.gimbal])
+        kv = float(model.dof_M0[dof]) / lag_s
+        model.actuator_dyntype[i] = int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
+        model.actuator_dynprm[i, 0] = COMMAND_LAG_S
+        model.actuator_gainprm[i, 0] = kv
+        model.actuator_biasprm[i, :3] = 0.0, 0.0, -kv
+        model.dof_frictionloss[dof] = kv * deadband
+        model.key_act[plant.key, model.actuator_actadr[i]] = 0.0
+
+
+class Servos(NamedTuple):
+    """The runs, the same worlds each."""
+
+    position: Result
+    """With the bench's servo."""
+    velocity: Mapping[float, Result]
+    """Deadband [rad/s] -> runs with the servo in velocity mode."""
+    soft: Result
+    """Without a deadband, the soft servo in velocity mode."""
+
+
+def run(worlds: int, seed: int, duration_s: float = DURATION_S) -> Servos:
+    """Close the loop on (11), with the push of Figs 5 to 7, on every servo."""
+    experiment = push_recovery("homogeneous", seed, ["plant.timestep_s=0.001"], duration_s)
+    cases = [*((deadband, LAG_S) for deadband in DEADBANDS), (0.0, SOFT_LAG_S)]
+    rigs = [load_plant(experiment.scenario.plant) for _ in cases]
+    for rig, case in zip(rigs, cases, strict=True):
+        in_velocity_mode(rig, *case)
+    plants = [rig for rig in rigs for _ in range(worlds)]
+    *groups, soft = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).groups(len(rigs))
+    return Servos(experiment.run_many(worlds), dict(zip(DEADBANDS, groups, strict=True)), soft)
+
+
+def tracking(result: Result) -> Interval | None:
+    """RMS of the gimbals' rate less the command, means over `MEANS_S`, by that of the command; worlds that stood."""
+    run = trajectory_of(result)
+    span = round(MEANS_S / float(run["time_s"][1] - run["time_s"][0]))
+    ends = np.arange(0, len(run["time_s"]), span)
+    turned = np.diff(run["x3_rad"][ends], axis=0) / MEANS_S
+    command = np.add.reduceat(run["u_rad_s"], ends[:-1])[: len(turned)] / span
+    command[-1] = run["u_rad_s"][ends[-2] : ends[-1]].mean(axis=0)
+    off = np.sqrt(np.mean((turned - command) ** 2, axis=0) / np.mean(command**2, axis=0))
+    return known_interval(np.where(result.stood, off, np.nan))
+
+
+def servo_claim(found: Servos) -> Claim:
+    """Whether the commanded velocity can be taken for the gimbal's."""
+    smooth = found.velocity[0.0]
+    velocity, tilt = (
+        {d: ratio_interval(result.values(key), smooth.values(key)) for d, result in found.velocity.items()}
+        for key in ("velocity_rms_error_rad_s", "tilt_rms_deg")
+    )
+    fell = {d: float(result.fell.mean()) for d, result in found.velocity.items()}
+    unnoticed = [
+        d for d in fell if fell[d] == 0.0 and max(abs(velocity[d].mean - 1.0), abs(tilt[d].mean - 1.0)) < WITHIN
+    ]
+    tracked = {d: tracking(result) for d, result in found.velocity.items()}
+    standing = [d for d in fell if fell[d] == 0.0]
+    listed = ", ".join(f"{d:g}: {velocity[d].mean:.2f} and {tilt[d].mean:.2f}" for d in standing if d > 0.0)
+    falling = [f"{d:g}" for d in fell if fell[d] > 0.0]
+    near = tracked[RESOLUTION]
+    bench = ratio_interval(*(r.values("velocity_rms_error_rad_s") for r in (found.position, smooth)))
+    return Claim(
+        place="After (2), the servos",
+        says="The gimbals' servos ensure velocity tracking, so that omega_c can be taken for an input.",
+        found=(
+            f"Servos in velocity mode with a lag of {1e3 * LAG_S:g} ms and a deadband, (11) in the loop, "
+            f"{len(smooth.outcomes)} seeds, the push of Figs 5 to 7. Over {MEANS_S:g} s the gimbal is off its command "
+            f"by {_share(tracked[0.0])} of it (RMS) without a deadband, by {_share(near)} with the resolution of the "
+            f"MX-106, {RESOLUTION:g} rad/s; with a lag of {1e3 * SOFT_LAG_S:g} ms, and so less torque against the "
+            f"flywheel's, by {_share(tracking(found.soft))}. By deadband [rad/s], velocity RMS error and tilt RMS by those without: "
+            f"{listed}. The rig falls with {', '.join(falling) or 'none'}. The bench's own servo, which integrates its "
+            f"command, has {bench.mean:.2f} times the velocity error."
+        ),
+        holds=RESOLUTION in unnoticed and near is not None and near.mean < WITHIN,
+        conditions=(
+            f"With a servo that stiff, up to a deadband of {max(unnoticed, default=0.0):g} rad/s, with which the estimate's error and the tilt "
+            f"stay within {WITHIN:.0%}; the paper says nothing of one."
+        ),
+        otherwise="Already the resolution of the servo is felt in the estimate or in the tilt.",
+        figures={
+            "deadband_rad_s": list(DEADBANDS),
+            "velocity_rms_error_by_none": list(velocity.values()),
+            "tilt_rms_by_none": list(tilt.values()),
+            "tracking_error_share": list(tracked.values()),
+            "tracking_error_share_soft": tracking(found.soft),
+            "fell_fraction": list(fell.values()),
+            "bench_servo_velocity_rms_error_by_none": bench,
+        },
+        pictures=[_picture(found)],
+    )
+
+
+def _share(interval: Interval | None) -> str:
+    return "-" if interval is None else f"{interval.mean:.0%}"
+
+
+def _picture(found: Servos) -> Picture:
+    tilts, turns = [], []
+    shown = {POSITION: found.position} | {
+        f"deadband {d:g} rad/s": found.velocity[d] for d in (0.0, DEADBANDS[3], DEADBANDS[-1])
+    }
+    for color, (label, result) in enumerate(shown.items()):
+        run = trajectory_of(result).world(0)
+        tilts.append(Line(run["time_s"], np.degrees(run["x1_rad"]), label, color=color, width=0.8))
+        turns.append(Line(run["time_s"], np.degrees(run["x3_rad"]), color=color, width=0.8))
+    return Picture(
+        "aranovskiy2020-servo",
+        "aranovskiy2020, Section II: the gimbals' servos in velocity mode, with a deadband, world 0",
+        [Panel("tilt x1 [deg]", tilts), Panel("gimbal angle x3 [deg]", turns)],
+    )
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """The servos."""
+    return [servo_claim(run(WORLDS, SEED))]
