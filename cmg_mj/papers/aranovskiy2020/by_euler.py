@@ -1,4 +1,4 @@
-"""(10) and (11) of aranovskiy2020 by explicit Euler, for one world or many: what Section V's order owes to the method."""
+"""(10) and (11) of aranovskiy2020 by explicit Euler, which Section V's order owes something to."""
 
 from __future__ import annotations
 

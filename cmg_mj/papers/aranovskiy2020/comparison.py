@@ -10,13 +10,16 @@ import numpy as np
 from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.words import listed_and, plus_minus
+from cmg_mj.papers.words import listed_and
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.simulate import Result
 from cmg_mj.summary_keys import KEYS, written
 
 Numbers = Mapping[str, np.ndarray]
 """Observer -> a measure in the loop, (n_worlds,); NaN for a world that did not stand. Less is better."""
+
+Angles = Literal["measured", "estimated"]
+"""Which angles the law is fed with."""
 
 Order = Literal["holds", "is inverted", "does not hold"]
 
@@ -47,11 +50,11 @@ class Measured(NamedTuple):
     """One measure, with the law on either kind of angles."""
 
     key: str
-    numbers: Mapping[str, Numbers]
+    numbers: Mapping[Angles, Numbers]
     """Which angles -> observer -> numbers."""
 
     @property
-    def orders(self) -> dict[str, Order]:
+    def orders(self) -> dict[Angles, Order]:
         """Which angles -> the order."""
         return {angles: order_of(numbers) for angles, numbers in self.numbers.items()}
 
@@ -60,7 +63,7 @@ class Measured(NamedTuple):
         return set(self.orders.values()) == {order}
 
 
-def measured(results: Mapping[str, Mapping[str, Result]]) -> list[Measured]:
+def measured(results: Mapping[Angles, Mapping[str, Result]]) -> list[Measured]:
     """Read the measures off the runs.
 
     Args:
@@ -135,9 +138,7 @@ def _by_measure(found: list[Measured]) -> str:
         by = [f"the {KEYS[measure.key].label}" for measure in found if measure.everywhere(kind)]
         if by:
             sentences.append(f"By {listed_and(by)} {said}.")
-    mixed = [
-        f"the {KEYS[m.key].label}" for m in found if not (m.everywhere("holds") or m.everywhere("is inverted"))
-    ]
+    mixed = [f"the {KEYS[m.key].label}" for m in found if not (m.everywhere("holds") or m.everywhere("is inverted"))]
     if mixed:
         sentences.append(f"By {listed_and(mixed)} it is neither, or not on all angles.")
     return " ".join(sentences)

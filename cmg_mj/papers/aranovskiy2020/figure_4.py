@@ -28,7 +28,7 @@ class Riding(NamedTuple):
     """The observers open loop, on one motion."""
 
     whole: dict[str, np.ndarray]
-    """RMS of the estimated rate less the gyro's over the whole run, (n_worlds,) [rad/s]; `zero`: of an estimate of 0."""
+    """RMS of the estimated rate less the gyro's over the whole run, (n_worlds,) [rad/s]; `zero`: of zero."""
     after_push: dict[str, np.ndarray]
     """The same from the push to one second after its end."""
     example: Trajectory
@@ -68,9 +68,9 @@ def figure_4(worlds: int = WORLDS, seed: int = SEED) -> Claim:
         place="Fig. 4",
         says="With the loop closed on the gyro and a push at 2 s, the three tuned observers are comparable open loop.",
         found=(
-            f"RMS of the estimated rate less the gyro's, {worlds} seeds, with 95 % intervals [rad/s]. From the push to "
-            f"a second after it: {_listed(after)}; the largest is {spread_after:.2f} times the smallest. Over all 10 s: "
-            f"{_listed(whole)}; {spread:.2f} times."
+            f"RMS of the estimated rate less the gyro's, {worlds} seeds, with 95 % intervals [rad/s]. From the push "
+            f"to a second after it: {_listed(after)}; the largest is {spread_after:.2f} times the smallest. Over all "
+            f"10 s: {_listed(whole)}; {spread:.2f} times."
         ),
         holds=spread_after < COMPARABLE,
         conditions=f"From our push to a second after it (1 N m for 0.1 s, e = 0.5 deg). {_against_zero(after)}",

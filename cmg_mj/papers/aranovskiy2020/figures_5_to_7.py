@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
 
 import numpy as np
 
 from cmg_mj.intervals import known_interval
 from cmg_mj.papers.aranovskiy2020 import comparison, second_place
+from cmg_mj.papers.aranovskiy2020.comparison import Angles
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
@@ -17,8 +17,6 @@ from cmg_mj.papers.words import plus_minus
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
-
-Angles = Literal["measured", "estimated"]
 
 FIGURES = {"linear": "Fig. 5", "ltv": "Fig. 6", "homogeneous": "Fig. 7"}
 ANGLES: tuple[Angles, Angles] = ("measured", "estimated")

@@ -119,12 +119,12 @@ def finite_time_claim() -> Claim:
         place="After (11), finite time",
         says="Were it not for the replaced x2 and sin(x1), the error would converge to the origin in finite time.",
         found=(
-            "k1, k2 of Table 2, no bias, no noise, at rest, a first error of 1 rad/s. By alpha the error is gone after "
-            f"{', '.join(f'{alpha:g}: {d.end_s:.3f} s' for alpha, d in finite.items())}: each half turn of the error is "
+            "k1, k2 of Table 2, no bias, no noise, at rest, a first error of 1 rad/s. By alpha the error is gone "
+            f"after {', '.join(f'{alpha:g}: {d.end_s:.3f} s' for alpha, d in finite.items())}. Each half turn is "
             f"quicker than the one before it, by the factors {', '.join(f'{d.shrinks:.3f}' for d in finite.values())}. "
             f"By homogeneity the factor is that of the size, to the power 1 - alpha, which agrees to "
-            f"{factor_off:.1%}. With alpha = 1 each takes as long as the one before. At alpha = {printed:g} the bench's "
-            f"observer, sampled at {1.0 / FINE_DT:g} Hz, has fallen to {SEEN:g} rad/s after {ours:.4f} s, the "
+            f"{factor_off:.1%}. With alpha = 1 each takes as long as the one before. At alpha = {printed:g} the "
+            f"bench's observer, sampled at {1.0 / FINE_DT:g} Hz, has fallen to {SEEN:g} rad/s after {ours:.4f} s, the "
             f"differential equation after {theirs:.4f} s."
         ),
         holds=all(map(math.isfinite, (d.end_s for d in finite.values())))

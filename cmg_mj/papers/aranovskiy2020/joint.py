@@ -81,8 +81,8 @@ def joint_claim(studies: Studies) -> Claim:
             f"{len(studies)} pushes at {len(tried)} noises in all, each recorded once for all three. In {len(worth)} "
             "of them all three can be tuned to follow the gyro better than an estimate of zero does. Of these Table "
             f"2's lines come nearest to being the best together at {found.words}. Table 2's error by that of the "
-            f"tuned there: {ratios}. Zero left aside it is {least.words}, where the worst has {least.worst:.2f} times the "
-            f"error of the tuned. {_apart(studies)}"
+            f"tuned there: {ratios}. Zero left aside it is {least.words}, where the worst has {least.worst:.2f} times "
+            f"the error of the tuned. {_apart(studies)}"
         ),
         holds=found.worth_it and not others,
         conditions=f"At {found.words}; the paper gives neither its push nor its noise.",

@@ -122,8 +122,10 @@ def residuals(states: int, seed: int) -> Residuals:
         last = gimbal_torque(x2, x3, 0.0, 0.0)  # that of J2 alone
         flywheel = gimbal_torque(x2, x3, 0.0, speed) - last
         rows.append(
-            (off - by_spin_up, off, off_turned - by_spin_up, data.qacc[plant.yaw], q)
-            + (miss, miss + 2.0 * last, miss + flywheel, gimbal_torque_n_m)
+            (
+                *(off - by_spin_up, off, off_turned - by_spin_up, data.qacc[plant.yaw], q),
+                *(miss, miss + 2.0 * last, miss + flywheel, gimbal_torque_n_m),
+            )
         )
     return Residuals(*(float(value) for value in np.sqrt(np.mean(np.square(rows), axis=0))))
 
@@ -151,7 +153,7 @@ def gimbals_line(r: Residuals, states: int) -> Claim:
     """The second line of (2), which the velocity servos make superfluous later."""
     return Claim(
         place="(2), tau_c",
-        says="The torque of a gimbal is (I_c + I_d) omega_c' + J_d omega_b omega_d sin q_c + J2 sin(2 q_c) omega_b^2/2.",
+        says="A gimbal's torque is (I_c + I_d) omega_c' + J_d omega_b omega_d sin q_c + J2 sin(2 q_c) omega_b^2/2.",
         found=(
             f"At the same {states} states, under gimbal torques of {r.torque_size:.2f} N m RMS, the six bodies have it "
             f"to {r.torque:.1e} N m. With the sign of the last term turned it would be {r.torque_turned_J2:.1e} off. "

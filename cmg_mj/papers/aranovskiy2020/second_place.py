@@ -30,8 +30,10 @@ Errors = Mapping[str, np.ndarray]
 def errors_of(form: str, worlds: int, seed: int) -> np.ndarray:
     """Close the loop on one of `CASES`, the push and noise of Figs 5 to 7, the law on measured angles."""
     observer, settings = CASES[form]
-    return push_recovery(observer, seed, settings).run_many(worlds, keep_trajectory=False).values(
-        "velocity_rms_error_rad_s"
+    return (
+        push_recovery(observer, seed, settings)
+        .run_many(worlds, keep_trajectory=False)
+        .values("velocity_rms_error_rad_s")
     )
 
 
@@ -59,9 +61,7 @@ def cause(errors: Errors) -> Claim:
     """
     exact = known_interval(errors[TEN] - errors[ELEVEN])
     by_euler = known_interval(errors[TEN_BY_EULER] - errors[ELEVEN_BY_EULER])
-    method = known_interval(
-        (errors[TEN_BY_EULER] - errors[TEN]) - (errors[ELEVEN_BY_EULER] - errors[ELEVEN])
-    )
+    method = known_interval((errors[TEN_BY_EULER] - errors[TEN]) - (errors[ELEVEN_BY_EULER] - errors[ELEVEN]))
     gain = known_interval(errors[TEN_BY_EULER] - errors[TEN_EXACT_GAIN])
     share = None if method is None or by_euler is None else method.mean / by_euler.mean
     told = "-" if share is None else f"{share:.0%}"

@@ -19,7 +19,7 @@ from cmg_mj.simulate import Result
 SEED = 78_000
 WORLDS = 4
 LAG_S, SOFT_LAG_S = 0.001, 0.005
-"""I/kv, in which a free gimbal comes near a new velocity, of a stiff and of a soft servo [s]; the paper gives neither."""
+"""I/kv, in which a free gimbal comes near a new velocity: a stiff servo and a soft one [s]; the paper has neither."""
 COMMAND_LAG_S = 0.0005
 """Half a physics step: Runge-Kutta 4 follows nothing much faster [s]."""
 RESOLUTION = 0.0119
@@ -117,14 +117,14 @@ def servo_claim(found: Servos) -> Claim:
             f"{len(smooth.outcomes)} seeds, the push of Figs 5 to 7. Over {MEANS_S:g} s the gimbal is off its command "
             f"by {_share(tracked[0.0])} of it (RMS) without a deadband, by {_share(near)} with the resolution of the "
             f"MX-106, {RESOLUTION:g} rad/s; with a lag of {1e3 * SOFT_LAG_S:g} ms, and so less torque against the "
-            f"flywheel's, by {_share(tracking(found.soft))}. By deadband [rad/s], velocity RMS error and tilt RMS by those without: "
-            f"{listed}. The rig falls with {', '.join(falling) or 'none'}. The bench's own servo, which integrates its "
-            f"command, has {bench.mean:.2f} times the velocity error."
+            f"flywheel's, by {_share(tracking(found.soft))}. By deadband [rad/s], velocity RMS error and tilt RMS by "
+            f"those without: {listed}. The rig falls with {', '.join(falling) or 'none'}. The bench's own servo, which "
+            f"integrates its command, has {bench.mean:.2f} times the velocity error."
         ),
         holds=RESOLUTION in unnoticed and near is not None and near.mean < WITHIN,
         conditions=(
-            f"With a servo that stiff, up to a deadband of {max(unnoticed, default=0.0):g} rad/s, with which the estimate's error and the tilt "
-            f"stay within {WITHIN:.0%}; the paper says nothing of one."
+            f"With a servo that stiff, up to a deadband of {max(unnoticed, default=0.0):g} rad/s, with which the "
+            f"estimate's error and the tilt stay within {WITHIN:.0%}; the paper says nothing of one."
         ),
         otherwise="Already the resolution of the servo is felt in the estimate or in the tilt.",
         figures={

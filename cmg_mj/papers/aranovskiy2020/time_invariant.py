@@ -47,7 +47,7 @@ GAINS: dict[str, Gain] = {
     "fast": damped(30.0),
     FROZEN: Gain(*settled_gains()),
 }
-"""From slow to fast. The predecessor's is printed in its Table II, the frozen one is where the Riccati equation settles."""
+"""From slow to fast. The predecessor's is of its Table II, the frozen one is where the Riccati equation settles."""
 PRINTED = (PREDECESSOR, FROZEN)
 """Those that the authors could have run: what the verdict goes by."""
 

@@ -39,9 +39,7 @@ class Tried(NamedTuple):
 def loops_of(studies: Studies, together: Together, on_share: OnShare) -> list[Tried]:
     """Close the loop on the tuned and on Table 2's: at the default noise and push, and in the joint experiment."""
     default = next(
-        tried
-        for tried in experiments(studies)
-        if tried.push == STRONG.words and tried.noise_ug_rthz == DEFAULT_NOISE
+        tried for tried in experiments(studies) if tried.push == STRONG.words and tried.noise_ug_rthz == DEFAULT_NOISE
     )
     found, chosen = [], [default] + [together] * (together.words != default.words)
     for i, tried in enumerate(chosen):

@@ -1,0 +1,246 @@
+"""The introduction of aranovskiy2020: two scissored pairs at right angles, and whether each axis can be taken alone."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from cmg_mj.law import Law, lqr_gains
+from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
+from cmg_mj.papers.aranovskiy2020.rig import DT
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.reduced import ReducedModel
+from cmg_mj.resources import find
+
+AXES = ("pitch", "roll")
+"""The tilt axes y and x of the body; the cubes' gimbals lie across them."""
+HEIGHT_M = 0.134
+"""Of the cubes' centres above the joint, l/sqrt(2) as on the rig [m]."""
+MASS_KG = 4.0 * TABLE_1["m"]
+SPEED = TABLE_1["omega_d"]
+DURATION_S, PUSH_S = 3.0, 0.1
+PUSHES_N_M = (1.0, 2.0, 3.0)
+"""On either axis, of a body of four cubes [N m]; the rig of two has 1."""
+SMALL = 0.05
+"""What the other axis changes by less than this of the largest tilt leaves the two separate."""
+WEIGHTS = (426.0, 1.7, 0.01, 0.08)
+"""Of the law of either axis: a diagonal Q that gives Table 2's gains on the rig, to the digits printed."""
+
+
+@cache
+def two_pairs() -> mujoco.MjModel:
+    """Four cubes on one body that tilts about two axes; it does not turn about the vertical, as if both feet stood."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep, spec.option.integrator = 0.001, mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    torso = spec.worldbody.add_body(name="torso")
+    for name, axis in zip(AXES, ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)), strict=True):
+        torso.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
+    place = 0.095
+    for i, (x, y) in enumerate(((place, place), (-place, -place), (place, -place), (-place, place))):
+        turn = 0.0 if i < 2 else math.pi / 2.0
+        frame = torso.add_frame(pos=[x, y, HEIGHT_M], quat=[math.cos(turn / 2.0), 0.0, 0.0, math.sin(turn / 2.0)])
+        cube = mujoco.MjSpec.from_file(str(_cube()))
+        frame.attach_body(cube.body("half"), f"c{i}/", "")
+    return spec.compile()
+
+
+def _cube() -> Path:
+    return find("models", "scissored_pair", ".xml", "plant.model =").parent / "cube.xml"
+
+
+class Addresses(NamedTuple):
+    """Where an axis' things are."""
+
+    tilt: int
+    gimbals: list[int]
+    servos: list[int]
+    signs: list[float]
+    """By which a command is multiplied, so that both cubes of the pair push the same way."""
+
+
+def addresses(model: mujoco.MjModel, axis: int) -> Addresses:
+    """Of pitch, driven by the first two cubes, or of roll, by the others."""
+    cubes = (2 * axis, 2 * axis + 1)
+    tilt = int(model.joint(AXES[axis]).qposadr[0])
+    gimbals = [int(model.joint(f"c{i}/gimbal").qposadr[0]) for i in cubes]
+    servos = [int(model.actuator(f"c{i}/gimbal_servo").id) for i in cubes]
+    data = at_rest(model)
+    for gimbal in gimbals:
+        data.qpos[gimbal] -= math.pi / 2.0  # the wheel's momentum lies along the tilt axis: u > 0 turns it away
+    M = _mass_matrix(model, data)
+    wheels = [int(model.joint(f"c{i}/flywheel").dofadr[0]) for i in cubes]
+    return Addresses(tilt, gimbals, servos, [math.copysign(1.0, M[tilt, wheel] * data.qvel[wheel]) for wheel in wheels])
+
+
+def _mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    mujoco.mj_forward(model, data)
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    return M
+
+
+def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
+    """Upright, spin axes upright, the wheels of a pair turning against each other."""
+    data = mujoco.MjData(model)
+    for i in range(4):
+        gimbal = int(model.joint(f"c{i}/gimbal").qposadr[0])
+        wheel = int(model.joint(f"c{i}/flywheel").dofadr[0])
+        speed = SPEED if i % 2 == 0 else -SPEED
+        data.qpos[gimbal] = math.pi / 2.0
+        data.act[model.actuator_actadr[model.actuator(f"c{i}/gimbal_servo").id]] = math.pi / 2.0
+        data.qvel[wheel] = speed
+        data.ctrl[model.actuator(f"c{i}/flywheel_motor").id] = speed
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def reduced(model: mujoco.MjModel, axis: int) -> ReducedModel:
+    """One axis' reduced model, by a gimbal's share of its pair, read off the mass matrix; J2 is small beside J1."""
+    data, tilt = at_rest(model), addresses(model, axis).tilt
+    J1 = float(_mass_matrix(model, data)[tilt, tilt]) / 2.0
+    data.qvel[:] = 0.0
+    data.qpos[tilt] = math.pi / 2.0
+    mujoco.mj_forward(model, data)
+    return ReducedModel(J1, 0.0, TABLE_1["J_d"], SPEED, abs(float(data.qfrc_bias[tilt])) / 2.0, 2)
+
+
+class Ran(NamedTuple):
+    """What the body did."""
+
+    tilts: np.ndarray
+    """Pitch and roll tick by tick, (n_ticks, 2) [rad]."""
+    vertical: np.ndarray
+    """The torque about the vertical that held it from turning, (n_ticks - 1,) [N m]."""
+
+
+def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Ran:
+    """The motion under a push on each axis at 0.2 s, each axis with a law of its own that knows its own state alone.
+
+    Args:
+        pushes_n_m: On pitch and roll [N m].
+        duration_s: How long [s].
+
+    Returns:
+        What the body did.
+    """
+    model = two_pairs()
+    data = at_rest(model)
+    axes = [addresses(model, axis) for axis in range(2)]
+    laws = [Law(DT, lqr_gains(reduced(model, axis), WEIGHTS, 1.0)) for axis in range(2)]  # type: ignore[arg-type]
+    integrators, steps = [0.0, 0.0], round(DT / model.opt.timestep)
+    tilts, momenta = [], []
+    torso = int(model.body("torso").id)
+    for tick in range(round(duration_s / DT)):
+        pushing = 0.2 <= tick * DT < 0.2 + PUSH_S - 1e-9
+        for axis, (at, law) in enumerate(zip(axes, laws, strict=True)):
+            pairs = zip(at.signs, at.gimbals, strict=True)
+            x3 = sum(sign * float(data.qpos[gimbal] - math.pi / 2.0) for sign, gimbal in pairs) / 2.0
+            state = float(data.qpos[at.tilt]), float(data.qvel[at.tilt]), x3, integrators[axis]
+            u, integrators[axis] = law(*state)
+            for sign, servo in zip(at.signs, at.servos, strict=True):
+                data.ctrl[servo] = sign * u
+            data.qfrc_applied[at.tilt] = pushes_n_m[axis] if pushing else 0.0
+        tilts.append([float(data.qpos[at.tilt]) for at in axes])
+        mujoco.mj_subtreeVel(model, data)
+        momenta.append(float(_about_the_joint(data, torso)))
+        mujoco.mj_step(model, data, steps)
+    return Ran(np.array(tilts), np.diff(momenta) / DT)
+
+
+def _about_the_joint(data: mujoco.MjData, body: int) -> float:
+    """Vertical part of the momentum of all that hangs on a body, about the world's origin [N m s]."""
+    arm, moving = data.subtree_com[body], data.subtree_linvel[body] * MASS_KG
+    return data.subtree_angmom[body][2] + arm[0] * moving[1] - arm[1] * moving[0]
+
+
+class Coupling(NamedTuple):
+    """One push on both axes at once beside the same on either alone."""
+
+    both: np.ndarray
+    """Tilts, (n_ticks, 2) [rad]."""
+    alone: np.ndarray
+    """Each axis' tilt while the other is not pushed, (n_ticks, 2) [rad]."""
+    vertical_n_m: float
+    """Largest torque about the vertical, with both pushed."""
+
+    @property
+    def largest_deg(self) -> float:
+        """Largest tilt of an axis alone."""
+        return float(np.degrees(np.abs(self.alone).max()))
+
+    @property
+    def share(self) -> float:
+        """Largest change by the other axis, by the largest tilt."""
+        return float(np.abs(self.both - self.alone).max() / np.abs(self.alone).max())
+
+
+def coupling(push_n_m: float) -> Coupling:
+    """Push both, then either."""
+    both = run((push_n_m, push_n_m))
+    pitch, roll = run((push_n_m, 0.0)).tilts, run((0.0, push_n_m)).tilts
+    return Coupling(both.tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(both.vertical).max()))
+
+
+def axes_claim(found: dict[float, Coupling]) -> Claim:
+    """Each axis alone."""
+    small = [push for push, c in found.items() if c.share < SMALL]
+    first = next(iter(found))
+    listed = ", ".join(f"{push:g} N m: {c.largest_deg:.1f} deg, {c.share:.2%}" for push, c in found.items())
+    return Claim(
+        place="Section I, one axis at a time",
+        says="With two scissored pairs at right angles each tilt axis of the robot can be stabilised by itself.",
+        found=(
+            "Four cubes on a body that tilts about two axes, each with a law of its own that knows only its own state. "
+            "A push on both axes at once beside the same push on either alone: largest tilt, and how much of it the "
+            f"other axis changes. {listed}. The torque about the vertical is "
+            f"{', '.join(f'{c.vertical_n_m:.2f}' for c in found.values())} N m at most."
+        ),
+        holds=first in small,
+        conditions=(
+            f"Up to pushes of {max(small, default=0.0):g} N m for {PUSH_S:g} s, under which the other axis changes "
+            f"less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. What a pair "
+            "holds along its own axis makes a torque about the vertical as soon as the other axis moves; the ground "
+            "must bear it."
+        ),
+        otherwise="The axes are felt in each other.",
+        figures={
+            "push_n_m": list(found),
+            "largest_tilt_deg": [c.largest_deg for c in found.values()],
+            "vertical_torque_n_m": [c.vertical_n_m for c in found.values()],
+            "changed_by_the_other_axis_share": [c.share for c in found.values()],
+        },
+        pictures=[_picture(found)],
+    )
+
+
+def _picture(found: dict[float, Coupling]) -> Picture:
+    panels = []
+    push = max(found)
+    for axis, name in enumerate(AXES):
+        time = np.arange(len(found[push].both)) * DT
+        lines = [
+            Line(time, np.degrees(found[push].alone[:, axis]), "pushed alone", color=0),
+            Line(time, np.degrees(found[push].both[:, axis]), "both pushed", "--", color=1),
+        ]
+        panels.append(Panel(f"{name} [deg]", lines, shaded=[(0.2, 0.2 + PUSH_S)]))
+    return Picture(
+        "aranovskiy2020-two-axes",
+        f"aranovskiy2020, Section I: two pairs at right angles, {push:g} N m on an axis",
+        panels,
+    )
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """The two axes."""
+    found = {}
+    for i, push in enumerate(PUSHES_N_M):
+        found[push] = coupling(push)
+        on_share((i + 1) / len(PUSHES_N_M))
+    return [axes_claim(found)]
