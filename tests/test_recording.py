@@ -19,12 +19,10 @@ from cmg_mj import recording
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.metrics import MetricsSettings
-from cmg_mj.observers import OBSERVERS
 from cmg_mj.push import Push
 from cmg_mj.recording import Run, write_recording
 from cmg_mj.recording.run import phases, torque_steps
 from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, POSE_RATE_HZ, shapes
-from cmg_mj.recording.signals import OBSERVER_COLORS
 from cmg_mj.recording.summary import FEWER
 from cmg_mj.recording.timeline import column as time_column
 from cmg_mj.recording.timeline import instant
@@ -200,11 +198,6 @@ def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
     assert len(RrdReader(path).blueprints()) == 1
     timelines = {name for chunk in RrdReader(path).stream() for name in chunk.timeline_names}
     assert timelines == {"sim_time"}
-
-
-def test_every_bundled_observer_has_a_colour_of_its_own() -> None:
-    assert OBSERVER_COLORS.keys() == OBSERVERS.keys()
-    assert len(set(OBSERVER_COLORS.values())) == len(OBSERVERS)
 
 
 # --- the mechanism -------------------------------------------------------------------------------------------

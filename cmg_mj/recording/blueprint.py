@@ -9,10 +9,11 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from cmg_mj.colours import colours
 from cmg_mj.plant import Plant
 from cmg_mj.recording.run import ENDINGS
 from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, extent
-from cmg_mj.recording.signals import Branch, colors_of
+from cmg_mj.recording.signals import Branch
 from cmg_mj.recording.timeline import TIMELINE
 
 
@@ -173,7 +174,7 @@ def _plot(plot: Plot, branch: Branch) -> rrb.View:
 
 def _overlay(plot: Plot, branches: Sequence[Branch], cube: str) -> rrb.View:
     """The same series of all runs, each in its run's colour."""
-    colors = colors_of(branch.run.name for branch in branches)
+    colors = colours(branch.run.name for branch in branches)
     lines: dict[str, rr.SeriesLines] = {}
     shown, standing = [], []
     for branch in branches:

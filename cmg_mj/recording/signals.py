@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
 
+from cmg_mj.colours import YARDSTICKS, Colour, colours
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
@@ -15,32 +16,11 @@ from cmg_mj.push import Push
 from cmg_mj.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
 from cmg_mj.recording.timeline import TIMELINE, column, instant
 
-Color = tuple[int, int, int]
+LIMIT: Colour = (120, 120, 120)
+CONTROLLER: Colour = (204, 121, 167)
+CUBES: tuple[Colour, ...] = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (204, 121, 167))
 
-TRUTH: Color = (165, 165, 165)
-SENSOR: Color = (95, 130, 190)
-LIMIT: Color = (120, 120, 120)
-CONTROLLER: Color = (204, 121, 167)
-CUBES: tuple[Color, ...] = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (204, 121, 167))
-
-OBSERVER_COLORS: dict[str, Color] = {
-    "homogeneous": (230, 97, 0),
-    "ltv": (86, 180, 233),
-    "linear": (0, 170, 120),
-    "luenberger": (214, 120, 180),
-    "finite_difference": (165, 110, 80),
-    "super_twisting": (150, 115, 215),
-    "linear_high_gain": (130, 185, 60),
-    "adaptive": (220, 60, 80),
-    "high_gain": (0, 190, 200),
-    "homogeneous_adaptive": (240, 228, 66),
-}
-"""An observer has the same colour in every recording. Mostly Okabe and Ito's, which the colour-blind can tell apart."""
-
-OTHERS: tuple[Color, ...] = ((240, 160, 130), (170, 170, 255), (255, 120, 200), (120, 220, 160))
-"""Colours of observers that are not bundled, in order of appearance."""
-
-PHASES: dict[str, Color] = {
+PHASES: dict[str, Colour] = {
     BALANCING: (0, 114, 178),
     PUSH: (213, 94, 0),
     RECOVERING: (200, 140, 0),
@@ -69,7 +49,7 @@ class Series:
     name: str
     time: np.ndarray
     values: np.ndarray
-    color: Color
+    color: Colour
     width: float = 1.5
 
 
@@ -88,13 +68,6 @@ class Branch:
     series: dict[str, Series]
 
 
-def colors_of(names: Iterable[str]) -> dict[str, Color]:
-    """The colour of each observer."""
-    names = list(dict.fromkeys(names))
-    strangers = [name for name in names if name not in OBSERVER_COLORS]
-    return {name: OBSERVER_COLORS.get(name) or OTHERS[strangers.index(name) % len(OTHERS)] for name in names}
-
-
 def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> list[Series]:
     """All time series of one run.
 
@@ -110,13 +83,13 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
     t = run.trajectory
     time = t["time_s"]
     rows = [
-        Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), SENSOR, 1.0),
-        Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), TRUTH, 2.5),
+        Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), YARDSTICKS["gyro"], 1.0),
+        Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), YARDSTICKS["true"], 2.5),
         _bounds("tilt/settle_band", "settle band", time, settings.settle_band_deg),
-        Series("rate/true", "true", time, t["x2_rad_s"], TRUTH, 3.0),
-        Series("rate/gyro", "gyro", time, t["fog_rad_s"], SENSOR, 1.0),
+        Series("rate/true", "true", time, t["x2_rad_s"], YARDSTICKS["true"], 3.0),
+        Series("rate/gyro", "gyro", time, t["fog_rad_s"], YARDSTICKS["gyro"], 1.0),
     ]
-    for name, color in colors_of(t.observers).items():
+    for name, color in colours(t.observers).items():
         part = rr.escape_entity_path_part(name)
         width = 1.5 if name == t.observers[0] else 1.0
         estimate = t[f"estimate/{name}/x2_rad_s"]
@@ -130,7 +103,7 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
             rows.append(Series(f"bias/{part}", name, time, bias, color, width))
             if (true := summary.get("bias_deg")) is not None:
                 ends = time[[0, -1]] if len(time) > 1 else time
-                rows.append(Series("bias/true", "true", ends, np.full(len(ends), true), TRUTH, 2.5))
+                rows.append(Series("bias/true", "true", ends, np.full(len(ends), true), YARDSTICKS["true"], 2.5))
     rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
     if rate_limit is not None:
         rows.append(_bounds("command/limit", "rate limit", time, rate_limit))
