@@ -22,8 +22,9 @@ from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
 from cmg_mj.recording import Run, write_recording
 from cmg_mj.recording.run import phases, torque_steps
-from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, POSE_RATE_HZ, shapes
-from cmg_mj.recording.summary import FEWER
+from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, POSE_RATE_HZ
+from cmg_mj.recording.shapes import shapes
+from cmg_mj.recording.summary import ROW_TABLES
 from cmg_mj.recording.timeline import column as time_column
 from cmg_mj.recording.timeline import instant
 from cmg_mj.scenario import Scenario, load_scenario
@@ -114,7 +115,7 @@ def rerun(home: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str
 def test_everything_promised_is_there(path: Path, experiment: Experiment) -> None:
     below = {
         *("phase", "tilt/true", "tilt/measured", "tilt/settle_band", "rate/true", "rate/gyro"),
-        *(f"{kind}/{name}" for kind in ("rate_estimate", "rate_error") for name in ("homogeneous", "linear")),
+        *(f"{kind}/{name}" for kind in ("rate_estimate", "rate_error") for name in ("1_homogeneous", "2_linear")),
         *("command/u", "command/limit", "integrator/x_e", "rig/frame/push"),
         *(f"{kind}/{cube}" for kind in ("gimbal", "flywheel") for cube in ("cube1", "cube2")),
         *(f"rig/{body}" for body in ("thrust_bearing", "frame", "cube1.gimbal", "cube2.flywheel")),
@@ -136,9 +137,9 @@ def test_values_equal_the_trajectory(path: Path, run: Run, experiment: Experimen
         "tilt/measured": np.degrees(t["y1_rad"]),
         "rate/true": t["x2_rad_s"],
         "rate/gyro": t["fog_rad_s"],
-        "rate_estimate/homogeneous": t["estimate/homogeneous/x2_rad_s"],
-        "rate_estimate/linear": t["estimate/linear/x2_rad_s"],
-        "rate_error/linear": t["estimate/linear/x2_rad_s"] - t["x2_rad_s"],
+        "rate_estimate/1_homogeneous": t["estimate/homogeneous/x2_rad_s"],
+        "rate_estimate/2_linear": t["estimate/linear/x2_rad_s"],
+        "rate_error/2_linear": t["estimate/linear/x2_rad_s"] - t["x2_rad_s"],
         "command/u": t["u_rad_s"],
         "integrator/x_e": t["x_e_rad_times_s"],
         "gimbal/cube1": np.degrees(t["angle/cube1/gimbal_rad"]) - 90.0,
@@ -159,11 +160,11 @@ def test_an_observer_keeps_its_colour(path: Path) -> None:
     colors = {
         (kind, name): tuple(static(path, f"/homogeneous/{kind}/{name}", "SeriesLines:colors"))
         for kind in ("rate_estimate", "rate_error")
-        for name in ("homogeneous", "linear")
+        for name in ("1_homogeneous", "2_linear")
     }
-    assert colors["rate_estimate", "linear"] == colors["rate_error", "linear"]
+    assert colors["rate_estimate", "2_linear"] == colors["rate_error", "2_linear"]
     assert len(set(colors.values())) == 2
-    assert static(path, "/homogeneous/rate_estimate/linear", "SeriesLines:names") == ["linear"]
+    assert static(path, "/homogeneous/rate_estimate/2_linear", "SeriesLines:names") == ["linear"]
 
 
 def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
@@ -171,9 +172,11 @@ def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
     of = prepare(scenario("observer.kind=adaptive", "companions=['homogeneous_adaptive']", "metrics.bias_from_s=0.1"))
     ran = recorded(of)
     where = write(tmp_path / "bias.rrd", of, [ran])
-    assert {"/adaptive/bias/adaptive", "/adaptive/bias/homogeneous_adaptive", "/adaptive/bias/true"} <= entities(where)
-    for name in ("adaptive", "homogeneous_adaptive"):
-        _, shown = scalars(where, f"/adaptive/bias/{name}")
+    assert {"/adaptive/bias/1_adaptive", "/adaptive/bias/2_homogeneous_adaptive", "/adaptive/bias/true"} <= entities(
+        where
+    )
+    for i, name in enumerate(("adaptive", "homogeneous_adaptive"), 1):
+        _, shown = scalars(where, f"/adaptive/bias/{i}_{name}")
         np.testing.assert_allclose(shown, np.degrees(ran.trajectory[f"estimate/{name}/bias_rad"]), rtol=1e-12)
     _, true = scalars(where, "/adaptive/bias/true")
     np.testing.assert_allclose(true, of.scenario.plant.equilibrium_bias_deg, rtol=1e-12)
@@ -183,7 +186,7 @@ def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
 
 def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
     (summary,) = static(path, "/summary", "TextDocument:text")
-    assert set(FEWER) <= run.summary.keys()
+    assert {key for keys in ROW_TABLES for key in keys} <= run.summary.keys()
     assert heading("bias_estimate_deg") not in summary
     shown = [key for key in KEYS if heading(key) in summary]
     assert shown == [key for key in KEYS if key in run.summary]
@@ -192,7 +195,9 @@ def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
     rows = [[cell.strip() for cell in line.split("|")] for line in summary.splitlines()]
     assert ["", heading("tilt_rms_deg"), written("tilt_rms_deg", run.summary["tilt_rms_deg"]), ""] in rows
     assert ["", "Outcome", "done at 0.5 s", ""] in rows
-    assert "linear" in {row[1] for row in rows if len(row) > 2}
+    (observers,) = static(path, "/observers", "TextDocument:text")
+    riding = [[cell.strip() for cell in line.split("|")][1] for line in observers.splitlines() if "|" in line]
+    assert riding[2:] == ["**homogeneous**", "**linear**"]
     assert 'kind = "made up"' in static(path, "/scenario", "TextDocument:text")[0]
     assert static(path, "/__properties", "RecordingInfo:name") == ["A title: homogeneous"]
     assert len(RrdReader(path).blueprints()) == 1
@@ -294,7 +299,7 @@ SHAPES = """
 
 def test_other_robots_shapes() -> None:
     model = mujoco.MjModel.from_xml_string(SHAPES)
-    drawn = {name: shape for _, name, shape in shapes(model)}
+    drawn = {name: shape for _, name, shape in shapes(model, 0.25)}
     assert drawn.keys() == {"ball", "egg", "sheet", "wedge", "geom4"}
     assert isinstance(drawn["ball"], rr.Ellipsoids3D)
     assert drawn["egg"].half_sizes.as_arrow_array().to_pylist() == [pytest.approx([0.1, 0.2, 0.3])]
@@ -421,16 +426,16 @@ def test_two_observers_have_a_branch_each(tmp_path: Path) -> None:
     experiments = [prepare(scenario().with_observer(kind)) for kind in ("homogeneous", "ltv")]
     runs = [recorded(experiment) for experiment in experiments]
     path = write(tmp_path / "compare.rrd", experiments[0], runs)
-    for run in runs:
+    for i, run in enumerate(runs, 1):
         for signal, entity in (
             ("x2_rad_s", "rate/true"),
-            (f"estimate/{run.name}/x2_rad_s", f"rate_estimate/{run.name}"),
+            (f"estimate/{run.name}/x2_rad_s", f"rate_estimate/1_{run.name}"),
         ):
-            _, read = scalars(path, f"/{run.name}/{entity}")
+            _, read = scalars(path, f"/{i}_{run.name}/{entity}")
             assert np.array_equal(read, run.trajectory[signal])
     branches = [
-        {name.removeprefix(f"/{run.name}") for name in entities(path) if name.startswith(f"/{run.name}/")}
-        for run in runs
+        {name.removeprefix(f"/{i}_{run.name}") for name in entities(path) if name.startswith(f"/{i}_{run.name}/")}
+        for i, run in enumerate(runs, 1)
     ]
     assert {name for name in branches[0] if "/rig/" in name} == {name for name in branches[1] if "/rig/" in name}
     (summary,) = static(path, "/summary", "TextDocument:text")
@@ -466,7 +471,7 @@ def test_a_companion_that_diverged(run: Run, experiment: Experiment, tmp_path: P
     columns["estimate/linear/x2_rad_s"] = columns["x2_rad_s"].copy()
     columns["estimate/linear/x2_rad_s"][50:] = [*[1e300, -np.inf], *[np.nan] * (len(run.trajectory) - 52)]
     path = write(tmp_path / "nan.rrd", experiment, [replace(run, trajectory=replace(run.trajectory, columns=columns))])
-    _, read = scalars(path, "/homogeneous/rate_estimate/linear")
+    _, read = scalars(path, "/homogeneous/rate_estimate/2_linear")
     assert np.array_equal(read, columns["estimate/linear/x2_rad_s"], equal_nan=True)
 
 
@@ -477,9 +482,9 @@ def test_a_users_observer_may_have_any_name(run: Run, experiment: Experiment, tm
     named = replace(run, name=name, trajectory=replace(run.trajectory, columns=columns, layout=layout))
     path = write(tmp_path / "named.rrd", experiment, [named])
     part = rr.escape_entity_path_part(name)
-    assert {f"/{part}/rig/frame", f"/{part}/rate_estimate/{part}"} <= entities(path)
-    color = static(path, f"/{part}/rate_estimate/{part}", "SeriesLines:colors")
-    assert color != static(path, f"/{part}/rate_estimate/homogeneous", "SeriesLines:colors")
+    assert {f"/{part}/rig/frame", f"/{part}/rate_estimate/2_{part}"} <= entities(path)
+    color = static(path, f"/{part}/rate_estimate/2_{part}", "SeriesLines:colors")
+    assert color != static(path, f"/{part}/rate_estimate/1_homogeneous", "SeriesLines:colors")
 
 
 @pytest.mark.parametrize("name", ["my_lab.observers:Kalman", "a/b (c) é", "x" * 300])

@@ -17,10 +17,11 @@ from cmg_mj.metrics import MetricsSettings
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.recording.blueprint import default_blueprint
+from cmg_mj.recording.framing import ball
 from cmg_mj.recording.run import Run
-from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, log_rig
-from cmg_mj.recording.signals import Branch, log_phases, log_series, series
-from cmg_mj.recording.summary import page, scenario_page
+from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, log_rig, pose_samples
+from cmg_mj.recording.signals import Branch, log_phases, log_series, numbered, series
+from cmg_mj.recording.summary import observers_page, page, scenario_page
 from cmg_mj.trajectory import whole_file
 
 __all__ = ["Run", "write_recording"]
@@ -61,9 +62,11 @@ def write_recording(
     if not names or len(set(names)) < len(names):
         raise ValueError(f"a recording needs runs of different names, not {names}")
     settings = settings or MetricsSettings()
-    branches = [_branch(run, plant, settings, rate_limit_rad_s) for run in runs]
+    branches = [
+        _branch(part, run, plant, settings, rate_limit_rad_s) for part, run in zip(numbered(names), runs, strict=True)
+    ]
     notes = f"In the 3-D view the flywheels turn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed."
-    with _strict(), rr.RecordingStream(_application(names)) as rec:
+    with _strict(), rr.RecordingStream(_application(branches)) as rec:
         if not rr.is_enabled(rec):
             raise InputError("the environment variable RERUN turns recording off: unset it")
         # Rerun's own writing to a file hides a full disk, or waits for ever.
@@ -75,30 +78,33 @@ def write_recording(
         _log_properties(rec, runs, title)
         end = max(run.outcome.time_s for run in runs)
         for branch in branches:
-            log_rig(rec, branch.path, plant, branch.run, pushes)
+            log_rig(rec, branch.path, plant, branch.run, pushes, branch.rig)
             log_series(rec, branch)
             log_phases(rec, branch, pushes, settings, end)
         _log_page(rec, "summary", page(title, runs, pushes, settings, notes))
+        if observers := observers_page(runs):
+            _log_page(rec, "observers", observers)
         _log_page(rec, "scenario", scenario_page(scenario_toml))
         content = memory.drain_as_bytes()
     with whole_file(path) as temporary:
         temporary.write_bytes(content)
 
 
-def _branch(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> Branch:
+def _branch(part: str, run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> Branch:
     rows = {row.path: row for row in series(run, plant, settings, rate_limit)}
-    return Branch(f"/{rr.escape_entity_path_part(run.name)}", run, rows)
+    return Branch(f"/{part}", run, rows, ball(plant, pose_samples(plant, run)[1]))
 
 
-def _application(names: Sequence[str]) -> str:
-    """The viewer remembers a layout by application: recordings with other branches must not share it.
+def _application(branches: Sequence[Branch]) -> str:
+    """The viewer remembers a layout by application: recordings with other branches or lines must not share it.
 
     It may have about 180 characters, of which few are punctuation.
     """
-    listed = " ".join(names)
+    listed = " ".join(branch.run.name for branch in branches)
     if len(listed) > LONGEST_LIST:
-        listed = f"{len(names)} runs {zlib.crc32(listed.encode()):08x}"
-    return re.sub(r"[^\w -]", "-", f"cmg-mj {listed}", flags=re.ASCII)
+        listed = f"{len(branches)} runs"
+    lines = " ".join(f"{branch.path}/{path}" for branch in branches for path in branch.series)
+    return re.sub(r"[^\w -]", "-", f"cmg-mj {listed} {zlib.crc32(lines.encode()):08x}", flags=re.ASCII)
 
 
 def _log_page(rec: rr.RecordingStream, path: str, page: str) -> None:

@@ -1,73 +1,47 @@
-"""How a recording opens: which views, where, and what they look at."""
+"""How a recording opens: which views are where, and which observers are switched on."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
-import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 
-from cmg_mj.colours import colours
+from cmg_mj.legible import FEW
 from cmg_mj.plant import Plant
-from cmg_mj.recording.run import ENDINGS
-from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, extent
+from cmg_mj.recording.run import best_observers, best_runs
+from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN
 from cmg_mj.recording.signals import Branch
 from cmg_mj.recording.timeline import TIMELINE
-
-
-@dataclass(frozen=True)
-class Plot:
-    """One plot.
-
-    Attributes:
-        title: What it shows and in which unit.
-        entities: Paths below the run's branch, folders with their slash.
-        height: Share of its column.
-        corner: Where the legend hides least.
-        needs_legend: Whether it has a legend even if that is long, because it explains the colours of all plots.
-    """
-
-    title: str
-    entities: tuple[str, ...]
-    height: float
-    corner: rrb.Corner2D = rrb.Corner2D.RightTop
-    needs_legend: bool = False
-
+from cmg_mj.recording.views import Choice, Plot, overlay, pages, phases, plot, rig
 
 _LOW = rrb.Corner2D.RightBottom
-TILT_PLOTS = (
-    Plot("Tilt [deg]", ("tilt/",), 2.0),
-    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 3.0, needs_legend=True),
+ESTIMATE_PLOTS = (
+    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 3.0),
     Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), 2.0, _LOW),
 )
+TILT_PLOTS = (Plot("Tilt [deg]", ("tilt/",), 2.0), *ESTIMATE_PLOTS)
 BIAS_PLOT = Plot("Estimated equilibrium bias [deg]", ("bias/",), 1.5, _LOW)
 """Only where an observer estimates it."""
 ACTUATOR_PLOTS = (
     Plot("Command, gimbal rate [rad/s]", ("command/",), 3.0),
     Plot("Gimbal angles from upright [deg]", ("gimbal/",), 2.4, _LOW),
-    Plot("Flywheel speeds [rad/s]", ("flywheel/",), 1.8),
+    Plot("Flywheel speeds [rad/s]", ("flywheel/",), 1.8, least=3.0),
     Plot("Integrator [rad s]", ("integrator/",), 1.8, _LOW),
 )
 COMPARED_TILT_PLOTS = (
-    Plot("Tilt, true [deg]", ("tilt/true",), 1.0, needs_legend=True),
-    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/{observer}",), 1.0, _LOW),
+    Plot("Tilt, true [deg]", ("tilt/true",)),
+    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), corner=_LOW),
 )
 COMPARED_ACTUATOR_PLOTS = (
-    Plot("Command, gimbal rate [rad/s]", ("command/u",), 1.0),
-    Plot("Gimbal angle of {cube} from upright [deg]", ("gimbal/{cube}",), 1.0, _LOW),
-    Plot("Integrator [rad s]", ("integrator/x_e",), 1.0, _LOW),
+    Plot("Command, gimbal rate [rad/s]", ("command/u",)),
+    Plot("Gimbal angle of {cube} from upright [deg]", ("gimbal/{cube}",), corner=_LOW),
+    Plot("Integrator [rad s]", ("integrator/x_e",), corner=_LOW),
 )
 
-EYE = (1.3, -1.45, 0.55)
-"""From the rig's centre to the camera, in radii of the rig."""
+LANE, COLUMN = 40.0, 820.0
+"""Height of a lane of phases and of a column of plots [pixels]."""
 
-BACKGROUND = (58, 63, 71)
-LANE, COLUMN, MOST_LANES = 40.0, 820.0, 8
-"""Height of a lane of phases and of a column of plots [pixels], and how many lanes are seen without scrolling."""
-MOST_LEGENDS = 4
-"""More lines than this are explained once, not in every plot."""
+ALL = "All observers"
 
 
 def default_blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint:
@@ -78,15 +52,16 @@ def default_blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint
         branches: The runs.
 
     Returns:
-        A dashboard for one run; for several, one that compares them, and a tab for each.
+        A dashboard for one run; for several, one that compares them, and a tab for each. Of more than a few observers
+        the best are switched on, and another tab has all of them.
     """
-    if len(branches) == 1:
-        root = _dashboard(plant, branches[0])
-    else:
-        boards = [_dashboard(plant, branch) for branch in branches]
-        root = rrb.Tabs(_comparison(plant, branches), *boards, active_tab=0)
+    boards = [_dashboard(branch) for branch in branches]
+    if len(branches) > 1:
+        boards = [*_comparison(plant, branches), *boards]
+    elif len(branches[0].run.observers) > FEW:
+        boards.append(_all_riding_along(branches[0]))
     return rrb.Blueprint(
-        root,
+        rrb.Tabs(*boards, active_tab=0) if len(boards) > 1 else boards[0],
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing"),
@@ -95,134 +70,84 @@ def default_blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint
     )
 
 
-def _dashboard(plant: Plant, branch: Branch) -> rrb.Container:
+def _dashboard(branch: Branch) -> rrb.Container:
     """Everything about one run."""
-    has_bias = any(path.startswith("bias/") for path in branch.series)
-    tilt = (*TILT_PLOTS, BIAS_PLOT) if has_bias else TILT_PLOTS
-    rig = _rig(plant, branch, f"Rig (flywheels drawn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed)")
-    return _three_columns(
+    tilt = (*TILT_PLOTS, BIAS_PLOT) if _has_bias(branch) else TILT_PLOTS
+    mechanism = rig(branch, f"Rig (flywheels drawn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed)")
+    few = best_observers(branch.run)
+    names = _page_names([branch])
+    return _columns(
         branch.run.name,
-        rrb.Vertical(rig, _pages(), row_shares=[3, 2]),
-        _column(_phases([branch]), 1, [_plot(plot, branch) for plot in tilt], tilt),
-        _column(None, 0, [_plot(plot, branch) for plot in ACTUATOR_PLOTS], ACTUATOR_PLOTS),
+        [9, 8, 6],
+        rrb.Vertical(mechanism, pages(names, names[-2]), row_shares=[5, 4]),
+        _below_lanes([branch], tilt, [plot(what, branch, Choice(few)) for what in tilt]),
+        _stack(ACTUATOR_PLOTS, [plot(what, branch, Choice(few)) for what in ACTUATOR_PLOTS]),
     )
 
 
-def _comparison(plant: Plant, branches: Sequence[Branch]) -> rrb.Container:
-    """All runs over each other."""
-    rigs = rrb.Tabs(*(_rig(plant, branch, branch.run.name) for branch in branches), active_tab=0)
+def _all_riding_along(branch: Branch) -> rrb.Container:
+    """What every observer of a run says, each to be switched on in the legend."""
+    observers = Choice(best_observers(branch.run), listed=True)
+    rates = [plot(what, branch, observers) for what in ESTIMATE_PLOTS]
+    bias = [plot(BIAS_PLOT, branch, observers)] if _has_bias(branch) else []
+    return _columns(ALL, [3, 2], rrb.Vertical(*rates), rrb.Vertical(*bias, pages(_page_names([branch]), "Observers")))
+
+
+def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]:
+    """The best runs over each other, then, if there are more, all of them."""
+    few = best_runs([branch.run for branch in branches])
     cube = plant.cubes[0].name
-    tilt = [_overlay(plot, branches, cube) for plot in COMPARED_TILT_PLOTS]
-    actuators = [_overlay(plot, branches, cube) for plot in COMPARED_ACTUATOR_PLOTS]
-    return _three_columns(
+    shown = [branch for branch in branches if branch.run.name in few]
+    tilt = [overlay(what, branches, cube, Choice(few)) for what in COMPARED_TILT_PLOTS]
+    actuators = [overlay(what, branches, cube, Choice(few)) for what in COMPARED_ACTUATOR_PLOTS]
+    rigs = rrb.Tabs(*(rig(branch, branch.run.name) for branch in shown), active_tab=0)
+    names = _page_names(branches)
+    board = _columns(
         "Comparison",
-        rrb.Vertical(rigs, _pages(), row_shares=[3, 2]),
-        _column(_phases(branches), len(branches), tilt, COMPARED_TILT_PLOTS),
-        _column(None, 0, actuators, COMPARED_ACTUATOR_PLOTS),
+        [9, 8, 6],
+        rrb.Vertical(rigs, pages(names, "Summary"), row_shares=[1, 1]),
+        _below_lanes(shown, COMPARED_TILT_PLOTS, tilt),
+        _stack(COMPARED_ACTUATOR_PLOTS, actuators),
     )
+    if len(shown) == len(branches):
+        return [board]
+    any_of_them = Choice(few, listed=True)
+    lanes = _lanes_height(branches)
+    more = _columns(
+        ALL,
+        [9, 8, 6],
+        rrb.Vertical(phases(branches), pages(names, "Summary"), row_shares=[lanes, COLUMN - lanes]),
+        rrb.Vertical(*(overlay(what, branches, cube, any_of_them) for what in COMPARED_TILT_PLOTS)),
+        rrb.Vertical(*(overlay(what, branches, cube, any_of_them) for what in COMPARED_ACTUATOR_PLOTS[:2])),
+    )
+    return [board, more]
 
 
-def _three_columns(name: str, *columns: rrb.Container | rrb.View) -> rrb.Container:
-    return rrb.Horizontal(*columns, column_shares=[4, 4, 3], name=name)
+def _has_bias(branch: Branch) -> bool:
+    return any(path.startswith("bias/") for path in branch.series)
 
 
-def _column(phases: rrb.View | None, lanes: int, views: Sequence[rrb.View], plots: Sequence[Plot]) -> rrb.Container:
+def _page_names(branches: Sequence[Branch]) -> list[str]:
+    """The pages there are; the last but one is in front of a dashboard."""
+    riding = any(len(branch.run.observers) > 1 for branch in branches)
+    return ["Summary", *(["Observers"] if riding else []), "Scenario"]
+
+
+def _columns(name: str, shares: list[float], *columns: rrb.Container | rrb.View) -> rrb.Container:
+    return rrb.Horizontal(*columns, column_shares=shares, name=name)
+
+
+def _stack(plots: Sequence[Plot], views: Sequence[rrb.View]) -> rrb.Container:
+    """Plots below each other."""
+    return rrb.Vertical(*views, row_shares=[what.height for what in plots])
+
+
+def _below_lanes(lanes: Sequence[Branch], plots: Sequence[Plot], views: Sequence[rrb.View]) -> rrb.Container:
     """Plots below each other, and the lanes of phases above them."""
-    if phases is None:
-        return rrb.Vertical(*views, row_shares=[plot.height for plot in plots])
-    top = LANE * (1.3 + min(lanes, MOST_LANES))
-    share = (COLUMN - top) / sum(plot.height for plot in plots)
-    return rrb.Vertical(phases, *views, row_shares=[top, *(plot.height * share for plot in plots)])
+    top = _lanes_height(lanes)
+    share = (COLUMN - top) / sum(what.height for what in plots)
+    return rrb.Vertical(phases(lanes), *views, row_shares=[top, *(what.height * share for what in plots)])
 
 
-def _pages() -> rrb.Container:
-    summary = rrb.TextDocumentView(origin="/summary", name="Summary")
-    scenario = rrb.TextDocumentView(origin="/scenario", name="Scenario")
-    return rrb.Tabs(summary, scenario, active_tab=0)
-
-
-def _rig(plant: Plant, branch: Branch, name: str) -> rrb.View:
-    centre, radius = extent(plant)
-    eye = centre + radius * np.array(EYE)
-    return rrb.Spatial3DView(
-        origin=f"{branch.path}/rig",
-        name=name,
-        eye_controls=rrb.EyeControls3D(position=eye, look_target=centre, eye_up=(0.0, 0.0, 1.0)),
-        line_grid=False,
-        background=rrb.Background(color=BACKGROUND),
-    )
-
-
-def _phases(branches: Sequence[Branch]) -> rrb.View:
-    contents = [f"{branch.path}/phase" for branch in branches]
-    return rrb.StateTimelineView(origin="/", contents=contents, name="Phase", time_view=_time_axis())
-
-
-def _plot(plot: Plot, branch: Branch) -> rrb.View:
-    """A plot of one run."""
-    shown = [row.values for path, row in branch.series.items() if path.startswith(plot.entities)]
-    yardstick = [branch.series["rate/true"].values, np.zeros(1)]
-    return rrb.TimeSeriesView(
-        origin=branch.path,
-        contents=[f"{branch.path}/{entity}**" for entity in plot.entities],
-        name=plot.title,
-        axis_x=_time_axis(),
-        axis_y=_frame(yardstick, shown) if "rate" in plot.entities[0] else None,
-        plot_legend=_legend(plot, len(shown)),
-    )
-
-
-def _overlay(plot: Plot, branches: Sequence[Branch], cube: str) -> rrb.View:
-    """The same series of all runs, each in its run's colour."""
-    colors = colours(branch.run.name for branch in branches)
-    lines: dict[str, rr.SeriesLines] = {}
-    shown, standing = [], []
-    for branch in branches:
-        name = branch.run.name
-        observer = rr.escape_entity_path_part(branch.run.trajectory.observers[0])
-        entity = plot.entities[0].format(cube=rr.escape_entity_path_part(cube), observer=observer)
-        lines[f"{branch.path}/{entity}"] = rr.SeriesLines(colors=[colors[name]], names=[name], widths=[1.5])
-        values = branch.series[entity].values
-        shown.append(values)
-        if branch.run.outcome.kind not in ENDINGS:
-            standing.append(values)
-    overrides: Mapping[str, rr.SeriesLines] = lines
-    return rrb.TimeSeriesView(
-        origin="/",
-        contents=list(lines),
-        name=plot.title.format(cube=cube),
-        overrides=overrides,  # type: ignore[arg-type]
-        axis_x=_time_axis(),
-        axis_y=_frame(standing, shown),
-        plot_legend=_legend(plot, len(shown)),
-    )
-
-
-def _frame(yardstick: Sequence[np.ndarray], shown: Sequence[np.ndarray]) -> rrb.ScalarAxis | None:
-    """Keep what matters legible beside a line that shoots off: the yardstick's range and as much again on each side.
-
-    Args:
-        yardstick: Values that must be seen.
-        shown: All that is plotted.
-
-    Returns:
-        The axis, or None if everything fits and may be shown whole.
-    """
-    sure = [values[np.isfinite(values)] for values in yardstick]
-    everything = [values[np.isfinite(values)] for values in shown]
-    if not sum(map(len, sure)) or not sum(map(len, everything)):
-        return None
-    low, high = (float(f(np.concatenate(sure))) for f in (np.min, np.max))
-    lowest, highest = (float(f(np.concatenate(everything))) for f in (np.min, np.max))
-    reach = high - low
-    if reach == 0.0 or (lowest >= low - reach and highest <= high + reach):
-        return None
-    return rrb.ScalarAxis(range=(max(lowest, low - reach), min(highest, high + reach)))
-
-
-def _legend(plot: Plot, lines: int) -> rrb.PlotLegend:
-    return rrb.PlotLegend(corner=plot.corner, visible=plot.needs_legend or lines <= MOST_LEGENDS)
-
-
-def _time_axis() -> rrb.TimeAxis:
-    return rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
+def _lanes_height(lanes: Sequence[Branch]) -> float:
+    return min(LANE * (1.3 + len(lanes)), 0.6 * COLUMN)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.legible import best
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
 from cmg_mj.simulate import Outcome
@@ -34,6 +35,23 @@ class Run:
     trajectory: Trajectory
     summary: Mapping[str, Any]
     outcome: Outcome
+
+    @property
+    def observers(self) -> dict[str, Mapping[str, Any]]:
+        """The observer in the loop, then those riding along, each with its numbers."""
+        riding = self.summary.get("companions") or {}
+        in_loop, *others = self.trajectory.observers
+        return {in_loop: self.summary, **{name: riding.get(name, {}) for name in others}}
+
+
+def best_observers(run: Run) -> list[str]:
+    """The one in the loop, and the best of those riding along."""
+    return best(run.observers, always=run.trajectory.observers[:1])
+
+
+def best_runs(runs: Sequence[Run]) -> list[str]:
+    """Names of the runs in which the estimate was best, of those that stood to the end if there are enough."""
+    return best({run.name: {**run.summary, "fell": run.outcome.kind in ENDINGS} for run in runs})
 
 
 def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, float]]:

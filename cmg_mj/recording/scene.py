@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -11,7 +10,9 @@ import rerun as rr
 
 from cmg_mj.plant import Cube, Plant
 from cmg_mj.push import Push
+from cmg_mj.recording.framing import Ball
 from cmg_mj.recording.run import Run, torque_steps
+from cmg_mj.recording.shapes import shapes
 from cmg_mj.recording.timeline import TIMELINE, column, instant
 
 POSE_RATE_HZ = 100.0
@@ -24,19 +25,12 @@ At 314 rad/s a mark on the disc makes half a turn between two poses and seems to
 the flywheel is the true one; its shapes hang from a child entity, `slowed`, that turns them back.
 """
 
-SHOWN_GROUPS = 3
-"""Geoms and sites of groups 0 to 2 are drawn, as in MuJoCo's own viewers."""
-
 PUSH_COLOR = (213, 94, 0)
-PUSH_LENGTH_M = 0.2
-INFINITE_PLANE_M = 1.0
-TILE_M = 0.125
-TILE_COLORS = ((150, 156, 164), (132, 138, 147))
-
-_Type = mujoco.mjtGeom
+PUSH_LENGTH, PUSH_RADIUS = 0.8, 0.047
+"""Of the strongest push's arrow, in radii of the rig."""
 
 
-def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes: Sequence[Push]) -> None:
+def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes: Sequence[Push], rig: Ball) -> None:
     """Record the rig of one run under `<branch>/rig`.
 
     Args:
@@ -45,8 +39,9 @@ def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes
         plant: The rig.
         run: The run.
         pushes: Torques from outside.
+        rig: Its size, by which arrows and floors go.
     """
-    _log_shapes(rec, branch, plant)
+    _log_shapes(rec, branch, plant, rig.radius)
     time, qpos = pose_samples(plant, run)
     positions, quaternions = body_poses(plant, qpos)
     at = column(time)
@@ -57,7 +52,7 @@ def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes
         translation, quaternion = _turned_back(plant, cube, qpos)
         poses = rr.Transform3D.columns(translation=translation, quaternion=quaternion)
         rec.send_columns(_slowed_path(branch, plant, cube), [at], poses)
-    _log_push(rec, branch, plant, pushes, run.outcome.time_s)
+    _log_push(rec, branch, plant, pushes, run.outcome.time_s, rig.radius)
 
 
 def body_path(branch: str, plant: Plant, body: int) -> str:
@@ -107,19 +102,6 @@ def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return positions, np.roll(quaternions, -1, axis=-1)
 
 
-def extent(plant: Plant) -> tuple[np.ndarray, float]:
-    """Centre, (3,) [m], and radius [m] of all that is drawn of the rig in its initial pose, floor apart."""
-    model = plant.drawn_model
-    data = mujoco.MjData(model)
-    data.qpos[:] = plant.new_data().qpos
-    mujoco.mj_forward(model, data)
-    drawn = [i for i in range(model.ngeom) if _is_drawn(model.geom_group[i], _rgba(model, i)) and model.geom_bodyid[i]]
-    if not drawn:
-        return data.subtree_com[0].copy(), float(model.stat.extent)
-    low, high = data.geom_xpos[drawn].min(axis=0), data.geom_xpos[drawn].max(axis=0)
-    return (low + high) / 2.0, float(np.linalg.norm(high - low) / 2.0) or float(model.stat.extent)
-
-
 def _turned_back(plant: Plant, cube: Cube, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Turn, in the flywheel's own frame, from its true angle to the slowed one: translation and quaternion xyzw."""
     model = plant.model
@@ -135,119 +117,20 @@ def _slowed_path(branch: str, plant: Plant, cube: Cube) -> str:
     return f"{body_path(branch, plant, int(plant.model.jnt_bodyid[cube.flywheel]))}/slowed"
 
 
-# --- shapes --------------------------------------------------------------------------------------------------
-
-
-def _log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant) -> None:
+def _log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float) -> None:
     """One static entity a geom and a site, under its body."""
     model = plant.drawn_model
     parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
     for cube in plant.cubes:
         parents[int(model.jnt_bodyid[cube.flywheel])] = _slowed_path(branch, plant, cube)
-    for body, name, shape in shapes(model):
+    for body, name, shape in shapes(model, radius):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
         rec.log(f"{parents[body]}/{path}", shape, static=True)
 
 
-def shapes(model: mujoco.MjModel) -> Iterator[tuple[int, str, Any]]:
-    """Body, name and shape of all that MuJoCo draws."""
-    for i in range(model.ngeom):
-        rgba = _rgba(model, i)
-        if _is_drawn(model.geom_group[i], rgba):
-            name = model.geom(i).name or f"geom{i}"
-            place = (model.geom_size[i], model.geom_pos[i], model.geom_quat[i])
-            yield int(model.geom_bodyid[i]), name, _shape(model, i, int(model.geom_type[i]), *place, rgba)
-    for i in range(model.nsite):
-        if _is_drawn(model.site_group[i], model.site_rgba[i]):
-            name = f"site/{model.site(i).name or i}"
-            place = (model.site_size[i], model.site_pos[i], model.site_quat[i])
-            yield (
-                int(model.site_bodyid[i]),
-                name,
-                _shape(model, None, int(model.site_type[i]), *place, model.site_rgba[i]),
-            )
-
-
-def _is_drawn(group: int, rgba: np.ndarray) -> bool:
-    return group < SHOWN_GROUPS and rgba[3] > 0.0
-
-
-def _rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """A geom's colour: its own, or its material's if it has none of its own."""
-    own, material = model.geom_rgba[geom], model.geom_matid[geom]
-    return model.mat_rgba[material] if material >= 0 and np.all(own == (0.5, 0.5, 0.5, 1.0)) else own
-
-
-def _shape(
-    model: mujoco.MjModel,
-    geom: int | None,
-    kind: int,
-    size: np.ndarray,
-    position: np.ndarray,
-    wxyz: np.ndarray,
-    rgba: np.ndarray,
-) -> Any:
-    """MuJoCo's shape as rerun's, in the body's frame."""
-    rotation = _matrix(wxyz)
-    color = tuple(round(255.0 * c) for c in rgba.tolist())
-    looks: dict[str, Any] = {"colors": [color], "quaternions": [np.roll(wxyz, -1)]}
-    solid: dict[str, Any] = {"fill_mode": rr.components.FillMode.Solid}
-    if kind == int(_Type.mjGEOM_CAPSULE):
-        # MuJoCo's capsule is centred, rerun's stands on its start.
-        start = position - rotation[:, 2] * size[1]
-        return rr.Capsules3D(lengths=[2.0 * size[1]], radii=[size[0]], translations=[start], **looks, **solid)
-    if kind == int(_Type.mjGEOM_CYLINDER):
-        return rr.Cylinders3D(lengths=[2.0 * size[1]], radii=[size[0]], centers=[position], **looks, **solid)
-    if kind == int(_Type.mjGEOM_BOX):
-        return rr.Boxes3D(half_sizes=[size], centers=[position], **looks, **solid)
-    if kind in (int(_Type.mjGEOM_SPHERE), int(_Type.mjGEOM_ELLIPSOID)):
-        half_sizes = size if kind == int(_Type.mjGEOM_ELLIPSOID) else np.full(3, size[0])
-        return rr.Ellipsoids3D(half_sizes=[half_sizes], centers=[position], **looks, **solid)
-    if kind == int(_Type.mjGEOM_PLANE):
-        return _tiles(size, position, rotation)
-    if kind == int(_Type.mjGEOM_MESH) and geom is not None:
-        vertices, faces = _mesh(model, int(model.geom_dataid[geom]))
-        return rr.Mesh3D(vertex_positions=vertices @ rotation.T + position, triangle_indices=faces, albedo_factor=color)
-    # A height field or a signed distance field: its bounding box.
-    box = model.geom_aabb[geom]
-    return rr.Boxes3D(half_sizes=[box[3:]], centers=[position + rotation @ box[:3]], **looks)
-
-
-def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[np.ndarray, np.ndarray]:
-    vertex, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-    return (
-        model.mesh_vert[vertex : vertex + model.mesh_vertnum[mesh]],
-        model.mesh_face[face : face + model.mesh_facenum[mesh]],
-    )
-
-
-def _tiles(size: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> Any:
-    """A plane as a chequered mesh: lines and textures would fight or blur."""
-    half = np.where(size[:2] > 0.0, size[:2], INFINITE_PLANE_M)
-    count = np.maximum(1, np.ceil(2.0 * half / TILE_M)).astype(int)
-    i, j = (index.ravel() for index in np.meshgrid(*map(np.arange, count), indexing="ij"))
-    corners = np.stack([i, j], axis=1)[:, None] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-    flat = (corners / count * 2.0 - 1.0) * half
-    vertices = np.concatenate([flat, np.zeros((*flat.shape[:2], 1))], axis=2).reshape(-1, 3)
-    triangles = (4 * np.arange(len(i)))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])
-    colors = np.repeat(np.array(TILE_COLORS, np.uint8)[(i + j) % 2], 4, axis=0)
-    return rr.Mesh3D(
-        vertex_positions=vertices @ rotation.T + position,
-        triangle_indices=triangles.reshape(-1, 3),
-        vertex_colors=colors,
-    )
-
-
-def _matrix(wxyz: np.ndarray) -> np.ndarray:
-    matrix = np.empty(9)
-    mujoco.mju_quat2Mat(matrix, wxyz.astype(float))
-    return matrix.reshape(3, 3)
-
-
-# --- the push ------------------------------------------------------------------------------------------------
-
-
-def _log_push(rec: rr.RecordingStream, branch: str, plant: Plant, pushes: Sequence[Push], end_s: float) -> None:
+def _log_push(
+    rec: rr.RecordingStream, branch: str, plant: Plant, pushes: Sequence[Push], end_s: float, radius: float
+) -> None:
     """An arrow on the frame's upper edge that shows the torque as the force of a hand, while it lasts."""
     path = f"{body_path(branch, plant, plant.frame)}/push"
     steps = torque_steps(pushes, end_s)
@@ -258,12 +141,9 @@ def _log_push(rec: rr.RecordingStream, branch: str, plant: Plant, pushes: Sequen
         if abs(torque) <= 1e-9 * strongest:
             rec.log(path, rr.Clear(recursive=False))
             continue
-        vector = direction * (PUSH_LENGTH_M * torque / strongest)
-        label = f"push {torque:+.3g} N m"
-        rec.log(
-            path,
-            rr.Arrows3D(vectors=[vector], origins=[tip - vector], radii=[0.012], colors=[PUSH_COLOR], labels=[label]),
-        )
+        vector = direction * (PUSH_LENGTH * radius * torque / strongest)
+        looks = {"radii": [PUSH_RADIUS * radius], "colors": [PUSH_COLOR], "labels": [f"push {torque:+.3g} N m"]}
+        rec.log(path, rr.Arrows3D(vectors=[vector], origins=[tip - vector], **looks))
     rec.reset_time()
 
 

@@ -13,12 +13,14 @@ from cmg_mj.metrics import MetricsSettings
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
+from cmg_mj.recording.framing import Ball
 from cmg_mj.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
 from cmg_mj.recording.timeline import TIMELINE, column, instant
 
 LIMIT: Colour = (120, 120, 120)
-CONTROLLER: Colour = (204, 121, 167)
-CUBES: tuple[Colour, ...] = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (204, 121, 167))
+CONTROLLER: Colour = (200, 200, 200)
+CUBES: tuple[Colour, ...] = ((225, 205, 165), (125, 150, 185), (160, 120, 90), (110, 160, 140))
+"""Strong colours are the observers'."""
 
 PHASES: dict[str, Colour] = {
     BALANCING: (0, 114, 178),
@@ -43,6 +45,8 @@ class Series:
         values: (n,) or (n, n_lines), in the unit that the plot's title names.
         color: Of its lines.
         width: Of its lines.
+        whole: Whether an axis must show all of it; bounds, measurements and estimates may be cut off.
+        observer: Whose it is; empty if no observer's.
     """
 
     path: str
@@ -51,6 +55,8 @@ class Series:
     values: np.ndarray
     color: Colour
     width: float = 1.5
+    whole: bool = True
+    observer: str = ""
 
 
 @dataclass(frozen=True)
@@ -61,11 +67,22 @@ class Branch:
         path: Where everything of the run is found.
         run: The run.
         series: Its time series by their path below the branch.
+        rig: Where the rig is.
     """
 
     path: str
     run: Run
     series: dict[str, Series]
+    rig: Ball
+
+
+def numbered(names: Sequence[str]) -> list[str]:
+    """Parts of entity paths: the viewer sorts by them, so that of several each has its number before its name."""
+    digits = len(str(len(names)))
+    return [
+        rr.escape_entity_path_part(f"{i:0{digits}}_{name}" if len(names) > 1 else name)
+        for i, name in enumerate(names, 1)
+    ]
 
 
 def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> list[Series]:
@@ -82,28 +99,16 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
     """
     t = run.trajectory
     time = t["time_s"]
+    true, gyro = YARDSTICKS["true"], YARDSTICKS["gyro"]
     rows = [
-        Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), YARDSTICKS["gyro"], 1.0),
-        Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), YARDSTICKS["true"], 2.5),
+        Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), gyro, 1.0, whole=False),
+        Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), true, 2.5),
         _bounds("tilt/settle_band", "settle band", time, settings.settle_band_deg),
-        Series("rate/true", "true", time, t["x2_rad_s"], YARDSTICKS["true"], 3.0),
-        Series("rate/gyro", "gyro", time, t["fog_rad_s"], YARDSTICKS["gyro"], 1.0),
+        Series("rate/true", "true", time, t["x2_rad_s"], true, 3.0),
+        Series("rate/gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False),
     ]
-    for name, color in colours(t.observers).items():
-        part = rr.escape_entity_path_part(name)
-        width = 1.5 if name == t.observers[0] else 1.0
-        estimate = t[f"estimate/{name}/x2_rad_s"]
-        rows += [
-            Series(f"rate_estimate/{part}", name, time, estimate, color, width),
-            Series(f"rate_error/{part}", name, time, estimate - t["x2_rad_s"], color, width),
-        ]
-        if BIAS in t.extra_signals(name):
-            bias = np.degrees(t[f"estimate/{name}/{BIAS}"])
-            summary = run.summary if name == t.observers[0] else run.summary.get("companions", {}).get(name, {})
-            rows.append(Series(f"bias/{part}", name, time, bias, color, width))
-            if (true := summary.get("bias_deg")) is not None:
-                ends = time[[0, -1]] if len(time) > 1 else time
-                rows.append(Series("bias/true", "true", ends, np.full(len(ends), true), YARDSTICKS["true"], 2.5))
+    for part, (name, color) in zip(numbered(t.observers), colours(t.observers).items(), strict=True):
+        rows += _estimates(run, part, name, color)
     rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
     if rate_limit is not None:
         rows.append(_bounds("command/limit", "rate limit", time, rate_limit))
@@ -119,6 +124,24 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
             Series(f"flywheel/{part}", cube.name + way, time, speed, color, width),
         ]
     rows.append(Series("integrator/x_e", "x_e", time, t["x_e_rad_times_s"], CONTROLLER))
+    return rows
+
+
+def _estimates(run: Run, part: str, name: str, color: Colour) -> list[Series]:
+    """What one observer says."""
+    t = run.trajectory
+    time, rate = t["time_s"], t[f"estimate/{name}/x2_rad_s"]
+    said = {"rate_estimate": rate, "rate_error": rate - t["x2_rad_s"]}
+    if BIAS in t.extra_signals(name):
+        said["bias"] = np.degrees(t[f"estimate/{name}/{BIAS}"])
+    width = 1.5 if name == t.observers[0] else 1.0
+    rows = [
+        Series(f"{folder}/{part}", name, time, values, color, width, whole=False, observer=name)
+        for folder, values in said.items()
+    ]
+    if "bias" in said and (bias := run.observers[name].get("bias_deg")) is not None:
+        ends = time[[0, -1]] if len(time) > 1 else time
+        rows.append(Series("bias/true", "true", ends, np.full(len(ends), bias), YARDSTICKS["true"], 2.5))
     return rows
 
 
@@ -169,4 +192,4 @@ def log_phases(
 def _bounds(path: str, name: str, time: np.ndarray, bound: float) -> Series:
     """Two horizontal lines at +-bound."""
     ends = time[[0, -1]] if len(time) > 1 else time
-    return Series(path, name, ends, np.tile([bound, -bound], (len(ends), 1)), LIMIT, 1.0)
+    return Series(path, name, ends, np.tile([bound, -bound], (len(ends), 1)), LIMIT, 1.0, whole=False)

@@ -1,21 +1,26 @@
-"""The summary as a page of Markdown."""
+"""The summary as pages of Markdown, in tables no wider than their view."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 from cmg_mj import markdown
+from cmg_mj.legible import FEW
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
-from cmg_mj.recording.run import Run
+from cmg_mj.recording.run import Run, best_observers, best_runs
 from cmg_mj.summary_keys import KEYS, heading, written
 
-FEWER = ("settle_time_s", "velocity_rms_error_rad_s", "tilt_rms_deg", "gimbal_peak_deg", "command_rms_rad_s")
-"""Those that find room when each run is a row."""
+ROW_TABLES = (
+    ("velocity_rms_error_rad_s", "settle_time_s"),
+    ("tilt_rms_deg", "gimbal_peak_deg", "command_rms_rad_s"),
+)
+"""What is shown where each run is a row, table by table."""
 
-MOST_COLUMNS = 3
-"""More runs than this are rows."""
+BOLD = "In bold: those that are switched on in the plots; the legends of the other tab switch on any."
+
+RIDING = ("velocity_rms_error_rad_s",)
+"""What there is of an observer that rides along."""
 
 
 def page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: MetricsSettings, notes: str) -> str:
@@ -31,16 +36,26 @@ def page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: Metr
     Returns:
         The page.
     """
-    table = _by_column(runs) if len(runs) <= MOST_COLUMNS else _by_row(runs)
+    tables = [_by_column(runs)] if len(runs) <= FEW else _by_row(runs)
     band = f"Settled: the tilt stays within ±{settings.settle_band_deg:g}° to the end."
-    lines = [f"# {title or 'Run'}", "", table, "", _pushes(pushes), "", band]
+    reasons = [f"**{run.name}**: {run.outcome.reason}" for run in runs if run.outcome.reason]
+    return _paragraphs(f"# {title or 'Run'}", *tables, _pushes(pushes), band, *reasons, notes)
+
+
+def observers_page(runs: Sequence[Run]) -> str:
+    """The estimates of those in the loop and those riding along; empty where nobody rides along."""
+    parts = []
     for run in runs:
-        if run.outcome.reason:
-            lines += ["", f"**{run.name}**: {run.outcome.reason}"]
-        companions = run.summary.get("companions")
-        if companions:
-            lines += ["", _companions(run.name, companions)]
-    return "\n".join([*lines, "", notes, ""])
+        if len(run.observers) > 1:
+            names = _marked(run.observers, best_observers(run))
+            said = [[written(key, of.get(key)) for key in RIDING] for of in run.observers.values()]
+            parts.append(
+                f"In the run of {run.name}; the other observers ride along.{f' {BOLD}' if len(names) > FEW else ''}"
+            )
+            parts.append(
+                markdown.table(("", *map(heading, RIDING)), [(n, *s) for n, s in zip(names, said, strict=True)])
+            )
+    return _paragraphs(*parts) if parts else ""
 
 
 def scenario_page(toml: str) -> str:
@@ -59,16 +74,21 @@ def _by_column(runs: Sequence[Run]) -> str:
     return markdown.table(("", *(run.name for run in runs)), rows)
 
 
-def _by_row(runs: Sequence[Run]) -> str:
-    """A table with a row a run."""
-    rows = [(run.name, _outcome(run), *(written(key, run.summary.get(key)) for key in FEWER)) for run in runs]
-    return markdown.table(("", "Outcome", *map(heading, FEWER)), rows, text_columns=2)
+def _by_row(runs: Sequence[Run]) -> list[str]:
+    """Tables with a row a run."""
+    first = [_marked([run.name for run in runs], best_runs(runs)), [_outcome(run) for run in runs]]
+    tables = []
+    for i, keys in enumerate(ROW_TABLES):
+        columns = [[written(key, run.summary.get(key)) for run in runs] for key in keys]
+        text = first if i == 0 else first[:1]
+        headings = (*("", "Outcome")[: len(text)], *map(heading, keys))
+        tables.append(markdown.table(headings, list(zip(*text, *columns, strict=True)), text_columns=len(text)))
+    return [*tables, BOLD]
 
 
-def _companions(name: str, companions: Mapping[str, Mapping[str, Any]]) -> str:
-    key = "velocity_rms_error_rad_s"
-    rows = [(companion, written(key, of.get(key))) for companion, of in companions.items()]
-    return f"Riding along open loop in the run of {name}:\n\n{markdown.table(('', heading(key)), rows)}"
+def _marked(names: Iterable[str], best: Sequence[str]) -> list[str]:
+    """Names in bold that are switched on."""
+    return [f"**{name}**" if name in best else name for name in names]
 
 
 def _outcome(run: Run) -> str:
@@ -80,3 +100,7 @@ def _pushes(pushes: Sequence[Push]) -> str:
         return "No push."
     listed = (f"{p.torque_n_m:+g} N m for {p.duration_s:g} s at {p.start_s:g} s" for p in pushes)
     return "Pushes: " + "; ".join(listed) + "."
+
+
+def _paragraphs(*parts: str) -> str:
+    return "\n\n".join(parts) + "\n"

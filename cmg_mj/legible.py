@@ -1,0 +1,75 @@
+"""What keeps a picture of many lines legible: the best few of them, on an axis that those fill."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.colours import YARDSTICKS
+
+FEW = 3
+"""This many observers can be followed over each other."""
+
+JUDGED_BY = ("velocity_rms_error_push_rad_s", "velocity_rms_error_rad_s")
+"""Keys of a summary, the first of them that it has: a whole run is mostly stillness."""
+
+LEFT_OUT = 0.1
+"""Percentage of the samples at each end of an estimate that its axis need not show."""
+
+REACH = 3.0
+"""An estimate that goes astray stretches its axis by this many times the span of what is true, on each side."""
+
+MARGIN = 0.05
+
+
+def best(summaries: Mapping[str, Mapping[str, Any]], always: Iterable[str] = ()) -> list[str]:
+    """Those worth being shown when there are too many.
+
+    Args:
+        summaries: Of each observer its summary; one that fell has `fell`, and comes last.
+        always: Those shown in any case.
+
+    Returns:
+        At most `FEW` names (more only if `always` has more), in the order given: those with the smallest errors. What
+        observers are compared with is not among them, unless there is too little else.
+    """
+    always = list(always)
+    rest = sorted((name for name in summaries if name not in always), key=lambda name: _rank(name, summaries[name]))
+    shown = {*always, *rest[: max(0, FEW - len(always))]}
+    return [name for name in summaries if name in shown]
+
+
+def _rank(name: str, summary: Mapping[str, Any]) -> tuple[bool, bool, float]:
+    error = next((summary[key] for key in JUDGED_BY if summary.get(key) is not None), math.inf)
+    return name in YARDSTICKS, bool(summary.get("fell")), error if math.isfinite(error) else math.inf
+
+
+def axis_range(sure: Sequence[np.ndarray], rather: Sequence[np.ndarray] = ()) -> tuple[float, float] | None:
+    """The range of an axis which one noisy or diverging line cannot take for itself.
+
+    Args:
+        sure: What must be seen whole, arrays of any shape. Whatever is not finite is passed over, here as below.
+        rather: What should be seen too, but for its outliers, and as long as it leaves room for the others.
+
+    Returns:
+        Lowest and highest, with a margin; None if there is nothing, or all of it one value.
+    """
+    certain, wanted = (_finite(values) for values in (sure, rather))
+    if not len(certain) and not any(map(len, wanted)):
+        return None
+    low, high = (min(map(np.min, certain)), max(map(np.max, certain))) if certain else (math.inf, -math.inf)
+    span = high - low
+    lowest, highest = (low - REACH * span, high + REACH * span) if span > 0.0 else (-math.inf, math.inf)
+    for values in wanted:
+        least, most = np.percentile(values, (LEFT_OUT, 100.0 - LEFT_OUT))
+        low, high = min(low, max(least, lowest)), max(high, min(most, highest))
+    margin = MARGIN * (high - low)
+    return (float(low - margin), float(high + margin)) if 0.0 < margin < math.inf else None
+
+
+def _finite(arrays: Sequence[np.ndarray]) -> list[np.ndarray]:
+    kept = [values[np.isfinite(values)] for values in arrays]
+    return [values for values in kept if len(values)]
