@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from itertools import product
+from typing import Any, Literal
 
 import numpy as np
 
@@ -23,6 +24,24 @@ REACH = 3.0
 """An estimate that goes astray stretches its axis by this many times the span of what is true, on each side."""
 
 MARGIN = 0.05
+
+LEGEND = (0.35, 0.6)
+"""Shares of a plot's width and height that a legend takes."""
+
+
+def by_observer(observers: Sequence[str], summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """A run's numbers observer by observer.
+
+    Args:
+        observers: The one in the loop, then those riding along.
+        summary: The run's, with the others' in `companions`.
+
+    Returns:
+        Observer -> its numbers, in that order; empty for one that has none.
+    """
+    in_loop, *others = observers
+    riding = summary.get("companions") or {}
+    return {in_loop: summary, **{name: riding.get(name, {}) for name in others}}
 
 
 def best(summaries: Mapping[str, Mapping[str, Any]], always: Iterable[str] = ()) -> list[str]:
@@ -68,6 +87,39 @@ def axis_range(sure: Sequence[np.ndarray], rather: Sequence[np.ndarray] = ()) ->
         low, high = min(low, max(least, lowest)), max(high, min(most, highest))
     margin = MARGIN * (high - low)
     return (float(low - margin), float(high + margin)) if 0.0 < margin < math.inf else None
+
+
+def free_corner(
+    lines: Sequence[tuple[np.ndarray, np.ndarray]], axis: tuple[float, float] | None
+) -> tuple[Literal["right", "left"], Literal["top", "bottom"]]:
+    """The corner of a plot in which a legend hides the least: rather a stretch of noise than an excursion.
+
+    Args:
+        lines: Abscissae, (n,), and ordinates, (n,) or (n, n_lines).
+        axis: Range of the ordinates; None for what they need.
+
+    Returns:
+        Which one.
+    """
+    drawn = [(x[:, None] if y.ndim == 2 else x, np.nan_to_num(y, posinf=0.0, neginf=0.0)) for x, y in lines if len(x)]
+    axis = axis or axis_range([y for _, y in drawn])
+    corners = list(product(("right", "left"), ("top", "bottom")))
+    if axis is None:
+        return corners[0]
+    start, end = min(x.min() for x, _ in drawn), max(x.max() for x, _ in drawn)
+    drawn = [(x, np.clip(y, *axis)) for x, y in drawn]
+    width, height = LEGEND[0] * (end - start), LEGEND[1] * (axis[1] - axis[0])
+
+    def hidden(corner: tuple[str, str]) -> float:
+        side, end_of_axis = corner
+        loss = 0.0
+        for x, y in drawn:
+            beside = x > end - width if side == "right" else x < start + width
+            within = y > axis[1] - height if end_of_axis == "top" else y < axis[0] + height
+            loss += float(np.mean(np.square(y - np.median(y)) * (beside & within)))
+        return loss
+
+    return min(corners, key=hidden)
 
 
 def _finite(arrays: Sequence[np.ndarray]) -> list[np.ndarray]:

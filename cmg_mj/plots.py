@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cmg_mj.colours import colour, colours, hexadecimal
+from cmg_mj.legible import axis_range, best, by_observer
 from cmg_mj.picture import Panel, Picture
 from cmg_mj.trajectory import Trajectory, whole_file
 
@@ -75,49 +78,141 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=4, frameon=False, borderpad=0)
 
 
-def plot_run(path: Path, trajectory: Trajectory, title: str) -> None:
-    """Plot a run as aranovskiy2020's Figs 4 to 7 do: tilt, tilt rate with a panel an observer, gimbal angle, command.
+INK = "0.15"
+"""What is true, on paper."""
+MEASURED = hexadecimal(colour("gyro"))
+PAGE = (9.0, 12.7)
+"""A page [inch]."""
+PANEL_HEIGHT, SMALL_HEIGHT, SMALL_COLUMNS, SMALL_ROWS = 1.8, 1.3, 4, 3
+"""Of the panels, and of the small ones of observers for which there is no room in them."""
+
+
+def plot_run(
+    path: Path,
+    trajectory: Trajectory,
+    title: str,
+    summary: Mapping[str, Any],
+    *,
+    settle_band_deg: float,
+    rate_limit_rad_s: float,
+) -> None:
+    """Plot a run on one page: tilt, tilt rate, error of the estimates, gimbal angle, command.
+
+    The observer in the loop and the best of those riding along share the panels; each of the others has a small one.
 
     Args:
         path: The PNG to write.
         trajectory: One world.
         title: Above the plot.
+        summary: The run's numbers, by which the best are found.
+        settle_band_deg: Settled is a tilt within this much of zero [deg].
+        rate_limit_rad_s: Largest command [rad/s].
     """
     plt = _pyplot()
-    t = trajectory["time_s"]
-    n = len(trajectory.observers)
-    figure, panels = plt.subplots(3 + n, 1, sharex=True, figsize=(9.0, 7.5 + 1.75 * n), layout="constrained")
-    tilt, *rates, gimbal, command = panels
-    tilt.plot(t, np.degrees(trajectory["y1_rad"]), color="0.7", linewidth=0.8, label="measured $y_1$")
-    tilt.plot(t, np.degrees(trajectory["x1_rad"]), color="C0", label="true $x_1$ (from equilibrium)")
-    tilt.set_ylabel("tilt [deg]")
-    fog = trajectory["fog_rad_s"]
-    low, high = (float(fog.min()), float(fog.max())) if len(fog) else (0.0, 0.0)
-    room = 0.75 * max(high - low, 0.05)  # an estimate may be far off, and would leave no room for the others
-    for i, (name, axes) in enumerate(zip(trajectory.observers, rates, strict=True)):
-        label = f"{name} $\\hat x_2$" + (", riding along" if i else "")
-        axes.plot(t, trajectory[f"estimate/{name}/x2_rad_s"], color=f"C{i + 1}", linewidth=0.8, label=label)
-        axes.plot(t, fog, color="0.15", linewidth=1.2, label="gyro")
-        axes.set_ylim(low - room, high + room)
-        axes.set_ylabel("tilt rate\n[rad/s]")
-    gimbal.plot(t, np.degrees(trajectory["x3_rad"]), color="C0", label="true $x_3$")
-    gimbal.set_ylabel("gimbal angle\n[deg]")
-    command.step(t, trajectory["u_rad_s"], where="post", color="C0", linewidth=0.8, label="$u$")
-    command.set_ylabel("gimbal rate\n[rad/s]")
-    command.set_xlabel("time [s]")
-    pushed = trajectory["push_n_m"] != 0.0
+    summaries = by_observer(trajectory.observers, summary)
+    few = best(summaries, always=trajectory.observers[:1])
+    others = [name for name in trajectory.observers if name not in few]
+    columns = max(SMALL_COLUMNS, -(-len(others) // SMALL_ROWS))
+    small = [others[i : i + columns] for i in range(0, len(others), columns)]
+    heights = [PANEL_HEIGHT] * 5 + [SMALL_HEIGHT] * len(small)
+    figure = plt.figure(figsize=(PAGE[0], min(PAGE[1], 0.6 + sum(heights))), layout="constrained")
+    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
+    panels = [figure.add_subplot(grid[0, :])]
+    panels += [figure.add_subplot(grid[i, :], sharex=panels[0]) for i in range(1, 5)]
+    _draw_tilt(panels[0], trajectory, settle_band_deg)
+    palette = {name: hexadecimal(rgb) for name, rgb in colours(trajectory.observers).items()}
+    rates = _draw_estimates(panels[1], panels[2], trajectory, {name: palette[name] for name in few}, summaries)
+    _draw_actuators(panels[3], panels[4], trajectory, rate_limit_rad_s)
+    for i, row in enumerate(small, 5):
+        for j, name in enumerate(row):
+            axes = figure.add_subplot(grid[i, j], sharex=panels[0])
+            _draw_small(axes, trajectory, name, palette[name], rates)
+            lowest = i == len(heights) - 1 or j >= len(small[-1])
+            axes.tick_params(labelbottom=lowest, labelleft=j == 0, labelsize="small")
+            if j == 0:
+                axes.set_ylabel("tilt rate\n[rad/s]", fontsize="small")
+            panels.append(axes)
+    t, pushed = trajectory["time_s"], trajectory["push_n_m"] != 0.0
     for axes in panels:
         if pushed.any():
-            in_panel = axes.get_xaxis_transform()
-            style = {"color": "C3", "alpha": 0.25, "linewidth": 0, "zorder": 0}
-            axes.fill_between(
-                t, 0, 1, where=pushed, transform=in_panel, label="push" if axes is tilt else None, **style
-            )
+            label = "push" if axes is panels[0] else None
+            style = {"color": "C3", "alpha": 0.25, "linewidth": 0, "zorder": 0, "label": label}
+            axes.fill_between(t, 0, 1, where=pushed, transform=axes.get_xaxis_transform(), **style)
         axes.grid(alpha=0.3)
         axes.margins(x=0.0)
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=3, frameon=False, borderpad=0)
-    figure.align_ylabels()
+    for axes in panels[:5]:
+        axes.tick_params(labelbottom=axes is panels[4])
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
+    panels[4].set_xlabel("time [s]")
+    figure.align_ylabels(panels[:5])
     figure.suptitle(title, x=0.01, ha="left", parse_math=False)
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=110, format="png")
     plt.close(figure)
+
+
+def _draw_tilt(axes: Any, trajectory: Trajectory, band: float) -> None:
+    t = trajectory["time_s"]
+    measured, true = np.degrees(trajectory["y1_rad"]), np.degrees(trajectory["x1_rad"])
+    axes.plot(t, measured, color=MEASURED, linewidth=0.6, alpha=0.7, label="measured $y_1$")
+    axes.plot(t, true, color=INK, linewidth=1.3, label="true $x_1$ (from equilibrium)")
+    _draw_bounds(axes, band, "settle band")
+    axes.set_ylabel("tilt [deg]")
+    _fit(axes, [true], [measured, np.array([band, -band])])
+
+
+def _draw_estimates(
+    rates: Any,
+    errors: Any,
+    trajectory: Trajectory,
+    palette: Mapping[str, str],
+    summaries: Mapping[str, Mapping[str, Any]],
+) -> tuple[float, float] | None:
+    """Tilt rate and error of some observers; the range of the rates."""
+    t, true = trajectory["time_s"], trajectory["x2_rad_s"]
+    estimates = {name: trajectory[f"estimate/{name}/x2_rad_s"] for name in palette}
+    rates.plot(t, trajectory["fog_rad_s"], color=MEASURED, linewidth=0.6, label="gyro")
+    rates.plot(t, true, color=INK, linewidth=1.8, label="true $x_2$")
+    for name, color in palette.items():
+        short = name.rpartition(":")[2].lstrip("_") or name  # matplotlib hides what begins with an underscore
+        style = {"color": color, "linewidth": 0.8}
+        rms = summaries[name].get("velocity_rms_error_rad_s")
+        rates.plot(t, estimates[name], **style, label=f"{short} $\\hat x_2$")
+        errors.plot(t, estimates[name] - true, **style, label=short if rms is None else f"{short}: RMS {rms:.3g}")
+    rates.set_ylabel("tilt rate\n[rad/s]")
+    errors.set_ylabel("error $\\hat x_2 - x_2$\n[rad/s]")
+    _fit(errors, [true], [estimate - true for estimate in estimates.values()])
+    return _fit(rates, [true], [*estimates.values()])
+
+
+def _draw_small(axes: Any, trajectory: Trajectory, name: str, color: str, rates: tuple[float, float] | None) -> None:
+    """One observer's estimate on the axis of the others."""
+    t = trajectory["time_s"]
+    axes.plot(t, trajectory[f"estimate/{name}/x2_rad_s"], color=color, linewidth=0.5)
+    axes.plot(t, trajectory["x2_rad_s"], color=INK, linewidth=0.8)
+    axes.set_title(name.rpartition(":")[2], loc="left", fontsize="small", parse_math=False, pad=2.0)
+    if rates is not None:
+        axes.set_ylim(*rates)
+
+
+def _draw_actuators(gimbal: Any, command: Any, trajectory: Trajectory, limit: float) -> None:
+    t, u = trajectory["time_s"], trajectory["u_rad_s"]
+    gimbal.plot(t, np.degrees(trajectory["x3_rad"]), color=INK, linewidth=1.3, label="true $x_3$")
+    gimbal.set_ylabel("gimbal angle\n[deg]")
+    command.step(t, u, where="post", color=INK, linewidth=0.6, label="command $u$")
+    _draw_bounds(command, limit, "rate limit")
+    command.set_ylabel("gimbal rate\n[rad/s]")
+    _fit(command, [u], [np.array([limit, -limit])])
+
+
+def _draw_bounds(axes: Any, bound: float, label: str) -> None:
+    for value, named in ((bound, label), (-bound, None)):
+        axes.axhline(value, color="0.5", linewidth=0.8, linestyle="--", label=named)
+
+
+def _fit(axes: Any, sure: Sequence[np.ndarray], rather: Sequence[np.ndarray]) -> tuple[float, float] | None:
+    """Give an axis the range in which these can be read."""
+    found = axis_range(sure, rather)
+    if found is not None:
+        axes.set_ylim(*found)
+    return found

@@ -174,7 +174,7 @@ def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *
         lambda path: _write_json(path, summary_of(experiment, result)),
         experiment.save,
         lambda path: _record(path, [(experiment, result)]),
-        lambda path: plot_run(path, trajectory, title),
+        lambda path: _plot(path, trajectory, title, experiment, result),
     )
     with claimed(folder) as it:
         complete = result.outcomes[0].kind in ("done", "fell")
@@ -234,6 +234,17 @@ def trajectory_with_metadata(experiment: Experiment, result: Result) -> Trajecto
     assert result.trajectory is not None
     outcome = dataclasses.asdict(result.outcomes[0])
     return dataclasses.replace(result.trajectory, metadata={"outcome": outcome, "scenario": experiment.resolved()})
+
+
+def _plot(path: Path, trajectory: Trajectory, title: str, experiment: Experiment, result: Result) -> None:
+    plot_run(
+        path,
+        trajectory,
+        title,
+        summary_of(experiment, result),
+        settle_band_deg=experiment.scenario.metrics.settle_band_deg,
+        rate_limit_rad_s=experiment.law.rate_limit,
+    )
 
 
 def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:

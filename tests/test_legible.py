@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.legible import FEW, MARGIN, REACH, axis_range, best
+from cmg_mj.legible import FEW, MARGIN, REACH, axis_range, best, free_corner
 
 TRUE = 0.5 * np.sin(np.linspace(0.0, 20.0, 2001))
 """From -0.5 to 0.5."""
@@ -92,3 +92,31 @@ def test_what_observers_are_compared_with_is_not_among_the_best() -> None:
     summaries = {name: summary(i / 10.0) for i, name in enumerate(("zero", "mems_gyro", "a", "b", "c", "d"))}
     assert best(summaries) == ["a", "b", "c"]
     assert len(best(dict.fromkeys(("zero", "mems_gyro", "a"), summary(0.1)))) == FEW
+
+
+TIME = np.linspace(0.0, 10.0, 1001)
+PEAK = np.exp(-np.square((TIME - 2.0) / 0.1))
+
+
+@pytest.mark.parametrize(
+    ("values", "corner"),
+    [
+        (PEAK, ("right", "top")),
+        (PEAK[::-1], ("left", "top")),
+        (PEAK + 0.02 * noise(1.0)[:1001], ("right", "top")),
+        (np.exp(TIME), ("left", "top")),
+        (1.0 - np.exp(-TIME), ("right", "bottom")),
+        (np.ones_like(TIME), ("right", "top")),
+        (np.full_like(TIME, math.nan), ("right", "top")),
+        (np.stack([PEAK, -PEAK], axis=1), ("right", "top")),
+    ],
+)
+def test_a_legend_hides_no_excursion(values: np.ndarray, corner: tuple[str, str]) -> None:
+    side, end = free_corner([(TIME, values)], axis_range([values]))
+    assert (side, end) == corner or (corner == ("right", "top") and side == "right")
+
+
+def test_a_legend_where_there_is_no_line() -> None:
+    assert free_corner([], None) == ("right", "top")
+    assert free_corner([(np.empty(0), np.empty(0))], None) == ("right", "top")
+    assert free_corner([(np.array([1.0, 1.0]), np.array([1e300, -1e300]))], (-1.0, 1.0)) == ("right", "top")

@@ -14,28 +14,27 @@ from cmg_mj.recording.signals import Branch
 from cmg_mj.recording.timeline import TIMELINE
 from cmg_mj.recording.views import Choice, Plot, overlay, pages, phases, plot, rig
 
-_LOW = rrb.Corner2D.RightBottom
 ESTIMATE_PLOTS = (
-    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 3.0),
-    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), 2.0, _LOW),
+    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 2.8),
+    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), 2.8),
 )
-TILT_PLOTS = (Plot("Tilt [deg]", ("tilt/",), 2.0), *ESTIMATE_PLOTS)
-BIAS_PLOT = Plot("Estimated equilibrium bias [deg]", ("bias/",), 1.5, _LOW)
+TILT_PLOTS = (Plot("Tilt [deg]", ("tilt/",), 1.7), *ESTIMATE_PLOTS)
+BIAS_PLOT = Plot("Estimated equilibrium bias [deg]", ("bias/",), 1.3)
 """Only where an observer estimates it."""
 ACTUATOR_PLOTS = (
     Plot("Command, gimbal rate [rad/s]", ("command/",), 3.0),
-    Plot("Gimbal angles from upright [deg]", ("gimbal/",), 2.4, _LOW),
+    Plot("Gimbal angles from upright [deg]", ("gimbal/",), 2.4),
     Plot("Flywheel speeds [rad/s]", ("flywheel/",), 1.8, least=3.0),
-    Plot("Integrator [rad s]", ("integrator/",), 1.8, _LOW),
+    Plot("Integrator [rad s]", ("integrator/",), 1.8),
 )
 COMPARED_TILT_PLOTS = (
     Plot("Tilt, true [deg]", ("tilt/true",)),
-    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), corner=_LOW),
+    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",)),
 )
 COMPARED_ACTUATOR_PLOTS = (
     Plot("Command, gimbal rate [rad/s]", ("command/u",)),
-    Plot("Gimbal angle of {cube} from upright [deg]", ("gimbal/{cube}",), corner=_LOW),
-    Plot("Integrator [rad s]", ("integrator/x_e",), corner=_LOW),
+    Plot("Gimbal angle of {cube} from upright [deg]", ("gimbal/{cube}",)),
+    Plot("Integrator [rad s]", ("integrator/x_e",)),
 )
 
 LANE, COLUMN = 40.0, 820.0

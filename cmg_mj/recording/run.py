@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.legible import best
+from cmg_mj.legible import best, by_observer
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
 from cmg_mj.simulate import Outcome
@@ -39,9 +39,7 @@ class Run:
     @property
     def observers(self) -> dict[str, Mapping[str, Any]]:
         """The observer in the loop, then those riding along, each with its numbers."""
-        riding = self.summary.get("companions") or {}
-        in_loop, *others = self.trajectory.observers
-        return {in_loop: self.summary, **{name: riding.get(name, {}) for name in others}}
+        return by_observer(self.trajectory.observers, self.summary)
 
 
 def best_observers(run: Run) -> list[str]:

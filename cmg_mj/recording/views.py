@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from cmg_mj.colours import colours
-from cmg_mj.legible import axis_range
+from cmg_mj.legible import axis_range, free_corner
 from cmg_mj.recording.run import ENDINGS
 from cmg_mj.recording.signals import Branch, Series
 
@@ -27,14 +27,12 @@ class Plot:
         title: What it shows and in which unit.
         entities: Paths below the run's branch, folders with their slash.
         height: Share of its column.
-        corner: Where the legend hides least.
         least: Least span of its axis, in its unit.
     """
 
     title: str
     entities: tuple[str, ...]
     height: float = 1.0
-    corner: rrb.Corner2D = rrb.Corner2D.RightTop
     least: float = 0.0
 
 
@@ -86,7 +84,8 @@ def plot(what: Plot, branch: Branch, observers: Choice) -> rrb.View:
         branch.path,
         [f"{branch.path}/{entity}**" for entity in what.entities],
         {f"{branch.path}/{row.path}": observers.line(row.observer) for row in rows if row not in fitting},
-        (sure, [row.values for row in fitting if not row.whole]),
+        axis_range(sure, [row.values for row in fitting if not row.whole]),
+        fitting,
     )
 
 
@@ -107,6 +106,7 @@ def overlay(what: Plot, branches: Sequence[Branch], cube: str, runs: Choice) -> 
     overrides: dict[str, list[Any]] = {}
     sure: list[np.ndarray] = []
     rather: list[np.ndarray] = []
+    fitting = []
     for branch in branches:
         name = branch.run.name
         row = _row(branch, what.entities[0].format(cube=part))
@@ -114,12 +114,12 @@ def overlay(what: Plot, branches: Sequence[Branch], cube: str, runs: Choice) -> 
         overrides[f"{branch.path}/{row.path}"] = runs.line(name, **looks)
         stands = branch.run.outcome.kind not in ENDINGS
         if name in runs.shown:
+            fitting.append(row)
             (sure if row.whole and stands else rather).append(row.values)
             if RATE_ERROR in what.entities and stands:
                 sure.append(branch.series[RATE].values)
-    return _series_view(
-        replace(what, title=what.title.format(cube=cube)), "/", list(overrides), overrides, (sure, rather)
-    )
+    what = replace(what, title=what.title.format(cube=cube))
+    return _series_view(what, "/", list(overrides), overrides, axis_range(sure, rather), fitting)
 
 
 def _row(branch: Branch, entity: str) -> Series:
@@ -134,26 +134,22 @@ def _series_view(
     origin: str,
     contents: list[str],
     overrides: Mapping[Any, list[Any]],
-    fitted: tuple[Sequence[np.ndarray], Sequence[np.ndarray]],
+    axis: tuple[float, float] | None,
+    shown: Sequence[Series],
 ) -> rrb.View:
+    if axis is not None:
+        more = max(0.0, what.least - (axis[1] - axis[0])) / 2.0
+        axis = (axis[0] - more, axis[1] + more)
+    corner = "".join(word.capitalize() for word in free_corner([(row.time, row.values) for row in shown], axis))
     return rrb.TimeSeriesView(
         origin=origin,
         contents=contents,
         name=what.title,
         overrides=overrides,
         axis_x=_time_axis(),
-        axis_y=_axis(fitted, what.least),
-        plot_legend=rrb.PlotLegend(corner=what.corner, visible=True),
+        axis_y=rrb.ScalarAxis(range=axis) if axis else None,
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.auto(corner), visible=True),
     )
-
-
-def _axis(fitted: tuple[Sequence[np.ndarray], Sequence[np.ndarray]], least: float) -> rrb.ScalarAxis | None:
-    found = axis_range(*fitted)
-    if found is None:
-        return None
-    low, high = found
-    more = max(0.0, least - (high - low)) / 2.0
-    return rrb.ScalarAxis(range=(low - more, high + more))
 
 
 def rig(branch: Branch, name: str) -> rrb.View:
