@@ -18,7 +18,8 @@ class Line:
         y: Ordinates, (n,).
         label: Its name in the legend; empty for none.
         style: As matplotlib writes it: `-`, `--`, `.`, `o-`.
-        color: Number of a colour of the cycle; None for the next.
+        color: An observer, for the colour that it has everywhere; or the number of a colour of the cycle; None for the
+            next.
         width: Line width [points].
         spread: Half height of a band around y, (n,), such as a confidence interval's.
     """
@@ -27,7 +28,7 @@ class Line:
     y: Sequence[float] | np.ndarray
     label: str = ""
     style: str = "-"
-    color: int | None = None
+    color: str | int | None = None
     width: float = 1.0
     spread: Sequence[float] | np.ndarray | None = None
 

@@ -58,7 +58,7 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
     for line in panel.lines:
         style = {"linewidth": line.width, "label": line.label or None}
         if line.color is not None:
-            style["color"] = f"C{line.color}"
+            style["color"] = hexadecimal(colour(line.color)) if isinstance(line.color, str) else f"C{line.color}"
         (drawn,) = axes.plot(line.x, line.y, line.style, markersize=4, **style)
         if line.spread is not None:
             low, high = np.subtract(line.y, line.spread), np.add(line.y, line.spread)

@@ -150,8 +150,8 @@ def _picture(found: list[Measured]) -> Picture:
         most = max(float(np.nanmax(values)) for numbers in measure.numbers.values() for values in numbers.values())
         for angles, numbers in measure.numbers.items():
             marks = [
-                Line(np.arange(len(numbers[name])), numbers[name], "" if i else equation, "o", color=color)
-                for color, (name, equation) in enumerate(OBSERVERS.items(), 1)
+                Line(np.arange(len(numbers[name])), numbers[name], "" if i else equation, "o", color=name)
+                for name, equation in OBSERVERS.items()
             ]
             label = KEYS[measure.key].heading.replace(" RMS", "\nRMS")
             panels.append(Panel(label, marks, "" if i else f"{angles} angles", "world", y_range=(0.0, 1.05 * most)))

@@ -118,8 +118,8 @@ def _picture(example: Trajectory) -> Picture:
     ]
     for i, (name, equation) in enumerate(OBSERVERS.items()):
         lines = [
-            Line(t, example[f"estimate/{name}/x2_rad_s"], f"{equation} {name}", color=i + 1, width=0.7),
-            Line(t, example["fog_rad_s"], "gyro", color=0, width=1.2),
+            Line(t, example[f"estimate/{name}/x2_rad_s"], f"{equation} {name}", color=name, width=0.7),
+            Line(t, example["fog_rad_s"], "gyro", "k-", width=1.0),
         ]
         panels.append(Panel("tilt rate [rad/s]", lines, "(b)" if i == 0 else "", shaded=shaded, y_range=(-0.5, 0.45)))
     return Picture(

@@ -127,6 +127,9 @@ def _trade_off(rows: Sequence[Row]) -> Picture:
     """Lag against noise gain, a mark an observer."""
     of_cell = [row for row in rows if (row["noise_ug_rthz"], row["bias_deg"]) == SHOWN]
     shown = [row for row in of_cell if row["push_lag_s"] is not None]
-    marks = [Line([1e3 * row["push_lag_s"]], [row["noise_gain_per_s"]], row["observer"], "o") for row in shown]
+    marks = [
+        Line([1e3 * row["push_lag_s"]], [row["noise_gain_per_s"]], row["observer"], "o", row["observer"])
+        for row in shown
+    ]
     panel = Panel("noise gain [1/s]", marks, x_label="lag in a sudden push [ms]", x_scale="log", y_scale="log")
     return Picture("beyond-trade-off", f"Every observer trades lag for noise ({SHOWN[0]:g} ug/rtHz)", [panel])

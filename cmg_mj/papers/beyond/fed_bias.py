@@ -96,6 +96,6 @@ def _picture(rows: Sequence[dict[str, Any]]) -> Picture:
         known = [(row["bias_deg"], row[f"{kind}_rad_s"]) for row in rows if row[f"{kind}_rad_s"] is not None]
         biases, errors = [bias for bias, _ in known], [error for _, error in known]
         means, halves = [error.mean for error in errors], [error.half for error in errors]
-        lines.append(Line(biases, means, kind, "o-", spread=halves))
+        lines.append(Line(biases, means, kind, "o-", kind, spread=halves))
     panel = Panel("velocity RMS error [rad/s]", lines, x_label="equilibrium bias e [deg]")
     return Picture("beyond-fed-bias", "The bias fed into (11): velocity RMS error with 95 % intervals", [panel])

@@ -98,7 +98,7 @@ def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
         (
             Panel(
                 "velocity RMS error [rad/s]",
-                [Line(biases, means[name], name, "o-", c, spread=halves[name]) for c, name in enumerate(errors)],
+                [Line(biases, means[name], name, "o-", name, spread=halves[name]) for name in errors],
                 x_label="equilibrium bias e [deg]",
             ),
         ),

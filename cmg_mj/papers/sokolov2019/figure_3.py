@@ -182,8 +182,8 @@ def _picture(tuning: Tuning) -> Picture:
     ]
     for i, (name, equation) in enumerate(OBSERVERS.items()):
         lines = [
-            Line(t, tuning.rates[name][: len(t), 0], f"{equation} {name}", color=i + 1, width=0.8),
-            Line(t, one["fog_rad_s"], "gyro", color=0, width=1.2),
+            Line(t, tuning.rates[name][: len(t), 0], f"{equation} {name}", color=name, width=0.8),
+            Line(t, one["fog_rad_s"], "gyro", "k-", width=1.0),
         ]
         panels.append(Panel("tilt rate [rad/s]", lines, "(b)" if i == 0 else "", shaded=shaded, y_range=(-1.0, 0.6)))
     title = (

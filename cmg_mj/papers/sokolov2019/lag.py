@@ -212,12 +212,12 @@ def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
 def _picture(found: Lags) -> Picture:
     grid = np.linspace(5e-3, 0.07, 66)
     rates = [
-        Line(1e3 * grid, _growth(name, grid), f"{OBSERVERS[name]} {name}", color=i + 1)
-        for i, name in enumerate(("linear", "luenberger"))
+        Line(1e3 * grid, _growth(name, grid), f"{OBSERVERS[name]} {name}", color=name)
+        for name in ("linear", "luenberger")
     ]
     rates.append(Line([5.0, 70.0], [0.0, 0.0], style="k:", width=0.8))
     tilts = [
-        Line(1e3 * s.lags_s, s.amplitude_deg, f"{OBSERVERS[name]} {name}", "os^"[i] + "-", color=i + 1)
+        Line(1e3 * s.lags_s, s.amplitude_deg, f"{OBSERVERS[name]} {name}", "os^"[i] + "-", color=name)
         for i, (name, s) in enumerate(found.sweeps.items())
     ]
     panels = [
