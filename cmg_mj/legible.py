@@ -29,6 +29,19 @@ LEGEND = (0.35, 0.6)
 """Shares of a plot's width and height that a legend takes."""
 
 
+def shortened(names: Sequence[str]) -> dict[str, str]:
+    """Observers' names as legends and tables have room for them.
+
+    Args:
+        names: Those that are shown together.
+
+    Returns:
+        Name -> itself; of a dotted path its class, unless another one's is called the same.
+    """
+    short = [name.rpartition(":")[2] or name for name in names]
+    return {name: part if short.count(part) == 1 else name for name, part in zip(names, short, strict=True)}
+
+
 def by_observer(observers: Sequence[str], summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """A run's numbers observer by observer.
 

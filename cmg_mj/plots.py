@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.colours import colour, colours, hexadecimal
-from cmg_mj.legible import axis_range, best, by_observer
+from cmg_mj.legible import axis_range, best, by_observer, shortened
 from cmg_mj.picture import Panel, Picture
 from cmg_mj.trajectory import Trajectory, whole_file
 
 
-def _pyplot() -> Any:
+def pyplot() -> Any:
+    """Matplotlib's pyplot, drawing into files."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -30,7 +31,7 @@ def draw(path: Path, picture: Picture) -> None:
         path: The PNG to write.
         picture: What to draw.
     """
-    plt = _pyplot()
+    plt = pyplot()
     columns = picture.columns
     rows = -(-len(picture.panels) // columns)
     size = (9.0 if columns == 1 else 5.5 * columns, 0.8 + 2.3 * rows)
@@ -108,7 +109,7 @@ def plot_run(
         settle_band_deg: Settled is a tilt within this much of zero [deg].
         rate_limit_rad_s: Largest command [rad/s].
     """
-    plt = _pyplot()
+    plt = pyplot()
     summaries = by_observer(trajectory.observers, summary)
     few = best(summaries, always=trajectory.observers[:1])
     others = [name for name in trajectory.observers if name not in few]
@@ -121,12 +122,13 @@ def plot_run(
     panels += [figure.add_subplot(grid[i, :], sharex=panels[0]) for i in range(1, 5)]
     _draw_tilt(panels[0], trajectory, settle_band_deg)
     palette = {name: hexadecimal(rgb) for name, rgb in colours(trajectory.observers).items()}
+    labels = shortened(trajectory.observers)
     rates = _draw_estimates(panels[1], panels[2], trajectory, {name: palette[name] for name in few}, summaries)
     _draw_actuators(panels[3], panels[4], trajectory, rate_limit_rad_s)
     for i, row in enumerate(small, 5):
         for j, name in enumerate(row):
             axes = figure.add_subplot(grid[i, j], sharex=panels[0])
-            _draw_small(axes, trajectory, name, palette[name], rates)
+            _draw_small(axes, trajectory, name, labels[name], palette[name], rates)
             lowest = i == len(heights) - 1 or j >= len(small[-1])
             axes.tick_params(labelbottom=lowest, labelleft=j == 0, labelsize="small")
             if j == 0:
@@ -173,24 +175,27 @@ def _draw_estimates(
     estimates = {name: trajectory[f"estimate/{name}/x2_rad_s"] for name in palette}
     rates.plot(t, trajectory["fog_rad_s"], color=MEASURED, linewidth=0.6, label="gyro")
     rates.plot(t, true, color=INK, linewidth=1.8, label="true $x_2$")
+    labels = shortened(trajectory.observers)
     for name, color in palette.items():
-        short = name.rpartition(":")[2].lstrip("_") or name  # matplotlib hides what begins with an underscore
+        label = labels[name].lstrip("_")  # matplotlib hides what begins with an underscore
         style = {"color": color, "linewidth": 0.8}
         rms = summaries[name].get("velocity_rms_error_rad_s")
-        rates.plot(t, estimates[name], **style, label=f"{short} $\\hat x_2$")
-        errors.plot(t, estimates[name] - true, **style, label=short if rms is None else f"{short}: RMS {rms:.3g}")
+        rates.plot(t, estimates[name], **style, label=f"{label} $\\hat x_2$")
+        errors.plot(t, estimates[name] - true, **style, label=label if rms is None else f"{label}: RMS {rms:.3g}")
     rates.set_ylabel("tilt rate\n[rad/s]")
     errors.set_ylabel("error $\\hat x_2 - x_2$\n[rad/s]")
     _fit(errors, [true], [estimate - true for estimate in estimates.values()])
     return _fit(rates, [true], [*estimates.values()])
 
 
-def _draw_small(axes: Any, trajectory: Trajectory, name: str, color: str, rates: tuple[float, float] | None) -> None:
+def _draw_small(
+    axes: Any, trajectory: Trajectory, name: str, label: str, color: str, rates: tuple[float, float] | None
+) -> None:
     """One observer's estimate on the axis of the others."""
     t = trajectory["time_s"]
     axes.plot(t, trajectory[f"estimate/{name}/x2_rad_s"], color=color, linewidth=0.5)
     axes.plot(t, trajectory["x2_rad_s"], color=INK, linewidth=0.8)
-    axes.set_title(name.rpartition(":")[2], loc="left", fontsize="small", parse_math=False, pad=2.0)
+    axes.set_title(label, loc="left", fontsize="small", parse_math=False, pad=2.0)
     if rates is not None:
         axes.set_ylim(*rates)
 

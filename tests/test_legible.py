@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.legible import FEW, MARGIN, REACH, axis_range, best, free_corner
+from cmg_mj.legible import FEW, MARGIN, REACH, axis_range, best, free_corner, shortened
 
 TRUE = 0.5 * np.sin(np.linspace(0.0, 20.0, 2001))
 """From -0.5 to 0.5."""
@@ -120,3 +120,9 @@ def test_a_legend_where_there_is_no_line() -> None:
     assert free_corner([], None) == ("right", "top")
     assert free_corner([(np.empty(0), np.empty(0))], None) == ("right", "top")
     assert free_corner([(np.array([1.0, 1.0]), np.array([1e300, -1e300]))], (-1.0, 1.0)) == ("right", "top")
+
+
+def test_names_are_shortened_where_they_stay_apart() -> None:
+    names = ["linear", "mine:Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
+    assert list(shortened(names).values()) == ["linear", "Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
+    assert list(shortened(["mine:linear", "linear"]).values()) == ["mine:linear", "linear"]

@@ -13,14 +13,15 @@ from typing import Any
 import rerun as rr
 
 from cmg_mj.errors import InputError
+from cmg_mj.legible import shortened
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.recording.blueprint import default_blueprint
-from cmg_mj.recording.framing import ball
+from cmg_mj.recording.framing import Ball, ball
 from cmg_mj.recording.run import Run
 from cmg_mj.recording.scene import FLYWHEEL_SLOWDOWN, log_rig, pose_samples
-from cmg_mj.recording.signals import Branch, log_phases, log_series, numbered, series
+from cmg_mj.recording.signals import Branch, Series, log_phases, log_series, numbered, series
 from cmg_mj.recording.summary import observers_page, page, scenario_page
 from cmg_mj.trajectory import whole_file
 
@@ -62,8 +63,10 @@ def write_recording(
     if not names or len(set(names)) < len(names):
         raise ValueError(f"a recording needs runs of different names, not {names}")
     settings = settings or MetricsSettings()
+    labels = shortened(names).values()
     branches = [
-        _branch(part, run, plant, settings, rate_limit_rad_s) for part, run in zip(numbered(names), runs, strict=True)
+        Branch(f"/{part}", label, run, _series(run, plant, settings, rate_limit_rad_s), _around(run, plant))
+        for part, label, run in zip(numbered(names), labels, runs, strict=True)
     ]
     notes = f"In the 3-D view the flywheels turn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed."
     with _strict(), rr.RecordingStream(_application(branches)) as rec:
@@ -74,7 +77,7 @@ def write_recording(
         rec.send_blueprint(default_blueprint(plant, branches), make_active=False, make_default=True)
         rec.set_log_time_enabled(False)
         rec.set_log_tick_enabled(False)
-        rec.send_recording_name(f"{title or 'Run'}: {', '.join(names)}")
+        rec.send_recording_name(f"{title or 'Run'}: {', '.join(labels)}")
         _log_properties(rec, runs, title)
         end = max(run.outcome.time_s for run in runs)
         for branch in branches:
@@ -90,9 +93,12 @@ def write_recording(
         temporary.write_bytes(content)
 
 
-def _branch(part: str, run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> Branch:
-    rows = {row.path: row for row in series(run, plant, settings, rate_limit)}
-    return Branch(f"/{part}", run, rows, ball(plant, pose_samples(plant, run)[1]))
+def _series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> dict[str, Series]:
+    return {row.path: row for row in series(run, plant, settings, rate_limit)}
+
+
+def _around(run: Run, plant: Plant) -> Ball:
+    return ball(plant, pose_samples(plant, run)[1])
 
 
 def _application(branches: Sequence[Branch]) -> str:

@@ -76,7 +76,7 @@ def _dashboard(branch: Branch) -> rrb.Container:
     few = best_observers(branch.run)
     names = _page_names([branch])
     return _columns(
-        branch.run.name,
+        branch.label,
         [9, 8, 6],
         rrb.Vertical(mechanism, pages(names, names[-2]), row_shares=[5, 4]),
         _below_lanes([branch], tilt, [plot(what, branch, Choice(few)) for what in tilt]),
@@ -99,7 +99,7 @@ def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]
     shown = [branch for branch in branches if branch.run.name in few]
     tilt = [overlay(what, branches, cube, Choice(few)) for what in COMPARED_TILT_PLOTS]
     actuators = [overlay(what, branches, cube, Choice(few)) for what in COMPARED_ACTUATOR_PLOTS]
-    rigs = rrb.Tabs(*(rig(branch, branch.run.name) for branch in shown), active_tab=0)
+    rigs = rrb.Tabs(*(rig(branch, branch.label) for branch in shown), active_tab=0)
     names = _page_names(branches)
     board = _columns(
         "Comparison",

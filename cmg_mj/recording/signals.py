@@ -9,6 +9,7 @@ import numpy as np
 import rerun as rr
 
 from cmg_mj.colours import YARDSTICKS, Colour, colours
+from cmg_mj.legible import shortened
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
@@ -65,12 +66,14 @@ class Branch:
 
     Attributes:
         path: Where everything of the run is found.
+        label: The run's name, shortened.
         run: The run.
         series: Its time series by their path below the branch.
         rig: Where the rig is.
     """
 
     path: str
+    label: str
     run: Run
     series: dict[str, Series]
     rig: Ball
@@ -107,8 +110,9 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
         Series("rate/true", "true", time, t["x2_rad_s"], true, 3.0),
         Series("rate/gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False),
     ]
+    labels = shortened(t.observers)
     for part, (name, color) in zip(numbered(t.observers), colours(t.observers).items(), strict=True):
-        rows += _estimates(run, part, name, color)
+        rows += _estimates(run, part, name, labels[name], color)
     rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
     if rate_limit is not None:
         rows.append(_bounds("command/limit", "rate limit", time, rate_limit))
@@ -127,7 +131,7 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
     return rows
 
 
-def _estimates(run: Run, part: str, name: str, color: Colour) -> list[Series]:
+def _estimates(run: Run, part: str, name: str, label: str, color: Colour) -> list[Series]:
     """What one observer says."""
     t = run.trajectory
     time, rate = t["time_s"], t[f"estimate/{name}/x2_rad_s"]
@@ -136,7 +140,7 @@ def _estimates(run: Run, part: str, name: str, color: Colour) -> list[Series]:
         said["bias"] = np.degrees(t[f"estimate/{name}/{BIAS}"])
     width = 1.5 if name == t.observers[0] else 1.0
     rows = [
-        Series(f"{folder}/{part}", name, time, values, color, width, whole=False, observer=name)
+        Series(f"{folder}/{part}", label, time, values, color, width, whole=False, observer=name)
         for folder, values in said.items()
     ]
     if "bias" in said and (bias := run.observers[name].get("bias_deg")) is not None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from cmg_mj import markdown
-from cmg_mj.legible import FEW
+from cmg_mj.legible import FEW, shortened
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
 from cmg_mj.recording.run import Run, best_observers, best_runs
@@ -47,7 +47,7 @@ def observers_page(runs: Sequence[Run]) -> str:
     parts = []
     for run in runs:
         if len(run.observers) > 1:
-            names = _marked(run.observers, best_observers(run))
+            names = _marked(list(run.observers), best_observers(run))
             said = [[written(key, of.get(key)) for key in RIDING] for of in run.observers.values()]
             parts.append(
                 f"In the run of {run.name}; the other observers ride along.{f' {BOLD}' if len(names) > FEW else ''}"
@@ -71,7 +71,7 @@ def _by_column(runs: Sequence[Run]) -> str:
         for key in KEYS
         if any(key in run.summary for run in runs)
     ]
-    return markdown.table(("", *(run.name for run in runs)), rows)
+    return markdown.table(("", *shortened([run.name for run in runs]).values()), rows)
 
 
 def _by_row(runs: Sequence[Run]) -> list[str]:
@@ -86,9 +86,9 @@ def _by_row(runs: Sequence[Run]) -> list[str]:
     return [*tables, BOLD]
 
 
-def _marked(names: Iterable[str], best: Sequence[str]) -> list[str]:
-    """Names in bold that are switched on."""
-    return [f"**{name}**" if name in best else name for name in names]
+def _marked(names: Sequence[str], best: Sequence[str]) -> list[str]:
+    """Names, shortened; in bold those that are switched on."""
+    return [f"**{short}**" if name in best else short for name, short in shortened(names).items()]
 
 
 def _outcome(run: Run) -> str:

@@ -110,7 +110,7 @@ def overlay(what: Plot, branches: Sequence[Branch], cube: str, runs: Choice) -> 
     for branch in branches:
         name = branch.run.name
         row = _row(branch, what.entities[0].format(cube=part))
-        looks = {"colors": [color[name]], "names": [name], "widths": [1.5]}
+        looks = {"colors": [color[name]], "names": [branch.label], "widths": [1.5]}
         overrides[f"{branch.path}/{row.path}"] = runs.line(name, **looks)
         stands = branch.run.outcome.kind not in ENDINGS
         if name in runs.shown:
