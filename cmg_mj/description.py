@@ -35,6 +35,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         f"; figures are accurate up to {rig.largest_step:g} s" if timestep > rig.largest_step * (1.0 + 1e-9) else ""
     )
     observer = {key: value for key, value in fields["observer"].items() if key != "kind"}
+    compare = scenario.compare
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
     rows = [
         ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
@@ -52,6 +53,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         ),
         ("companions", ", ".join(scenario.companion_names()) or "none"),
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
+        *([("compare", f"{', '.join(compare.names())}; {compare.worlds} worlds")] if compare else []),
         *(("push", f"{p.torque_n_m:g} N m from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     return lines(f"{name}: valid", [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))])

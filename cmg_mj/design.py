@@ -90,11 +90,13 @@ def design(scenario: Scenario, model: ReducedModel) -> Design:
 
 def _check_observers(scenario: Scenario) -> None:
     """The observers exist, and the parameters of the one in the loop are of their types: no text for a number."""
-    for name in scenario.companion_names():
+    named = [("companions", name) for name in scenario.companion_names()]
+    named += [("compare.observers", name) for name in (scenario.compare.names() if scenario.compare else ())]
+    for field, name in named:
         try:
             observer_class(name)
         except InputError as error:
-            raise InputError(str(error).replace("observer.kind = ", "companions: ", 1)) from error
+            raise InputError(str(error).replace("observer.kind = ", f"{field}: ", 1)) from error
     kind, parameters = scenario.observer.kind, scenario.observer.parameters
     types = fields_of(observer_class(kind))
     for name, value in parameters.items():

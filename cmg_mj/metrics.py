@@ -11,6 +11,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.fields import STRICT, Instant, Positive
+from cmg_mj.push import Push, inside, push_windows
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -35,10 +36,11 @@ class Metrics:
         observers: The observer in the loop, then the companions.
         n_worlds: How many worlds.
         dt: Control period [s].
-        push_end_s: End of the last push, 0 without one [s].
+        pushes: Torques from outside.
         rate_limit: Largest gimbal rate [rad/s].
         settings: The settle band, and from when on a bias estimate is judged.
         targets: Extra signal -> what an observer that estimates it should find in each world, (n_worlds,); in rad.
+        references: Names of what the estimates are judged beside.
     """
 
     def __init__(
@@ -46,14 +48,17 @@ class Metrics:
         observers: Sequence[str],
         n_worlds: int,
         dt: float,
-        push_end_s: float,
+        pushes: Sequence[Push],
         rate_limit: float,
         settings: MetricsSettings,
         targets: Mapping[str, Sequence[float]] | None = None,
+        references: Sequence[str] = (),
     ) -> None:
         self.observers = list(observers)
+        self.references = list(references)
         self._dt = dt
-        self._push_end = push_end_s
+        self._push_end = max((push.end_s for push in pushes), default=0.0)
+        self._windows = push_windows(pushes)
         self._limit = rate_limit
         self._band = math.radians(settings.settle_band_deg)
         self._targets = {signal: np.array(values) for signal, values in (targets or {}).items()}
@@ -62,9 +67,12 @@ class Metrics:
         self._found: dict[tuple[str, str], np.ndarray] = {}
         self._ticks = 0
         self._count = np.zeros(n_worlds)
-        self._squares = {name: np.zeros(n_worlds) for name in ("tilt", "command")}
-        self._errors = {name: np.zeros(n_worlds) for name in observers}
-        self._fog_errors = {name: np.zeros(n_worlds) for name in observers}
+        self._push_count = np.zeros(n_worlds)
+        self._squares = {name: np.zeros(n_worlds) for name in ("tilt", "velocity", "velocity_push", "command")}
+        judged = (*observers, *references)
+        self._errors = {name: np.zeros(n_worlds) for name in judged}
+        self._fog_errors = {name: np.zeros(n_worlds) for name in judged}
+        self._push_errors = {name: np.zeros(n_worlds) for name in judged}
         self._saturated = np.zeros(n_worlds)
         self._gimbal_peak = np.zeros(n_worlds)
         self._last_outside = np.full(n_worlds, -1)
@@ -78,6 +86,7 @@ class Metrics:
         u: np.ndarray,
         fog: np.ndarray,
         estimates: Sequence[Mapping[str, np.ndarray]],
+        references: Mapping[str, np.ndarray] | None = None,
     ) -> None:
         """Add the next ticks.
 
@@ -88,17 +97,25 @@ class Metrics:
             u: Command, (n_rows, n_worlds) [rad/s].
             fog: The gyro's rate, (n_rows, n_worlds) [rad/s].
             estimates: Each observer's estimates by their names, `x2_rad_s` among them, (n_rows, n_worlds).
+            references: Each reference's tilt rate, (n_rows, n_worlds) [rad/s].
         """
         counted = np.isfinite(x1)
         tick = self._ticks + np.arange(len(x1))[:, None]
         self._ticks += len(x1)
         self._count += counted.sum(axis=0)
         self._squares["tilt"] += _sum_of_squares(x1, counted)
+        self._squares["velocity"] += _sum_of_squares(x2, counted)
         self._squares["command"] += _sum_of_squares(u, counted)
+        pushed = counted & inside(tick * self._dt, self._windows)
+        self._push_count += pushed.sum(axis=0)
+        self._squares["velocity_push"] += _sum_of_squares(x2, pushed)
+        rates = {name: estimate["x2_rad_s"] for name, estimate in zip(self.observers, estimates, strict=True)}
+        for name, rate in (rates | dict(references or {})).items():
+            self._errors[name] += _sum_of_squares(rate - x2, counted)
+            self._fog_errors[name] += _sum_of_squares(rate - fog, counted)
+            self._push_errors[name] += _sum_of_squares(rate - x2, pushed)
         judged = counted & (tick * self._dt >= self._judged_from - 1e-9)
         for name, estimate in zip(self.observers, estimates, strict=True):
-            self._errors[name] += _sum_of_squares(estimate["x2_rad_s"] - x2, counted)
-            self._fog_errors[name] += _sum_of_squares(estimate["x2_rad_s"] - fog, counted)
             for signal in self._targets.keys() & estimate.keys():
                 self._add_found(name, signal, estimate[signal], judged)
         self._saturated += (counted & (np.abs(u) >= self._limit)).sum(axis=0)
@@ -138,30 +155,36 @@ class Metrics:
             Values by the names that `--json` prints; None where there is no such number.
         """
         n = self._count[world]
-
-        def rms(total: np.ndarray) -> float | None:
-            return _number(math.sqrt(total[world] / n)) if n else None
-
-        tilt = rms(self._squares["tilt"])
+        tilt, command = (_rms(self._squares[name][world], n) for name in ("tilt", "command"))
         loop = self.observers[0]
         companions = {
-            name: {
-                "velocity_rms_error_rad_s": rms(self._errors[name]),
-                "velocity_rms_error_fog_rad_s": rms(self._fog_errors[name]),
-                **self._found_summary(name, world),
-            }
-            for name in self.observers[1:]
+            name: {**self._rate_summary(name, world), **self._found_summary(name, world)} for name in self.observers[1:]
         }
+        references = {name: self._rate_summary(name, world) for name in self.references}
         return {
             "settle_time_s": self._settle_time(world, stood),
-            "velocity_rms_error_rad_s": rms(self._errors[loop]),
-            "velocity_rms_error_fog_rad_s": rms(self._fog_errors[loop]),
+            **self._rate_summary(loop, world),
             "tilt_rms_deg": None if tilt is None else math.degrees(tilt),
             "gimbal_peak_deg": math.degrees(self._gimbal_peak[world]) if n else None,
-            "command_rms_rad_s": rms(self._squares["command"]),
+            "command_rms_rad_s": command,
             "command_saturated_fraction": float(self._saturated[world] / n) if n else None,
             **self._found_summary(loop, world),
             **({"companions": companions} if companions else {}),
+            **({"references": references} if references else {}),
+        }
+
+    def _rate_summary(self, name: str, world: int) -> dict[str, float | None]:
+        """How well the true rate was estimated, over the whole run and in the push windows."""
+        n, n_push = self._count[world], self._push_count[world]
+        error, push_error = _rms(self._errors[name][world], n), _rms(self._push_errors[name][world], n_push)
+        motion = _rms(self._squares["velocity"][world], n)
+        return {
+            "velocity_rms_error_rad_s": error,
+            "velocity_rms_error_fog_rad_s": _rms(self._fog_errors[name][world], n),
+            "velocity_rms_error_push_rad_s": push_error,
+            "velocity_rms_rad_s": motion,
+            "velocity_fit": _fit(error, motion),
+            "velocity_fit_push": _fit(push_error, _rms(self._squares["velocity_push"][world], n_push)),
         }
 
     def _settle_time(self, world: int, stood: bool) -> float | None:
@@ -175,6 +198,16 @@ class Metrics:
 
 def _sum_of_squares(values: np.ndarray, counted: np.ndarray) -> np.ndarray:
     return np.square(np.where(counted, values, 0.0)).sum(axis=0)
+
+
+def _rms(total: float, n: float) -> float | None:
+    """Root of the mean square of n numbers; None of none, or if one was not finite."""
+    return _number(math.sqrt(total / n)) if n else None
+
+
+def _fit(error: float | None, motion: float | None) -> float | None:
+    """That of system identification, 1 - error/motion: 1 is the truth, 0 an estimate of zero."""
+    return _number(1.0 - error / motion) if motion and error is not None else None
 
 
 def _number(value: float) -> float | None:

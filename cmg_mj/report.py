@@ -5,10 +5,11 @@ from __future__ import annotations
 import inspect
 import sys
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rich import box
+from rich.console import Group
 from rich.table import Table
 
 from cmg_mj import markdown
@@ -16,10 +17,13 @@ from cmg_mj.description import assignments
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.resources import bundled
 from cmg_mj.scenario import load_scenario
-from cmg_mj.summary_keys import KEYS, heading, written
+from cmg_mj.summary_keys import KEYS, difference, heading, spread, written
 
-WIDEST = 9
+WIDEST = 8
 """Characters of a heading before it is broken."""
+
+LESS_BEST = "Less the best of each column, world by world"
+"""Above the second table of a comparison."""
 
 
 def columns_of(summaries: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -28,25 +32,81 @@ def columns_of(summaries: Sequence[Mapping[str, Any]]) -> list[str]:
     return [key for key, about in KEYS.items() if about.compared and (stopped or key != "stopped_fraction")]
 
 
-def comparison_table(summaries: Sequence[Mapping[str, Any]], title: str) -> Table:
-    """The table that `cmg-mj compare` prints."""
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0))
+def comparison_table(summaries: Sequence[Mapping[str, Any]], title: str) -> Group:
+    """What `cmg-mj compare` prints: means, below each its 95 % interval; differences to the best; what they are."""
+    tables = [_compared(summaries, title, columns_of(summaries), _mean)]
+    if _has_differences(summaries):
+        tables.append(_compared(summaries, LESS_BEST, _judged(summaries), _difference))
+    return Group(*tables, comparison_note(summaries))
+
+
+def _compared(
+    summaries: Sequence[Mapping[str, Any]], title: str, columns: Sequence[str], cell: Callable[..., list[str]]
+) -> Table:
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=0)
     table.add_column("observer", vertical="bottom", overflow="fold")
-    columns = columns_of(summaries)
     for key in columns:
         unit = [f"[{KEYS[key].unit}]"] if KEYS[key].unit else []
         lines = [*textwrap.wrap(KEYS[key].label, WIDEST, break_long_words=False), *unit]
         table.add_column("\n".join(lines), justify="right", vertical="bottom")
     for summary in summaries:
-        table.add_row(summary["observer"], *(written(key, summary[key]) for key in columns))
+        cells = [[summary["observer"]], *(cell(summary, key) for key in columns)]
+        height = max(map(len, cells))
+        table.add_row(*("\n".join([*lines, *[" "] * (height - len(lines))]) for lines in cells))
     return table
 
 
 def comparison_markdown(summaries: Sequence[Mapping[str, Any]]) -> str:
-    """The same table in Markdown."""
-    columns = columns_of(summaries)
-    rows = [(f"`{s['observer']}`", *(written(key, s[key]) for key in columns)) for s in summaries]
+    """The same in Markdown."""
+    parts = [_markdown(summaries, columns_of(summaries), _mean)]
+    if _has_differences(summaries):
+        parts += [f"{LESS_BEST}:", _markdown(summaries, _judged(summaries), _difference)]
+    return "\n\n".join([*parts, comparison_note(summaries)])
+
+
+def _markdown(summaries: Sequence[Mapping[str, Any]], columns: Sequence[str], cell: Callable[..., list[str]]) -> str:
+    rows = [(f"`{s['observer']}`", *(" ".join(cell(s, key)) for key in columns)) for s in summaries]
     return markdown.table(["observer", *map(heading, columns)], rows)
+
+
+def _judged(summaries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The columns in which one observer is the best."""
+    return [key for key in columns_of(summaries) if any(key in summary["less_best"] for summary in summaries)]
+
+
+def _has_differences(summaries: Sequence[Mapping[str, Any]]) -> bool:
+    return any(less["interval"] for summary in summaries for less in summary["less_best"].values())
+
+
+def _mean(summary: Mapping[str, Any], key: str) -> list[str]:
+    """A mean as a table shows it, and half its interval."""
+    return _with_half(written(key, summary[key]), key, summary["intervals"].get(key))
+
+
+def _difference(summary: Mapping[str, Any], key: str) -> list[str]:
+    """A difference to the best as a table shows it, and half its interval."""
+    less = summary["less_best"].get(key)
+    return ["best"] if less is None else _with_half(difference(key, less["mean"]), key, less["interval"])
+
+
+def _with_half(text: str, key: str, ends: Sequence[float] | None) -> list[str]:
+    return [text] if ends is None else [text, spread(key, (ends[1] - ends[0]) / 2.0)]
+
+
+def comparison_note(summaries: Sequence[Mapping[str, Any]]) -> str:
+    """What the tables of a comparison do not say by themselves."""
+    lines = [
+        "Means over the worlds that stood to the end, with 95 % intervals.",
+        "Push window: from a push's start to 1 s after its end.",
+        "Fit: 1 - RMS error / RMS of the true velocity; 1 is the truth, 0 an estimate of zero.",
+    ]
+    riding = next((summary["rides_along_in"] for summary in summaries if "rides_along_in" in summary), None)
+    if riding:
+        lines.append(
+            "zero (an estimate of zero) and mems_gyro (a two-dollar gyro) close no loop: they ride along in\n"
+            f"that of {riding}, the best."
+        )
+    return "\n".join(lines)
 
 
 def summary_table(summary: Mapping[str, Any]) -> Table:

@@ -11,6 +11,7 @@ from cmg_mj.controller import Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.metrics import Metrics
 from cmg_mj.plant import Plant
+from cmg_mj.references import References
 from cmg_mj.trajectory import ESTIMATES, Layout, Trajectory
 
 TICKS_A_PIECE = 256
@@ -25,6 +26,7 @@ class Rows:
         observers: The observer in the loop, then the companions.
         extras: What each of them estimates beyond x.
         metrics: Takes every piece.
+        references: What the estimates are judged beside.
         dt: Control period [s].
         keep: Whether to keep the pieces for a trajectory.
         single: Whether the ticks hold floats (one world) or arrays (n_worlds,).
@@ -36,6 +38,7 @@ class Rows:
         observers: Sequence[str],
         extras: Sequence[Sequence[str]],
         metrics: Metrics,
+        references: References,
         dt: float,
         *,
         keep: bool,
@@ -46,6 +49,7 @@ class Rows:
         self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), tuple(self._rig.joint_names))
         self._estimated = [(*ESTIMATES, *names) for names in extras]
         self._metrics = metrics
+        self._references = references
         self._dt = dt
         self._keep = keep
         self._single = single
@@ -86,7 +90,7 @@ class Rows:
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)
         named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
-        self._metrics.update(x1, x2, x3, u, fog, named)
+        self._metrics.update(x1, x2, x3, u, fog, named, self._references.rates(x2))
         if self._keep:
             columns = [
                 x1,

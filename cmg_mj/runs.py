@@ -1,72 +1,26 @@
-"""Running a scenario, comparing observers on it, and writing what comes out."""
+"""What a run and a comparison write."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tomli_w
 
+from cmg_mj.comparison import Compared
+from cmg_mj.distribution_plot import plot_worlds
 from cmg_mj.engine import quiet
-from cmg_mj.experiment import Experiment, load_rig, prepare
-from cmg_mj.observers.protocol import BIAS, extra_signals
-from cmg_mj.plant import Plant
+from cmg_mj.experiment import Experiment
 from cmg_mj.plots import plot_run
 from cmg_mj.run_folder import RunFolder, claimed, write_text
-from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Outcome, Result
+from cmg_mj.standings import standings, worlds_table
+from cmg_mj.summary_keys import finite
 from cmg_mj.trajectory import Trajectory
-
-
-@dataclasses.dataclass(frozen=True)
-class Compared:
-    """One observer's part in a comparison.
-
-    Attributes:
-        experiment: The scenario with this observer in the loop.
-        result: All worlds, without trajectories.
-        example: World 0 once more, with its trajectory.
-    """
-
-    experiment: Experiment
-    result: Result
-    example: Result
-
-    @property
-    def kind(self) -> str:
-        """The observer."""
-        return self.experiment.scenario.observer.kind
-
-    @property
-    def stopped(self) -> list[Outcome]:
-        """The worlds that could not go on, because the observer failed or the plant diverged."""
-        return [outcome for outcome in self.result.outcomes if outcome.kind == "stopped"]
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """Means over the worlds that stood to the end, by the names of a run's summary, and the share of falls."""
-        result, scenario = self.result, self.experiment.scenario
-        worlds = len(result.outcomes)
-        errors = result.values("velocity_rms_error_rad_s")
-        errors = errors[np.isfinite(errors)]
-        return _finite(
-            {
-                "observer": scenario.observer.kind,
-                "seed": scenario.seed,
-                "worlds": worlds,
-                "fell": bool(result.fell.any()),
-                "fell_fraction": float(result.fell.mean()),
-                "stopped_fraction": len(self.stopped) / worlds,
-                "settled_fraction": sum(summary["settle_time_s"] is not None for summary in result.summaries) / worlds,
-                **{key: result.mean(key) for key in result.summaries[0] if key != "companions"},
-                "velocity_rms_error_std_rad_s": float(errors.std(ddof=1)) if len(errors) > 1 else None,
-            }
-        )
+from cmg_mj.worlds_table import save_table
 
 
 def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[str, Any]:
@@ -83,66 +37,7 @@ def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[s
     }
     if outcome.reason:
         summary["reason"] = outcome.reason
-    return _finite(summary | result.summaries[world])
-
-
-def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Experiment]:
-    """Make every observer's experiment ready, on the same plant, pushes and noise.
-
-    Args:
-        scenario: The experiment.
-        observers: Their names.
-
-    Returns:
-        One experiment an observer; `controller.trim_s` counts for those that estimate the bias.
-
-    Raises:
-        InputError: An observer does not exist, or something does not fit.
-    """
-    plant = load_rig(scenario)
-    experiments = [prepare(_untrimmed(scenario.with_observer(kind), plant), plant) for kind in observers]
-    for experiment in experiments:
-        experiment.rehearse(worlds=2)
-    return experiments
-
-
-def _untrimmed(scenario: Scenario, plant: Plant) -> Scenario:
-    """The same without trimming the integrator, if the observer does not estimate the bias that takes."""
-    controller = scenario.controller
-    if not controller.trim_s or BIAS in extra_signals(scenario.observer.make(1.0 / controller.rate_hz, plant.reduced)):
-        return scenario
-    return scenario.model_copy(update={"controller": controller.model_copy(update={"trim_s": 0.0})})
-
-
-def compare(
-    experiments: Sequence[Experiment], worlds: int, on_progress: Callable[[float], None] | None = None
-) -> list[Compared]:
-    """Run every experiment in many worlds, and the first world once more with its trajectory.
-
-    Args:
-        experiments: One an observer.
-        worlds: How many worlds: world i has the same noise for every observer.
-        on_progress: Called now and then with the share done.
-
-    Returns:
-        One entry an observer; fewer if the user interrupted, and those there are complete.
-    """
-    compared = []
-    for i, experiment in enumerate(experiments):
-        duration = experiment.scenario.duration_s
-
-        def report(time: float, done: int = i, duration: float = duration) -> None:
-            if on_progress:
-                on_progress((done + time / duration) / len(experiments))
-
-        result = experiment.run_many(worlds, keep_trajectory=False, on_progress=report)
-        if any(outcome.kind == "interrupted" for outcome in result.outcomes):
-            break
-        example = experiment.run(on_progress=lambda time, report=report, end=duration: report(end))
-        if example.outcomes[0].kind == "interrupted":
-            break
-        compared.append(Compared(experiment, result, example))
-    return compared
+    return finite(summary | result.summaries[world])
 
 
 def files_of_run(*, plot: bool = False) -> list[str]:
@@ -181,19 +76,29 @@ def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *
         return it.write(dict(zip(files_of_run(plot=plot), writers, strict=False)), complete=complete)
 
 
-def files_of_comparison(kinds: Sequence[str]) -> list[str]:
+def files_of_comparison(kinds: Sequence[str], *, plot: bool = False) -> list[str]:
     """Names of what a comparison of these observers writes."""
     trajectories = [f"trajectory-{name}.parquet" for name in file_names(kinds)]
-    return [*trajectories, "summary.json", "scenario.toml", "recording.rrd"]
+    others = ["summary.json", "worlds.parquet", "scenario.toml", "recording.rrd"]
+    return [*trajectories, *others, *(["plot.png"] if plot else [])]
 
 
 @quiet()
-def save_comparison(folder: RunFolder | Path, compared: Sequence[Compared], *, complete: bool = True) -> Path:
-    """Write summary.json, a trajectory an observer, scenario.toml and one recording of world 0 of all of them.
+def save_comparison(
+    folder: RunFolder | Path,
+    experiment: Experiment,
+    compared: Sequence[Compared],
+    *,
+    plot: bool = False,
+    complete: bool = True,
+) -> Path:
+    """Write summary.json, worlds.parquet, scenario.toml, and of world 0 a trajectory an observer and one recording.
 
     Args:
         folder: Where. What is there and was not written by cmg_mj stays.
+        experiment: The one whose scenario runs to the same comparison: `comparison.rerunnable`.
         compared: What was run.
+        plot: Write plot.png as well: how every figure is distributed over the worlds.
         complete: Whether these are all observers that were to be compared.
 
     Returns:
@@ -204,18 +109,15 @@ def save_comparison(folder: RunFolder | Path, compared: Sequence[Compared], *, c
     """
     writers = (
         *(trajectory_with_metadata(entry.experiment, entry.example).save for entry in compared),
-        lambda path: _write_json(path, [entry.summary for entry in compared]),
-        with_own_observer([entry.experiment for entry in compared]).save,
+        lambda path: _write_json(path, standings(compared)),
+        lambda path: save_table(path, worlds_table(compared), {"scenario": experiment.resolved()}),
+        experiment.save,
         lambda path: _record(path, [(entry.experiment, entry.example) for entry in compared]),
+        lambda path: plot_worlds(path, compared, experiment.scenario.title),
     )
-    names = files_of_comparison([entry.kind for entry in compared])
+    names = files_of_comparison([entry.kind for entry in compared], plot=plot)
     with claimed(folder) as it:
-        return it.write(dict(zip(names, writers, strict=True)), complete=complete)
-
-
-def with_own_observer(experiments: Sequence[Experiment]) -> Experiment:
-    """Of those that are compared, the one with the scenario's own observer and its parameters, if it is there."""
-    return next((experiment for experiment in experiments if experiment.scenario.observer.parameters), experiments[0])
+        return it.write(dict(zip(names, writers, strict=False)), complete=complete)
 
 
 def file_names(kinds: Sequence[str]) -> list[str]:
@@ -271,10 +173,3 @@ def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
 
 def _write_json(path: Path, value: Any) -> None:
     write_text(path, json.dumps(value, indent=2))
-
-
-def _finite(value: Any) -> Any:
-    """None for a number that JSON does not know."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -79,6 +79,20 @@ class ObserverSettings(BaseModel):
         return make_observer(self.kind, dt, model, **self.parameters)
 
 
+class CompareSettings(BaseModel):
+    """What `cmg-mj compare` does if it is not told otherwise; other commands do without."""
+
+    model_config = FORBID
+    observers: Annotated[list[str], Field(min_length=1)] | Literal["all"] = "all"
+    """Observers to compare; the scenario's own with its parameters, the others with their defaults."""
+    worlds: Annotated[int, Field(ge=1)] = 20
+    """Runs an observer."""
+
+    def names(self) -> list[str]:
+        """The observers, spelled out."""
+        return list(OBSERVERS) if self.observers == "all" else list(dict.fromkeys(self.observers))
+
+
 class Scenario(BaseModel):
     """One experiment."""
 
@@ -94,6 +108,8 @@ class Scenario(BaseModel):
     sensors: Sensors = Field(default_factory=Sensors)
     push: list[Push] = Field(default_factory=list)
     metrics: MetricsSettings = Field(default_factory=MetricsSettings)
+    compare: CompareSettings | None = None
+    """Written by `cmg-mj compare`, so that its scenario runs to the same comparison."""
     versions: dict[str, str] = Field(default_factory=dict)
     """Written by a run, not read."""
     _where: str = PrivateAttr("")

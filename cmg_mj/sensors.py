@@ -17,6 +17,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, digitise
 from cmg_mj.fields import STRICT, Instant, NonNegative, Positive, Rate
+from cmg_mj.mems_gyro import MemsGyro
 from cmg_mj.timing import steps_until, whole_steps
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
@@ -174,11 +175,13 @@ class Sensors:
         accelerometer: The two accelerometers of the tilt estimate.
         encoder: The gimbals' encoders.
         fog: The fibre-optic gyro.
+        mems_gyro: A cheap gyro that estimates are judged beside; nothing else uses it.
     """
 
     accelerometer: Accelerometer = Field(default_factory=Accelerometer)
     encoder: Encoder = Field(default_factory=Encoder)
     fog: Fog = Field(default_factory=Fog)
+    mems_gyro: MemsGyro = Field(default_factory=MemsGyro)
 
 
 def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) -> Iterator[Sequence[Scalar]]:

@@ -8,7 +8,7 @@ import statistics
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -20,10 +20,15 @@ from cmg_mj.metrics import Metrics, MetricsSettings
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
+from cmg_mj.references import REFERENCES, References
 from cmg_mj.rows import Rows
 from cmg_mj.timing import whole_steps
 from cmg_mj.trajectory import Trajectory
 from cmg_mj.worlds import ManyWorlds, OneWorld
+from cmg_mj.worlds_table import as_table, riding_along, world_rows
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 A_TURN = 2.0 * math.pi
 """No rig that stood at the last look lies a whole turn farther at the next one: its numbers have gone [rad]."""
@@ -60,12 +65,18 @@ class Result:
         summaries: Each world's numbers, (n_worlds,).
         trajectory: All ticks, if they were kept.
         seconds: Simulated time of the longest world [s].
+        observers: The observer in the loop, then the companions.
+        seed: Seed of the sensors' noise.
+        worlds: The worlds' numbers, (n_worlds,).
     """
 
     outcomes: list[Outcome]
     summaries: list[dict[str, Any]]
     trajectory: Trajectory | None = None
     seconds: float = 0.0
+    observers: Sequence[str] = ("",)
+    seed: int = 0
+    worlds: Sequence[int] = ()
 
     @property
     def stood(self) -> np.ndarray:
@@ -82,7 +93,7 @@ class Result:
 
         Args:
             key: The summary's key, such as `velocity_rms_error_rad_s`.
-            companion: Whose, of the observers that rode along; None for the one in the loop.
+            companion: Whose, of what rode along: a companion, `zero` or `mems_gyro`; None for the observer in the loop.
 
         Returns:
             (n_worlds,); NaN for a world that did not stand to the end, or has no such number.
@@ -92,10 +103,10 @@ class Result:
         """
         of = self.summaries
         if companion is not None:
-            riding = self.summaries[0].get("companions", {})
+            riding = riding_along(self.summaries[0])
             if companion not in riding:
                 raise InputError(f"companion {companion!r}: did not ride along; {nearest(companion, riding)}")
-            of = [summary["companions"][companion] for summary in of]
+            of = [riding_along(summary)[companion] for summary in of]
         if key not in of[0]:
             raise InputError(f"{key!r}: not in the summary; {nearest(key, of[0])}")
         numbers = np.array([math.nan if s[key] is None else s[key] for s in of], dtype=float)
@@ -106,6 +117,22 @@ class Result:
         values = self.values(key, companion)
         known = values[np.isfinite(values)]
         return statistics.fmean(known) if len(known) else None
+
+    def rows(self, who: str | None = None) -> list[dict[str, Any]]:
+        """One observer's rows of `table`: that in the loop, or something that rode along."""
+        loop = self.observers[0]
+        worlds = self.worlds or range(len(self.outcomes))
+        return world_rows(loop, who or loop, self.seed, worlds, self.outcomes, self.summaries)
+
+    def table(self) -> pa.Table:
+        """Every world kept: a row per observer and world, those that rode along after the one in the loop.
+
+        Returns:
+            Columns `observer`, `rides_along_in`, `world`, `seed`, `outcome`, `stood`, `end_time_s`, `reason`, then
+            every figure of the summary, null where there is none. Where `stood` is false they are those until the end.
+        """
+        names = [self.observers[0], *riding_along(self.summaries[0])]
+        return as_table(row for name in names for row in self.rows(name))
 
     def groups(self, count: int) -> list[Result]:
         """The worlds in so many groups of equal size, in their order, as `run_many` was given them."""
@@ -122,6 +149,9 @@ class Result:
                 self.summaries[part],
                 None if self.trajectory is None else self.trajectory.of_worlds(part),
                 max(outcome.time_s for outcome in self.outcomes[part]),
+                self.observers,
+                self.seed,
+                self.worlds[part],
             )
             for part in parts
         ]
@@ -191,11 +221,12 @@ def simulate(
     steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
     worlds: Any = OneWorld(rig) if single else ManyWorlds(plants)
     fall = np.radians(settings.fall_angle_deg).item()
-    push_end = max((push.end_s for push in pushes), default=0.0)
     dt = controller.law.dt
     targets = {BIAS: [rig.apparent_bias(controller.sensors.accelerometer) for rig in plants]}
-    metrics = Metrics(observers, len(plants), dt, push_end, controller.law.rate_limit, settings, targets)
-    rows = Rows(plants, observers, controller.extra_signals, metrics, dt, keep=keep_trajectory, single=single)
+    limit = controller.law.rate_limit
+    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, REFERENCES)
+    beside = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds)
+    rows = Rows(plants, observers, controller.extra_signals, metrics, beside, dt, keep=keep_trajectory, single=single)
     ends: list[Outcome | None] = [None] * len(plants)
     native = driver == "native"
     torque = 0.0
@@ -246,7 +277,9 @@ def simulate(
     rows.flush()
     outcomes = [end or Outcome("done", duration_s) for end in ends]
     summaries = [metrics.summary(i, outcome.kind == "done") for i, outcome in enumerate(outcomes)]
-    return Result(outcomes, summaries, rows.trajectory(), max(o.time_s for o in outcomes))
+    numbers = (controller.worlds,) if isinstance(controller.worlds, int) else tuple(controller.worlds)
+    longest = max(outcome.time_s for outcome in outcomes)
+    return Result(outcomes, summaries, rows.trajectory(), longest, tuple(observers), controller.seed, numbers)
 
 
 def _stop_blind(worlds: ManyWorlds, tick: Tick, ends: list[Outcome | None], time: float) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import math
+from typing import Any, Literal, NamedTuple
 
 
 class Key(NamedTuple):
@@ -13,12 +14,14 @@ class Key(NamedTuple):
         unit: Empty for none.
         pattern: How it is written.
         compared: Whether it is a column where observers are compared, which has room for a few.
+        better: Which values are; empty where it is neither good nor bad.
     """
 
     label: str
     unit: str
     pattern: str
     compared: bool = True
+    better: Literal["less", "more", ""] = "less"
 
     @property
     def heading(self) -> str:
@@ -28,18 +31,26 @@ class Key(NamedTuple):
 
 KEYS = {
     "velocity_rms_error_rad_s": Key("velocity RMS error", "rad/s", "{:.4f}"),
-    "velocity_rms_error_fog_rad_s": Key("error against the gyro", "rad/s", "{:.4f}"),
+    "velocity_rms_error_push_rad_s": Key("error in push window", "rad/s", "{:.4f}"),
+    "velocity_rms_error_fog_rad_s": Key("error against the gyro", "rad/s", "{:.4f}", compared=False),
+    "velocity_rms_rad_s": Key("true velocity RMS", "rad/s", "{:.4f}", better=""),
+    "velocity_fit": Key("fit", "", "{:.2f}", better="more"),
+    "velocity_fit_push": Key("fit in push window", "", "{:.2f}", better="more"),
     "tilt_rms_deg": Key("tilt RMS", "deg", "{:.3f}"),
     "settle_time_s": Key("settle time", "s", "{:.2f}"),
     "gimbal_peak_deg": Key("gimbal peak", "deg", "{:.1f}"),
     "command_rms_rad_s": Key("command RMS", "rad/s", "{:.3f}"),
-    "command_saturated_fraction": Key("command limited", "", "{:.1%}"),
+    "command_saturated_fraction": Key("command limited", "", "{:.1%}", compared=False),
     "bias_estimate_deg": Key("bias found", "deg", "{:.4f}", compared=False),
     "bias_rms_error_deg": Key("bias RMS error", "deg", "{:.4f}", compared=False),
-    "fell_fraction": Key("fell", "", "{:.0%}"),
-    "stopped_fraction": Key("stopped", "", "{:.0%}"),
+    "fell_fraction": Key("fell", "", "{:.0%}", better=""),
+    "stopped_fraction": Key("stopped", "", "{:.0%}", better=""),
 }
 """Summary key -> what it is. In this order they stand in every table."""
+
+
+NESTED = ("companions", "references")
+"""Parts of a summary that hold the figures of what rode along, by name."""
 
 
 def heading(key: str) -> str:
@@ -50,3 +61,20 @@ def heading(key: str) -> str:
 def written(key: str, value: Any) -> str:
     """A summary's number as tables show it; a dash where there is none."""
     return "-" if value is None else KEYS[key].pattern.format(value)
+
+
+def spread(key: str, half: float | None) -> str:
+    """Half the width of a number's interval as tables show it; nothing where there is none."""
+    return "" if half is None else "±" + KEYS[key].pattern.format(half)
+
+
+def difference(key: str, value: float | None) -> str:
+    """A difference of two numbers as tables show it, with its sign."""
+    return "-" if value is None else KEYS[key].pattern.replace("{:", "{:+").format(value)
+
+
+def finite(value: Any) -> Any:
+    """None for a number that JSON does not know."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -14,12 +14,14 @@ from pathlib import Path
 import pytest
 import tomli_w
 from click.testing import CliRunner
+from rich.table import Table
 
-from cmg_mj import load_scenario, runs
+from cmg_mj import comparison, load_scenario
 from cmg_mj.cli import cli
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.report import columns_of, comparison_table
 from cmg_mj.resources import bundled
+from cmg_mj.standings import standings
 from tests.command import COMMAND, cmg_mj, cmg_mj_process, environment
 from tests.run_folders import assert_whole
 
@@ -204,7 +206,7 @@ def test_compare_prints_a_list_of_summaries(quick: str) -> None:
     said = cmg_mj("compare", quick, "--observers", "ltv, linear,ltv", "--worlds", 2, "--json")
     assert (said.status, said.err) == (0, "")
     compared = json.loads(said.out)
-    assert [entry["observer"] for entry in compared] == ["ltv", "linear"]
+    assert [entry["observer"] for entry in compared] == ["ltv", "linear", "zero", "mems_gyro"]
     assert all([key for key in entry if key in SUMMARY] == SUMMARY for entry in compared)
     assert json.loads(Path("runs/quick-compare-0/summary.json").read_text()) == compared
 
@@ -232,10 +234,11 @@ def test_two_observers_of_the_bias_fit_too() -> None:
 
 def test_compare_prints_markdown(quick: str) -> None:
     said = cmg_mj("compare", quick, "--worlds", 1, "--observers", "linear", "--markdown")
-    header, line, row = said.out.splitlines()
+    header, line, row, zero, *_ = said.out.splitlines()
     assert re.match(r"\| observer +\| +velocity RMS error \[rad/s\] \|", header)
-    assert line.count("|") == header.count("|") == row.count("|")
+    assert line.count("|") == header.count("|") == row.count("|") == zero.count("|")
     assert re.match(r"\| `linear` +\| +0\.", row)
+    assert re.match(r"\| `zero` +\| +0\.", zero)
 
 
 def test_numbers_that_there_are_not() -> None:
@@ -243,15 +246,20 @@ def test_numbers_that_there_are_not() -> None:
     Path("my.toml").write_text("duration_s = 1.0\n[plant]\nequilibrium_bias_deg = 30.0")
     said = cmg_mj("compare", "my.toml", "--worlds", 1, "--observers", "linear", "--out", "it")
     assert said.status == 0
-    assert re.search(r"^ linear( +-){7} +100%$", said.out, re.MULTILINE)
+    assert re.search(r"^ linear( +-){9} +100%$", said.out, re.MULTILINE)
+    assert "zero" not in said.out.splitlines()  # nothing stood, on whose motion it could ride along
     (summary,) = json.loads(Path("it/summary.json").read_text())
     assert (summary["fell"], summary["tilt_rms_deg"]) == (True, None)
 
 
 def test_every_column_is_of_a_key_there_is(quick: str) -> None:
-    (entry,) = runs.compare(runs.prepare_comparison(load_scenario(quick), ["linear"]), 1)
-    assert {"velocity_rms_error_rad_s", "tilt_rms_deg", "fell_fraction"} <= set(columns_of([entry.summary]))
-    assert comparison_table([entry.summary], "").row_count == 1
+    compared = comparison.compare(comparison.prepare_comparison(load_scenario(quick), ["linear"]), 1)
+    summaries = standings(compared)
+    columns = columns_of(summaries)
+    assert {"velocity_rms_error_rad_s", "velocity_fit", "tilt_rms_deg", "fell_fraction"} <= set(columns)
+    table = comparison_table(summaries, "").renderables[0]
+    assert isinstance(table, Table)
+    assert (len(table.columns), table.row_count) == (1 + len(columns), 3)
 
 
 # --- bench ---------------------------------------------------------------------------------------------------

@@ -157,9 +157,15 @@ def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
     )
     assert said.status == 130, said
     assert said.err.splitlines()[-1] == "cmg-mj: interrupted; 1 of 3 observers are in it"
-    assert names("it") == ["recording.rrd", "scenario.toml", "summary.json", "trajectory-linear.parquet"]
-    (entry,) = json.loads(Path("it/summary.json").read_text())
-    assert entry["observer"] == "linear"
+    assert names("it") == [
+        "recording.rrd",
+        "scenario.toml",
+        "summary.json",
+        "trajectory-linear.parquet",
+        "worlds.parquet",
+    ]
+    observers = [entry["observer"] for entry in json.loads(Path("it/summary.json").read_text())]
+    assert observers == ["linear", "zero", "mems_gyro"]
 
 
 def test_before_the_first_observer_is_done_leaves_nothing() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.metrics import Metrics, MetricsSettings
+from cmg_mj.push import Push, push_windows
 
 DT = 0.01
 DEG = math.radians(1.0)
@@ -18,10 +19,17 @@ T = np.arange(2000) * DT
 SIGNALS = ("x1", "x2", "x3", "u", "fog")
 
 
-def metrics(n_worlds: int = 1, push_end_s: float = 0.0, observers: tuple = ("mine",), **settings: Any) -> Metrics:
-    return Metrics(
-        observers, n_worlds, DT, push_end_s, 4.7, MetricsSettings(**settings), {"bias_rad": [0.0] * n_worlds}
-    )
+def metrics(
+    n_worlds: int = 1,
+    push_end_s: float = 0.0,
+    observers: tuple = ("mine",),
+    pushes: tuple = (),
+    references: tuple = (),
+    **settings: Any,
+) -> Metrics:
+    pushes = pushes or ((Push(push_end_s - 0.1, 0.1),) if push_end_s else ())
+    targets = {"bias_rad": [0.0] * n_worlds}
+    return Metrics(observers, n_worlds, DT, pushes, 4.7, MetricsSettings(**settings), targets, references)
 
 
 def rows(values: Any, n: int) -> np.ndarray:
@@ -29,12 +37,17 @@ def rows(values: Any, n: int) -> np.ndarray:
     return np.broadcast_to(np.asarray(values, dtype=float), (n,))[:, None]
 
 
+def still(n: int) -> dict[str, Any]:
+    """Signals of a rig that does not move."""
+    return {name: rows(0.0, n) for name in SIGNALS}
+
+
 def estimates(rates: Iterable[np.ndarray]) -> list[dict[str, np.ndarray]]:
     return [{"x2_rad_s": rate} for rate in rates]
 
 
 def summary(of: Metrics, n: int = len(T), fell: bool = False, rates: tuple = (0.0,), **signals: Any) -> dict[str, Any]:
-    given = {name: rows(signals.get(name, 0.0), n) for name in SIGNALS}
+    given: dict[str, Any] = {name: rows(signals.get(name, 0.0), n) for name in SIGNALS}
     of.update(**given, estimates=[{"x2_rad_s": rows(rate, n)} for rate in rates])
     return of.summary(0, stood=not fell)
 
@@ -98,6 +111,80 @@ def test_each_observer_has_its_own_errors() -> None:
     assert "companions" not in summary(metrics())
 
 
+# --- what an estimate is worth --------------------------------------------------------------------------------
+
+
+def test_fit_is_one_less_error_by_motion() -> None:
+    w = math.pi  # ten whole periods
+    found = summary(metrics(observers=("mine", "hers")), x2=0.5 * np.cos(w * T), rates=(0.4 * np.cos(w * T), 0.0))
+    assert found["velocity_rms_rad_s"] == pytest.approx(0.5 / math.sqrt(2.0), rel=1e-12)
+    assert found["velocity_fit"] == pytest.approx(0.8, rel=1e-12)
+    assert found["companions"]["hers"]["velocity_fit"] == 0.0  # an estimate of zero
+    assert found["companions"]["hers"]["velocity_rms_rad_s"] == found["velocity_rms_rad_s"]
+
+
+def test_fit_is_less_than_zero_where_zero_would_do_better() -> None:
+    assert summary(metrics(), x2=0.5, rates=(-1.0,))["velocity_fit"] == pytest.approx(-2.0)
+
+
+def test_without_a_motion_there_is_no_fit() -> None:
+    found = summary(metrics(), rates=(0.1,))
+    assert (found["velocity_rms_rad_s"], found["velocity_fit"]) == (0.0, None)
+
+
+def push_error(pushes: tuple, error: np.ndarray, n: int = len(T)) -> float | None:
+    """Error over the push windows of an estimate that is off by this, with a motion that must not matter."""
+    x2 = np.sin(T)[:n]
+    found = summary(metrics(pushes=pushes, observers=("a", "b")), n, x2=x2, rates=(x2 + error[:n], x2))
+    assert found["companions"]["b"]["velocity_rms_error_push_rad_s"] in (0.0, None)
+    return found["velocity_rms_error_push_rad_s"]
+
+
+def test_the_push_window_is_from_its_start_to_a_second_after_its_end() -> None:
+    """110 ticks from 2 s, included, to 3.1 s, excluded."""
+    assert push_error((Push(2.0, 0.1),), np.where((T > 1.995) & (T < 3.095), 3.0, 50.0)) == pytest.approx(3.0)
+    for tick in (200, 309):
+        assert push_error((Push(2.0, 0.1),), np.where(np.arange(len(T)) == tick, 1.0, 0.0)) == pytest.approx(110**-0.5)
+    for tick in (199, 310):
+        assert push_error((Push(2.0, 0.1),), np.where(np.arange(len(T)) == tick, 1.0, 0.0)) == 0.0
+
+
+def test_what_two_pushes_share_counts_once() -> None:
+    """2 to 3.1 s and 2.5 to 4 s are 2 to 4 s; 6 to 7.05 s stands alone. What is between them does not count."""
+    pushes = (Push(6.0, 0.05), Push(2.5, 0.5), Push(2.0, 0.1))
+    within = ((T > 1.995) & (T < 3.995)) | ((T > 5.995) & (T < 7.045))
+    assert push_error(pushes, np.where(within, 0.0, 9.0)) == 0.0
+    assert push_error(pushes, np.where((T > 2.495) & (T < 3.095), 1.0, 0.0)) == pytest.approx(math.sqrt(60 / 305))
+
+
+def test_a_push_within_another_adds_nothing() -> None:
+    assert push_windows([Push(1.0, 3.0), Push(2.0, 0.1)]) == [(1.0, 5.0)]
+    assert push_windows([]) == []
+
+
+def test_without_a_push_there_is_no_push_error() -> None:
+    assert push_error((), T) is None
+
+
+def test_a_run_that_ends_within_the_window_is_judged_until_there() -> None:
+    error = np.where(T < 2.495, 2.0, 7.0)
+    assert push_error((Push(2.0, 0.1),), error, 250) == pytest.approx(2.0)
+    assert push_error((Push(2.0, 0.1),), error, 200) is None
+
+
+def test_references_are_judged_as_companions_are() -> None:
+    of = metrics(references=("zero",), pushes=(Push(2.0, 0.1),))
+    x2 = rows(np.sin(T), len(T))
+    of.update(**still(len(T)) | {"x2": x2}, estimates=estimates([x2]), references={"zero": 0.0 * x2})
+    found = of.summary(0, stood=True)
+    assert list(found["references"]) == ["zero"]
+    assert found["references"]["zero"]["velocity_rms_error_rad_s"] == found["velocity_rms_rad_s"]
+    assert found["references"]["zero"]["velocity_fit"] == 0.0
+    assert found["references"]["zero"]["velocity_rms_error_push_rad_s"] == pytest.approx(
+        math.sqrt(np.mean(np.sin(T[200:310]) ** 2)), rel=1e-12
+    )
+
+
 # --- settle time -------------------------------------------------------------------------------------------
 
 
@@ -150,9 +237,9 @@ def test_a_run_that_ends_before_its_push_does_not_settle() -> None:
 # --- pieces, worlds and ends -------------------------------------------------------------------------------
 
 
-def restless(n: int, n_worlds: int) -> dict[str, np.ndarray]:
+def restless(n: int, n_worlds: int) -> dict[str, Any]:
     rng = np.random.default_rng(9)
-    signals = {name: rng.normal(0.0, 1.0, (n, n_worlds)) for name in SIGNALS}
+    signals: dict[str, Any] = {name: rng.normal(0.0, 1.0, (n, n_worlds)) for name in SIGNALS}
     signals["x1"] *= 3.0 * DEG * np.linspace(1.0, 0.1, n)[:, None]
     signals["u"] = np.clip(4.0 * signals["u"], -4.7, 4.7)
     return signals
@@ -225,12 +312,12 @@ def test_an_estimate_that_is_not_finite_gives_none_not_nan() -> None:
 
 def test_bias_is_judged_from_its_time_on() -> None:
     """Far off at first, then 0.3 degrees above and below 1.1 in turn, with 1.0 to be found: RMS of 0.4 and -0.2."""
-    of = Metrics(("adaptive", "other"), 1, DT, 0.0, 4.7, MetricsSettings(bias_from_s=5.0), {"bias_rad": [DEG]})
+    of = Metrics(("adaptive", "other"), 1, DT, (), 4.7, MetricsSettings(bias_from_s=5.0), {"bias_rad": [DEG]})
     bias = np.where(T < 5.0 - DT / 2.0, 90.0 * DEG, (1.1 + 0.3 * (-1.0) ** np.arange(len(T))) * DEG)
     for part in np.array_split(np.arange(len(T)), 7):
         n = len(part)
-        still, found = {"x2_rad_s": rows(0.0, n)}, {"bias_rad": rows(bias[part], n)}
-        of.update(**{name: rows(0.0, n) for name in SIGNALS}, estimates=[still | found, still])
+        rate, found = {"x2_rad_s": rows(0.0, n)}, {"bias_rad": rows(bias[part], n)}
+        of.update(**still(n), estimates=[rate | found, rate])
     found = of.summary(0, stood=True)
     assert found["bias_deg"] == pytest.approx(1.0)
     assert found["bias_estimate_deg"] == pytest.approx(1.1, rel=1e-12)
@@ -241,7 +328,7 @@ def test_bias_is_judged_from_its_time_on() -> None:
 def test_a_run_that_ends_before_has_no_bias_figures() -> None:
     of = metrics(bias_from_s=5.0)
     estimate = {"x2_rad_s": rows(0.0, 100), "bias_rad": rows(0.1, 100)}
-    of.update(**{name: rows(0.0, 100) for name in SIGNALS}, estimates=[estimate])
+    of.update(**still(100), estimates=[estimate])
     found = of.summary(0, stood=True)
     assert found["bias_estimate_deg"] is None
     assert found["bias_rms_error_deg"] is None

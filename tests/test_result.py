@@ -49,6 +49,39 @@ def test_worlds_vary_and_those_that_fell_do_not_count() -> None:
     assert companion[1] == found.summaries[1]["companions"]["linear"][ERROR]
 
 
+def test_the_table_has_a_row_per_observer_and_world() -> None:
+    table = result().table()
+    assert table["observer"].to_pylist() == [
+        name for name in ("homogeneous", "linear", "zero", "mems_gyro") for _ in BIASES
+    ]
+    assert table["rides_along_in"].to_pylist() == [None] * 4 + ["homogeneous"] * 12
+    assert table["world"].to_pylist() == [0, 1, 2, 3] * 4
+    assert table["stood"].to_pylist() == [True, True, False, False] * 4
+    assert table["outcome"].to_pylist() == ["done", "done", "fell", "fell"] * 4
+    assert table["end_time_s"].to_pylist() == [outcome.time_s for outcome in result().outcomes] * 4
+    for world, row in enumerate(table.slice(0, 4).to_pylist()):
+        summary = result().summaries[world]
+        assert {key: row[key] for key in summary if key in row} == {k: v for k, v in summary.items() if k in row}
+        assert set(summary) - set(row) == {"companions", "references"}
+    assert table[ERROR].to_pylist()[4:8] == [s["companions"]["linear"][ERROR] for s in result().summaries]
+    assert set(table["tilt_rms_deg"].to_pylist()[4:]) == {None}  # the loop's alone
+
+
+def test_the_table_of_a_group_and_of_one_world() -> None:
+    _, fell = result().groups(2)
+    assert fell.table()["world"].to_pylist()[:2] == [2, 3]
+    alone = experiment().run(world=5, keep_trajectory=False).table()
+    assert alone["world"].to_pylist() == [5] * 4
+    assert alone["seed"].to_pylist() == [0] * 4
+
+
+def test_references_have_values_too() -> None:
+    zero = result().values(ERROR, "zero")
+    assert zero[0] == result().summaries[0]["velocity_rms_rad_s"]
+    assert np.isnan(zero).tolist() == [False, False, True, True]
+    assert (result().values("velocity_fit", "mems_gyro")[:2] > 0.9).all()
+
+
 def test_groups_are_the_worlds_in_their_order() -> None:
     stood, fell = result().groups(2)
     assert stood.stood.all()

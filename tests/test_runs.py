@@ -12,9 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 
-from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare, runs
+from cmg_mj import Estimate, Measurement, comparison, load_scenario, parse_scenario, prepare, runs
 from cmg_mj.errors import InputError
 from cmg_mj.resources import folder
 from cmg_mj.simulate import Outcome
@@ -165,12 +166,12 @@ def test_a_comparison_of_one_world_equals_single_runs() -> None:
     assert (said.status, said.err) == (0, "")
     compared = json.loads(said.out)
     assert json.loads(Path("it/summary.json").read_text()) == compared
-    assert [entry["observer"] for entry in compared] == ["ltv", "homogeneous", mine]
-    for entry, name in zip(compared, ("ltv", "homogeneous", "Mine"), strict=True):
+    assert [entry["observer"] for entry in compared] == ["ltv", "homogeneous", mine, "zero", "mems_gyro"]
+    for entry, name in zip(compared, ("ltv", "homogeneous", "Mine"), strict=False):
         single = json.loads(cmg_mj("run", file, "--observer", entry["observer"], "--json", "--out", name).out)
         shared = {key: entry[key] for key in single.keys() & entry.keys()}
         assert shared == {key: single[key] for key in shared}
-        assert len(shared) == 10
+        assert len(shared) == 14
         columns = Trajectory.load(Path(f"it/trajectory-{name}.parquet")).columns
         assert all(
             (columns[key] == values).all()
@@ -183,13 +184,14 @@ def test_a_comparison_of_one_world_equals_single_runs() -> None:
         "trajectory-Mine.parquet",
         "trajectory-homogeneous.parquet",
         "trajectory-ltv.parquet",
+        "worlds.parquet",
     ]
 
 
 def test_a_comparison_of_many_worlds() -> None:
     """Means over the worlds that stood, and how they spread."""
     experiment = prepare(load_scenario(write("duration_s = 0.5")))
-    (entry,) = runs.compare([experiment], 3)
+    (entry,) = comparison.compare([experiment], 3)
     singles = [experiment.run(world=world).summaries[0] for world in range(3)]
     for key in ("velocity_rms_error_rad_s", "tilt_rms_deg", "settle_time_s"):
         assert entry.summary[key] == pytest.approx(sum(single[key] for single in singles) / 3, rel=1e-12)
@@ -200,7 +202,7 @@ def test_a_comparison_of_many_worlds() -> None:
 def test_a_comparison_reports_progress_from_nothing_to_all() -> None:
     experiment = prepare(load_scenario(write("duration_s = 3.0\n[controller]\nfeedback = 'truth'")))
     shares: list[float] = []
-    runs.compare([experiment, experiment], 1, shares.append)
+    comparison.compare([experiment, experiment], 1, shares.append)
     assert shares == sorted(shares)
     assert 0.0 < shares[0] < 0.5 < shares[-1] <= 1.0
 
@@ -212,8 +214,52 @@ def test_observers_of_one_name_from_two_places_do_not_overwrite_each_other() -> 
 def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
     """Those without one run untrimmed; alone, they are refused (tests/bad_input/)."""
     scenario = load_scenario("bias_estimation", ["duration_s=0.5"])
-    experiments = runs.prepare_comparison(scenario, ["linear", "adaptive", "homogeneous_adaptive"])
+    experiments = comparison.prepare_comparison(scenario, ["linear", "adaptive", "homogeneous_adaptive"])
     assert [experiment.scenario.controller.trim_s for experiment in experiments] == [0.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "observers", "same"),
+    [
+        ("push_recovery", "linear,ltv", ["linear", "ltv"]),  # without the scenario's own observer
+        ("bias_estimation", f"linear,{__name__}:Mine,adaptive", ["linear", f"{__name__}:Mine", "adaptive"]),  # trimmed
+    ],
+)
+def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, observers: str, same: list[str]) -> None:
+    settings = ["--set", "duration_s=0.4", "--set", "push=[]", "--set", "plant.equilibrium_bias_deg=0.3"]
+    first = cmg_mj("compare", scenario, "--observers", observers, "--worlds", 2, "--out", "a", "--json", *settings)
+    assert first.status == 0, first.err
+    again = cmg_mj("compare", "a/scenario.toml", "--out", "b", "--json")
+    assert (again.status, again.err) == (0, "")
+    assert again.out == first.out
+    assert [row["observer"] for row in json.loads(again.out)][:-2] == same
+    assert pq.read_table("a/worlds.parquet").equals(pq.read_table("b/worlds.parquet"))
+    written = tomllib.loads(Path("a/scenario.toml").read_text(encoding="utf-8"))
+    assert written == tomllib.loads(Path("b/scenario.toml").read_text(encoding="utf-8"))
+    assert written["compare"] == {"observers": same, "worlds": 2}
+
+
+def test_options_come_before_what_the_scenario_says_to_compare() -> None:
+    file = write("duration_s = 0.2\n[compare]\nobservers = ['ltv', 'linear', 'ltv']\nworlds = 3")
+    plain = json.loads(cmg_mj("compare", file, "--json").out)
+    assert [(row["observer"], row["worlds"]) for row in plain[:-2]] == [("ltv", 3), ("linear", 3)]
+    other = json.loads(cmg_mj("compare", file, "--json", "--observers", "homogeneous", "--worlds", 1).out)
+    assert [(row["observer"], row["worlds"]) for row in other[:-2]] == [("homogeneous", 1)]
+    fewer = json.loads(cmg_mj("compare", file, "--json", "--set", "compare.worlds=2").out)
+    assert fewer[0]["worlds"] == 2
+
+
+def test_run_says_that_it_does_not_compare() -> None:
+    said = cmg_mj("run", write("duration_s = 0.2\n[compare]\nworlds = 3"), "--json")
+    assert (said.status, said.err) == (0, "cmg-mj: [compare] is for cmg-mj compare; this is one run\n")
+    assert json.loads(said.out)["observer"] == "homogeneous"
+
+
+def test_a_comparison_is_drawn_if_it_is_asked_for() -> None:
+    file = write("duration_s = 1.0\n[plant]\nequilibrium_bias_deg = 6.0")
+    said = cmg_mj("compare", file, "--observers", "linear,luenberger", "--worlds", 3, "--plot", "--out", "it")
+    assert said.status == 0
+    assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
 
 
 # --- letters -------------------------------------------------------------------------------------------------

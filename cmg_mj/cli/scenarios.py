@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, check_observer, names_of, of_a_run, of_observers
+from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, check_observer, names_of, of_a_run
 from cmg_mj.cli.terminal import (
     INTERRUPTED,
     WRONG_INPUT,
@@ -50,6 +50,8 @@ def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
     scenario = chosen.scenario(observer)
     experiment = prepare(scenario)
     say_hints(experiment.hints)
+    if scenario.compare:
+        say("[compare] is for cmg-mj compare; this is one run")
     kind = runs.file_name(scenario.observer.kind)
     default = f"{Path(chosen.name).stem}-{kind}-{scenario.seed}"
     folder = chosen.folder(default, runs.files_of_run(plot=plot), experiment)
@@ -74,46 +76,60 @@ def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
 
 
 @click.command(short_help="Run several observers on the same plant, pushes and noise.")
-@of_observers
+@click.option(
+    "--observers",
+    metavar="NAMES",
+    help="Names with commas between, or all; your own as package.module:Class.  "
+    "[default: the scenario's [compare], or all]",
+)
 @of_a_run
 @click.option(
     "--worlds",
     type=click.IntRange(1, MOST_WORLDS),
-    default=20,
-    show_default=True,
     metavar="N",
-    help="Runs an observer, each with noise of its own; all observers get the same.",
+    help="Runs an observer, each with noise of its own; all observers get the same.  "
+    "[default: the scenario's [compare], or 20]",
 )
-@click.option("--markdown", is_flag=True, help="Print the table as Markdown.")
+@click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
+@click.option("--plot", is_flag=True, help="Write plot.png as well: every figure over the worlds.")
 @users_code()
-def compare(chosen: Chosen, observers: str, worlds: int, markdown: bool) -> None:
+def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown: bool, plot: bool) -> None:
     """Run several observers on the same plant, pushes and noise: one table, one recording.
 
-    The table has the means over the worlds that stood to the end; the recording has world 0 of every observer.
+    The table has the means over the worlds that stood to the end, with 95 % intervals, and the differences to the best,
+    world by world. worlds.parquet has a row per observer and world; the recording has world 0 of every observer, and
+    scenario.toml runs to the same comparison: cmg-mj compare FOLDER/scenario.toml.
     """
-    from cmg_mj import report, runs
+    from cmg_mj import comparison, report, runs
+    from cmg_mj.schema import CompareSettings
+    from cmg_mj.standings import standings
 
-    names = names_of(observers)
+    names = None if observers is None else names_of(observers)
     scenario = chosen.scenario()
+    asked = scenario.compare or CompareSettings()
+    names, worlds = names or asked.names(), worlds or asked.worlds
+    for name in names:
+        check_observer("compare.observers:", name)
     for setting in chosen.settings:
         if setting.startswith("observer.") and scenario.observer.kind not in names:
             raise InputError(
                 f"--set {setting}: is a setting of {scenario.observer.kind}, which is not among "
-                f"--observers {observers}; the others are compared with their default parameters"
+                f"--observers {','.join(names)}; the others are compared with their default parameters"
             )
-    experiments = runs.prepare_comparison(scenario, names)
-    own = runs.with_own_observer(experiments)
+    experiments = comparison.prepare_comparison(scenario, names)
+    own = comparison.rerunnable(scenario, experiments, worlds)
     say_hints(own.hints)
-    folder = chosen.folder(f"{Path(chosen.name).stem}-compare-{scenario.seed}", runs.files_of_comparison(names), own)
+    files = runs.files_of_comparison(names, plot=plot)
+    folder = chosen.folder(f"{Path(chosen.name).stem}-compare-{scenario.seed}", files, own)
     with CtrlC() as ctrl_c:
         with progress(f"{scenario.title or chosen.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
-            compared = runs.compare(experiments, worlds, on_progress)
+            compared = comparison.compare(experiments, worlds, on_progress)
         if not compared:
             say("interrupted before the first observer was done; nothing was written")
             sys.exit(INTERRUPTED)
-        summaries = [entry.summary for entry in compared]
+        summaries = standings(compared)
         try:
-            place = runs.save_comparison(folder, compared, complete=len(compared) == len(names))
+            place = runs.save_comparison(folder, own, compared, plot=plot, complete=len(compared) == len(names))
         finally:
             title = f"{scenario.title or chosen.name}: {worlds} worlds an observer, seed {scenario.seed}"
             table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
