@@ -17,6 +17,8 @@ from cmg_mj.fields import STRICT, NonNegative, Positive
 CORNERS_HZ = (0.01, 0.1, 1.0, 10.0)
 """Corner frequencies of the Gauss-Markov processes whose sum is the 1/f noise: one a decade, so it waves by 6 %.
 Above 15 Hz the white noise is the larger."""
+PIECE = 1000
+"""So many samples before the run are made together, whatever the rate."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -44,7 +46,7 @@ class MemsGyro:
     bias_instability_deg_h: NonNegative = 82.0
     scale_error: Annotated[float, Field(gt=-1.0, lt=1.0)] = 0.03
     bias_deg_s: float = 0.0
-    calibration_s: Annotated[float, Field(ge=0.0, le=60.0)] = 1.0
+    calibration_s: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
     range_deg_s: Positive = 250.0
     counts_per_deg_s: NonNegative = 131.0
 
@@ -101,6 +103,7 @@ class MemsGyro:
             return sigma * normals[:, 0] + driven.sum(axis=1)
 
         resting = round(self.calibration_s / dt)
-        offset = math.radians(self.bias_deg_s) - (errors(resting).mean(axis=0) if resting else 0.0)
+        pieces = [min(PIECE, resting - start) for start in range(0, resting, PIECE)]
+        offset = math.radians(self.bias_deg_s) - sum((errors(n).sum(axis=0) / resting for n in pieces), 0.0)
         scale = 1.0 + self.scale_error
         return lambda rate: digitise(scale * rate + (errors(len(rate)) + offset), limit, step)

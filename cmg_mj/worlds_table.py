@@ -98,5 +98,6 @@ def save_table(path: Path, table: pa.Table, metadata: Mapping[str, Any]) -> None
     import pyarrow.parquet as pq
 
     table = table.replace_schema_metadata({b"cmg_mj": json.dumps(metadata).encode()})
-    with whole_file(path) as temporary, temporary.open("wb") as file:  # Arrow takes no path with bytes that are no UTF-8
+    # Opened here: Arrow takes no path with bytes that are no UTF-8.
+    with whole_file(path) as temporary, temporary.open("wb") as file:
         pq.write_table(table, file)
