@@ -126,7 +126,7 @@ class Experiment:
         Raises:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
-        given = dataclasses.asdict(self.scenario.plant) | {"timestep_s": self.plant.timestep}
+        given: dict[str, Any] = dataclasses.asdict(self.scenario.plant) | {"timestep_s": self.plant.timestep}
         for name in vary:
             if name not in given:
                 raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, given)}")

@@ -42,7 +42,7 @@ def test_without_sampling_and_delay_the_poles_are_those_of_the_law() -> None:
     sampled = loop("controller.rate_hz=2000", "sensors.accelerometer.rate_hz=2000", "sensors.encoder.rate_hz=2000")
     model, gains = load_plant().reduced, (35.0, 4.0, -1.0, 0.3)
     np.testing.assert_allclose(
-        np.sort(sampled.poles.real)[1:], np.sort(closed_loop_poles(model, gains).real), rtol=5e-3
+        np.sort(np.real(sampled.poles))[1:], np.sort(np.real(closed_loop_poles(model, gains))), rtol=5e-3
     )
     assert sampled.distance == pytest.approx(1.0, abs=0.01)  # Table 2's gains are an LQR's, as good as
 

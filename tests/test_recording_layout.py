@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import re
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from cmg_mj.comparison import prepare_comparison
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.recording import Run, write_recording
@@ -22,7 +24,7 @@ from cmg_mj.recording.run import best_observers, best_runs
 from cmg_mj.recording.signals import numbered
 from cmg_mj.recording.summary import ROW_TABLES, page
 from cmg_mj.recording.views import EYE
-from cmg_mj.runs import prepare_comparison, summary_of
+from cmg_mj.runs import summary_of
 from cmg_mj.scenario import load_scenario
 from cmg_mj.simulate import Outcome
 
@@ -232,7 +234,7 @@ def test_a_rig_is_framed_whole(
     monkeypatch: pytest.MonkeyPatch, scenario: str, scale: float, by: tuple[float, float, float]
 ) -> None:
     plant = prepare(load_scenario(scenario, ())).plant
-    model = moved(plant._compiled(discard_visual=False), scale, np.array(by, float))
+    model = moved(copy.copy(plant.drawn_model), scale, np.array(by, float))
     monkeypatch.setitem(plant.__dict__, "drawn_model", model)
     qpos = plant.new_data().qpos[None]
     rig = ball(plant, qpos)
