@@ -245,7 +245,8 @@ def counting(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) -> None:
     """RK4 calls back four times a step, the others once."""
-    of, controller, calls = counting(f"plant.integrator={integrator}", f"controller.rate_hz={rate_hz}")
+    settings = (f"plant.integrator={integrator}", f"controller.rate_hz={rate_hz}", "plant.timestep_s=0.001")
+    of, controller, calls = counting(*settings)
     plant, data = of.plant, of.plant.new_data()
     seen: Counter[str] = Counter()
     with installed(plant, controller) as callback:
@@ -262,7 +263,7 @@ def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) 
 
 def test_half_steps_of_the_user_advance_it_once_too() -> None:
     """mj_step1 and mj_step2, which step RK4 models by Euler's method."""
-    of, controller, calls = counting()
+    of, controller, calls = counting("plant.timestep_s=0.001")
     plant, data = of.plant, of.plant.new_data()
     with installed(plant, controller):
         for _ in range(200):
@@ -370,7 +371,7 @@ def test_rollout_runs_the_callback() -> None:
 
 
 def test_leaving_steps_out_is_said() -> None:
-    plant = load_plant()
+    plant = load_plant(timestep_s=0.001)
     controller, data = plant.controller("linear"), plant.new_data()
     for _ in range(5):  # steps 0, 2, 4, 6, 8: step 5 is left out
         control(plant, controller, data)

@@ -9,6 +9,7 @@ import pytest
 
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.scenario import load_scenario
+from cmg_mj.summary_keys import NESTED
 
 PERFECT = (
     "duration_s=1",
@@ -69,9 +70,10 @@ def test_figures_do_not_depend_on_the_step(kind: str) -> None:
     (chosen, coarse), (_, fine) = results
     assert chosen == 0.005
     for key, value in fine.summaries[0].items():
-        if key in ("companions", "settle_time_s") or value is None:
+        if key in (*NESTED, "settle_time_s") or value is None:
             continue
-        assert coarse.mean(key) == pytest.approx(fine.mean(key), rel=2e-3, abs=1e-12), key
+        share = key.endswith(("fit", "fit_push", "fraction"))  # of a figure: it may be near zero
+        assert coarse.mean(key) == pytest.approx(fine.mean(key), rel=2e-3, abs=2e-3 if share else 1e-12), key
     medians = [float(np.nanmedian(result.values("settle_time_s"))) for result in (coarse, fine)]
     assert medians[0] == pytest.approx(medians[1], abs=0.005)
 
