@@ -17,7 +17,8 @@ from cmg_mj.description import assignments
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.resources import bundled
 from cmg_mj.scenario import load_scenario
-from cmg_mj.summary_keys import KEYS, difference, heading, spread, written
+from cmg_mj.summary_keys import KEYS, RIDING, difference, heading, spread, written
+from cmg_mj.worlds_table import riding_along
 
 WIDEST = 8
 """Characters of a heading before it is broken."""
@@ -109,8 +110,8 @@ def comparison_note(summaries: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def summary_table(summary: Mapping[str, Any]) -> Table:
-    """The table that `cmg-mj run` prints."""
+def summary_table(summary: Mapping[str, Any]) -> Group:
+    """What `cmg-mj run` prints: the figures, and how well those that rode along estimated the rate."""
     ends = {"done": "stood to the end, {:g} s", "fell": "fell at {:.2f} s"}
     outcome = str(summary["outcome"])
     end = ends.get(outcome, outcome + " at {:g} s").format(summary["end_time_s"])
@@ -126,11 +127,13 @@ def summary_table(summary: Mapping[str, Any]) -> Table:
     for key in KEYS:
         if key in summary:
             table.add_row(_capitalised(heading(key)), written(key, summary[key]))
-    error = "velocity_rms_error_rad_s"
-    for name, figures in summary.get("companions", {}).items():
-        of = KEYS[error]._replace(label=f"{KEYS[error].label} of {name}")
-        table.add_row(_capitalised(of.heading), written(error, figures[error]))
-    return table
+    riding = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1))
+    riding.add_column("Riding along", vertical="bottom", overflow="fold")
+    for key in RIDING:
+        riding.add_column(heading(key).replace(" [", "\n["), justify="right", vertical="bottom")
+    for name, figures in riding_along(summary).items():
+        riding.add_row(name, *(written(key, figures.get(key)) for key in RIDING))
+    return Group(table, riding) if riding.row_count else Group(table)
 
 
 def _capitalised(text: str) -> str:

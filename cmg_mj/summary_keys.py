@@ -53,6 +53,10 @@ NESTED = ("companions", "references")
 """Parts of a summary that hold the figures of what rode along, by name."""
 
 
+RIDING = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "velocity_fit", "velocity_fit_push")
+"""What tables show of everything that rode along."""
+
+
 def heading(key: str) -> str:
     """A summary key in words, with its unit."""
     return KEYS[key].heading

@@ -9,18 +9,19 @@ from cmg_mj.legible import FEW, shortened
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
 from cmg_mj.recording.run import Run, best_observers, best_runs
-from cmg_mj.summary_keys import KEYS, heading, written
+from cmg_mj.summary_keys import KEYS, RIDING, heading, written
 
 ROW_TABLES = (
     ("velocity_rms_error_rad_s", "settle_time_s"),
+    ("velocity_rms_error_push_rad_s", "velocity_fit", "velocity_fit_push"),
     ("tilt_rms_deg", "gimbal_peak_deg", "command_rms_rad_s"),
 )
 """What is shown where each run is a row, table by table."""
 
 BOLD = "In bold: those that are switched on in the plots; the legends of the other tab switch on any."
 
-RIDING = ("velocity_rms_error_rad_s",)
-"""What there is of an observer that rides along."""
+RIDING_TABLES = (RIDING[:2], RIDING[2:])
+"""What there is of an observer that rides along, table by table."""
 
 
 def page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: MetricsSettings, notes: str) -> str:
@@ -48,13 +49,15 @@ def observers_page(runs: Sequence[Run]) -> str:
     for run in runs:
         if len(run.observers) > 1:
             names = _marked(list(run.observers), best_observers(run))
-            said = [[written(key, of.get(key)) for key in RIDING] for of in run.observers.values()]
+            names += list(run.summary.get("references", ()))
+            figures = [*run.observers.values(), *run.summary.get("references", {}).values()]
             parts.append(
-                f"In the run of {run.name}; the other observers ride along.{f' {BOLD}' if len(names) > FEW else ''}"
+                f"In the run of {run.name}; the other observers ride along.{f' {BOLD}' if len(run.observers) > FEW else ''}"
             )
-            parts.append(
-                markdown.table(("", *map(heading, RIDING)), [(n, *s) for n, s in zip(names, said, strict=True)])
-            )
+            for keys in RIDING_TABLES:
+                said = [[written(key, of.get(key)) for key in keys] for of in figures]
+                rows = [(name, *row) for name, row in zip(names, said, strict=True)]
+                parts.append(markdown.table(("", *map(heading, keys)), rows))
     return _paragraphs(*parts) if parts else ""
 
 

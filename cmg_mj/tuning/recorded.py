@@ -13,29 +13,30 @@ from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.grid import common_period
 from cmg_mj.observers import Observer
+from cmg_mj.push import Window, inside, push_windows
 from cmg_mj.replay import replay
 from cmg_mj.schema import ObserverSettings, Scenario
 from cmg_mj.trajectory import Trajectory
 
-AFTER_PUSH_S = 1.0
-"""The window that is scored ends so long after the last push [s]."""
 WARM_UP_S = 2.0
 """So much of the recording before the window is replayed as well, for the observer to settle [s]."""
 
-Window = tuple[float, float]
-"""Start, included, and end, excluded, of what is scored [s]."""
 
-
-def window_of(scenario: Scenario) -> Window:
-    """From the first push to one second after the last; the whole run if there is no push.
+def windows_of(scenario: Scenario) -> list[Window]:
+    """What is scored: from each push to one second after its end, as in a summary; the whole run if there is no push.
 
     Over a whole run with a push the best differentiator would be none at all: outside that second the rig hardly
     moves, and an estimate of zero has the smallest error.
     """
-    if not scenario.push:
-        return 0.0, scenario.duration_s
-    end = max(push.end_s for push in scenario.push) + AFTER_PUSH_S
-    return min(push.start_s for push in scenario.push), min(end, scenario.duration_s)
+    end = scenario.duration_s
+    windows = push_windows(scenario.push) or [(0.0, end)]
+    return [(start, min(stop, end)) for start, stop in windows if start < end] or windows
+
+
+def window_of(scenario: Scenario) -> Window:
+    """From the start of the first of the windows to the end of the last [s]."""
+    windows = windows_of(scenario)
+    return windows[0][0], windows[-1][1]
 
 
 @dataclass(frozen=True)
@@ -44,13 +45,15 @@ class Recorded:
 
     Attributes:
         trajectory: From the warm-up to the window's end.
-        window: What is scored [s].
+        window: What is scored, from its start to its end [s].
         fell: How many more worlds there were, which fell.
+        windows: The parts of it that are scored, if not all of it is [s].
     """
 
     trajectory: Trajectory
     window: Window
     fell: int = 0
+    windows: Sequence[Window] = ()
 
     @property
     def worlds(self) -> int:
@@ -70,9 +73,8 @@ class Recorded:
 
     @property
     def _scored(self) -> np.ndarray:
-        """Which rows lie in the window, (n_ticks,)."""
-        time = self.trajectory["time_s"]
-        return (time > self.window[0] - 1e-9) & (time < self.window[1] - 1e-9)
+        """Which rows are scored, (n_ticks,)."""
+        return inside(self.trajectory["time_s"], self.windows or [self.window])
 
     def errors(self, observer: Observer) -> np.ndarray:
         """RMS over the window of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN where it is lost."""
@@ -151,4 +153,4 @@ def record(
     window = window_of(scenario)
     assert result.trajectory is not None
     kept = result.trajectory.of_worlds(stood).between(window[0] - warm_up_s, window[1])
-    return Recorded(kept, window, int((~stood).sum()))
+    return Recorded(kept, window, int((~stood).sum()), windows_of(scenario))

@@ -40,7 +40,7 @@ class Level:
         fit_given_rms: The same with the given parameters [rad/s].
         rms: On the held-out worlds, tuned, (n_worlds,) [rad/s].
         given_rms: On the held-out worlds, given, (n_worlds,) [rad/s].
-        zero_rms: What an estimate of zero would have, mean over the held-out worlds [rad/s].
+        zero_rms: What an estimate of zero would have there, mean over the held-out worlds [rad/s].
         largest_acceleration: Of the tilt, in the fitted worlds [rad/s^2].
         fell: Worlds that fell, and were left out.
     """
@@ -61,6 +61,19 @@ class Level:
     def ratio(self) -> Interval:
         """Held-out error with the given parameters by that with the tuned ones, world by world."""
         return ratio_interval(self.given_rms, self.rms)
+
+    @property
+    def fit(self) -> float:
+        """Of the tuned parameters in what is scored, 1 - error/motion: 0 or less is no better than an estimate of zero."""
+        return self._fit(self.rms)
+
+    @property
+    def given_fit(self) -> float:
+        """The same of the given parameters."""
+        return self._fit(self.given_rms)
+
+    def _fit(self, rms: np.ndarray) -> float:
+        return 1.0 - float(rms.mean()) / self.zero_rms if self.zero_rms else math.nan
 
     @property
     def verdict(self) -> PairedVerdict:

@@ -14,6 +14,7 @@ from rich.table import Table
 from cmg_mj.experiment import prepare
 from cmg_mj.intervals import Interval
 from cmg_mj.run_folder import RunFolder, claimed, write_text
+from cmg_mj.tuning.recorded import windows_of
 from cmg_mj.tuning.study import Level, Study, best_noise, tuned_scenario
 
 
@@ -26,6 +27,7 @@ def figures_of(study: Study) -> dict[str, Any]:
         "seed": study.scenario.seed,
         "worlds_fitted": study.worlds,
         "window_s": list(study.window),
+        "scored_s": [list(window) for window in windows_of(study.scenario)],
         "given_parameters": _plain(study.given),
         "tuned": [number.name for number in study.numbers],
         "idle": list(study.idle),
@@ -45,6 +47,8 @@ def _level(level: Level) -> dict[str, Any]:
         "held_out_worlds": len(level.rms),
         "held_out_rms_error_rad_s": _number(float(level.rms.mean())),
         "held_out_given_rms_error_rad_s": _number(float(level.given_rms.mean())),
+        "held_out_fit": _number(level.fit),
+        "held_out_given_fit": _number(level.given_fit),
         "held_out_ratio": _interval(level.ratio),
         "verdict": level.verdict,
         "zero_estimate_rms_error_rad_s": level.zero_rms,
@@ -113,12 +117,17 @@ def _spread(ratio: Interval) -> str:
 
 def _caption(study: Study) -> str:
     """What the table does not say by itself."""
-    start, end = study.window
-    lines = [f"RMS of the estimated rate less the gyro's, {start:g} s to {end:g} s, on worlds that were not fitted."]
+    spans = ", ".join(f"{start:g} s to {end:g} s" for start, end in windows_of(study.scenario))
+    lines = [f"RMS of the estimated rate less the gyro's, {spans}, on worlds that were not fitted."]
     if not study.scenario.push:
         lines.append("There is no push: the window is the whole run, where an estimate of zero may do best.")
     zero = [f"{level.zero_rms:.4f}" for level in study.levels]
     lines.append(f"An estimate of zero: {' to '.join(dict.fromkeys([min(zero), max(zero)]))} rad/s.")
+    for level in study.levels:
+        worse = [name for name, fit in (("tuned", level.fit), ("given", level.given_fit)) if not fit > 0.0]
+        at = f"At {level.noise_ug_rthz:g} ug/rtHz the" if len(study.levels) > 1 else "The"
+        fits = f"fit there is {level.fit:.2f} tuned, {level.given_fit:.2f} given"
+        lines.append(f"{at} {fits}" + (f": worse than an estimate of zero, {' and '.join(worse)}." if worse else "."))
     if study.idle:
         lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.idle)}.")
     if any(level.edges for level in study.levels):

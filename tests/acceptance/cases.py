@@ -52,6 +52,7 @@ def closed_loop_figures(result: Result, first: int = 0) -> dict[str, float]:
     return {
         **({"bias_rms_error_deg": statistics.fmean(s["bias_rms_error_deg"] for s in group)} if has_bias else {}),
         "velocity_rms_error_rad_s": statistics.fmean(s["velocity_rms_error_rad_s"] for s in group),
+        "velocity_rms_error_push_rad_s": statistics.fmean(s["velocity_rms_error_push_rad_s"] for s in group),
         "tilt_rms_deg": statistics.fmean(s["tilt_rms_deg"] for s in group),
         "command_rms_rad_s": statistics.fmean(s["command_rms_rad_s"] for s in group),
         # A world that is outside the band at the very end has not settled within the run.
@@ -60,10 +61,11 @@ def closed_loop_figures(result: Result, first: int = 0) -> dict[str, float]:
 
 
 def ride_along_figures(result: Result, first: int = 0) -> dict[str, float]:
-    """Each observer's velocity RMS error over a group of GROUP worlds."""
+    """Each observer's velocity RMS error over a group of GROUP worlds, in the whole run and in the push window."""
     group = result.summaries[first : first + GROUP]
     figures = {}
     for name in OBSERVERS:
         parts = [s["companions"][name] if name in s.get("companions", {}) else s for s in group]
         figures[name] = statistics.fmean(part["velocity_rms_error_rad_s"] for part in parts)
+        figures[f"{name}, push window"] = statistics.fmean(part["velocity_rms_error_push_rad_s"] for part in parts)
     return figures

@@ -41,7 +41,9 @@ def main() -> None:
         kept["closed_loop"][observer] = bounds([closed_loop_figures(result, first) for first in firsts])
     result = ride_along(SWEEP_SEED, GROUPS * GROUP)
     riding = bounds([ride_along_figures(result, first) for first in firsts])
-    kept["ride_along"] |= {name: riding[name] for name in riding if name in wanted or name not in kept["ride_along"]}
+    kept["ride_along"] |= {
+        name: riding[name] for name in riding if name.partition(",")[0] in wanted or name not in kept["ride_along"]
+    }
     FILE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
 

@@ -10,7 +10,7 @@ from cmg_mj.experiment import prepare
 from cmg_mj.observers import make_observer
 from cmg_mj.scenario import load_scenario
 from cmg_mj.tuning import record
-from cmg_mj.tuning.recorded import tuning_scenario, window_of
+from cmg_mj.tuning.recorded import tuning_scenario, window_of, windows_of
 from tests.observers.reference import DT
 
 
@@ -18,6 +18,17 @@ def test_the_window_is_from_the_push_to_a_second_after_it() -> None:
     assert window_of(load_scenario("observer_tuning")) == pytest.approx((2.0, 3.1))
     assert window_of(load_scenario("observer_tuning", ["duration_s=2.5"])) == pytest.approx((2.0, 2.5))
     assert window_of(load_scenario("observer_tuning", ["push=[]"])) == (0.0, 10.0)
+
+
+def test_what_is_between_two_pushes_is_not_scored() -> None:
+    """As in a summary: an estimate of zero would do best there."""
+    scenario = load_scenario("observer_tuning", ["seed=5", "push=[{start_s=2},{start_s=4}]", "duration_s=6"], "linear")
+    assert [pytest.approx(window) for window in windows_of(scenario)] == [(2.0, 3.1), (4.0, 5.1)]
+    recorded = record(scenario, range(2))
+    run = prepare(scenario).run_many(2, keep_trajectory=False)
+    zero = np.array([s["references"]["zero"]["velocity_rms_error_push_rad_s"] for s in run.summaries])
+    assert recorded.zero_rms == pytest.approx(zero.mean(), rel=1e-2)  # the gyro's rate, not the true one
+    assert recorded.window == pytest.approx((2.0, 5.1))
 
 
 def test_no_observer_takes_part_in_the_loop_of_the_recording() -> None:
