@@ -51,9 +51,8 @@ def observers_page(runs: Sequence[Run]) -> str:
             names = _marked(list(run.observers), best_observers(run))
             names += list(run.summary.get("references", ()))
             figures = [*run.observers.values(), *run.summary.get("references", {}).values()]
-            parts.append(
-                f"In the run of {run.name}; the other observers ride along.{f' {BOLD}' if len(run.observers) > FEW else ''}"
-            )
+            bold = f" {BOLD}" if len(run.observers) > FEW else ""
+            parts.append(f"In the run of {run.name}; the others ride along.{bold}")
             for keys in RIDING_TABLES:
                 said = [[written(key, of.get(key)) for key in keys] for of in figures]
                 rows = [(name, *row) for name, row in zip(names, said, strict=True)]
