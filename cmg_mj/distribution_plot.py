@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.colours import colours, hexadecimal
 from cmg_mj.comparison import Compared
 from cmg_mj.intervals import known_interval
+from cmg_mj.legible import shortened
 from cmg_mj.plots import pyplot
 from cmg_mj.standings import Row, rows_of
 from cmg_mj.summary_keys import KEYS
@@ -45,7 +47,8 @@ def plot_worlds(path: Path, compared: Sequence[Compared], title: str) -> None:
     for axes, panel in zip(grid.flat, drawn.values(), strict=False):
         panel.draw(axes)
     first = grid.flat[0]
-    first.set_yticks(range(len(rows)), [_label(row) for row in rows])
+    names = shortened([row.name for row in rows])
+    first.set_yticks(range(len(rows)), [_label(row, names[row.name]) for row in rows])
     first.invert_yaxis()  # shared: the table's order in every panel
     worlds = len(rows[0].entry.result.outcomes)
     said = f"{title or 'Comparison'}: {worlds} worlds an observer. Lines: mean and its 95 % interval."
@@ -57,12 +60,10 @@ def plot_worlds(path: Path, compared: Sequence[Compared], title: str) -> None:
     plt.close(figure)
 
 
-def _label(row: Row) -> str:
-    """A row's name, and what did not stand."""
-    if row.reference:
-        return row.name
+def _label(row: Row, name: str) -> str:
+    """A row's name, and how many worlds did not stand."""
     lost = int((~row.entry.result.stood).sum())
-    return f"{row.name} ({lost} lost)" if lost else row.name
+    return f"{name} ({lost} lost)" if lost and not row.reference else name
 
 
 class _Panel:
@@ -76,7 +77,7 @@ class _Panel:
         self.key = key
         self.stood = [row.values(key) for row in rows]
         self.lost = [_until_the_end(row, key) for row in rows]
-        self.references = [row.reference is not None for row in rows]
+        self.colours = [hexadecimal(of) for of in colours(row.name for row in rows).values()]
         values = np.concatenate([*self.stood, *self.lost])
         self.any = bool(np.isfinite(values).any())
         if self.any:
@@ -108,10 +109,9 @@ class _Panel:
             axes.minorticks_off()
         axes.set_title(about.heading, loc="left", fontsize="medium")
         axes.grid(alpha=0.3, axis="x")
-        for place, (stood, lost, reference) in enumerate(zip(self.stood, self.lost, self.references, strict=True)):
-            color = "0.45" if reference else "C0"
-            self._scatter(axes, place, stood, color=color, marker="o", s=8, alpha=0.45, linewidth=0)
-            self._scatter(axes, place, lost, color="C3", marker="x", s=14, linewidth=0.8)
+        for place, (stood, lost, color) in enumerate(zip(self.stood, self.lost, self.colours, strict=True)):
+            self._scatter(axes, place, stood, color=color, marker="o", s=9, alpha=0.6, linewidth=0)
+            self._scatter(axes, place, lost, color="red", marker="x", s=14, linewidth=0.8)
             interval = known_interval(stood)
             if interval is not None:
                 axes.plot([interval.low, interval.high], [place, place], color="black", linewidth=2.0)

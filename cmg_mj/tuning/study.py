@@ -64,7 +64,7 @@ class Level:
 
     @property
     def fit(self) -> float:
-        """Of the tuned parameters in what is scored, 1 - error/motion: 0 or less is no better than an estimate of zero."""
+        """Of the tuned parameters in what is scored, 1 - error/motion: 0 is what an estimate of zero has."""
         return self._fit(self.rms)
 
     @property
