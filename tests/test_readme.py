@@ -12,6 +12,7 @@ import pytest
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers import PAPERS
+from cmg_mj.references import REFERENCES
 from cmg_mj.resources import bundled
 from tests.command import HANGS_AFTER_S, ROOT, cmg_mj, environment
 
@@ -94,7 +95,7 @@ def test_the_list_of_commands_is_complete() -> None:
 
 
 def test_the_tables_are_complete() -> None:
-    assert first_cells(section("Observers on the same plant, push and noise")) == list(OBSERVERS)
+    assert first_cells(section("Observers on the same plant, push and noise")) == [*OBSERVERS, *REFERENCES]
     assert sorted(first_cells(section("Commands"))) == sorted(bundled("scenarios"))
     assert sorted(first_cells(section("The papers, claim by claim"))) == sorted(PAPERS)
 
