@@ -51,6 +51,7 @@ class Compared:
             {
                 "observer": scenario.observer.kind,
                 "seed": scenario.seed,
+                "differs": self.experiment.differences,
                 "worlds": worlds,
                 "fell": bool(result.fell.any()),
                 "fell_fraction": float(result.fell.mean()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,14 @@ import tomli_w
 
 from cmg_mj.controller import Controller
 from cmg_mj.design import Design, design
+from cmg_mj.differences import differences
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.grid import check_steps, common_period
 from cmg_mj.law import Law
 from cmg_mj.loop_check import hints
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.resolved import resolved
-from cmg_mj.scenario import located
+from cmg_mj.scenario import base_of, located
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Driver, Result, simulate
 from cmg_mj.trajectory import whole_file
@@ -167,6 +169,20 @@ class Experiment:
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
         return resolved(self.scenario, self.design, self.plant.path, self.plant.timestep)
+
+    @functools.cached_property
+    def differences(self) -> dict[str, Any]:
+        """What differs from the bundled scenario it is based on: `section.field` -> its value.
+
+        Title, seed and observer are left out; a scenario of the user's own differs from none.
+        """
+        base = base_of(self.scenario)
+        if base is None:
+            return {}
+        base = base.with_observer(self.scenario.observer.kind)
+        if base.model_dump(mode="json") == self.scenario.model_dump(mode="json"):
+            return {}
+        return differences(prepare(base).resolved(), self.resolved())
 
     def save(self, path: Path) -> None:
         """Write the resolved scenario as TOML: running that file again gives the same run."""

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from cmg_mj import markdown
 from cmg_mj.description import assignments
+from cmg_mj.differences import in_words
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.resources import bundled
 from cmg_mj.scenario import load_scenario
@@ -115,8 +116,9 @@ def summary_table(summary: Mapping[str, Any]) -> Group:
     ends = {"done": "stood to the end, {:g} s", "fell": "fell at {:.2f} s"}
     outcome = str(summary["outcome"])
     end = ends.get(outcome, outcome + " at {:g} s").format(summary["end_time_s"])
+    differs = in_words(summary["differs"])
     table = Table(
-        title=f"{summary['scenario'] or 'Run'}: {summary['observer']}, seed {summary['seed']}",
+        title=f"{summary['scenario'] or 'Run'}: {summary['observer']}, seed {summary['seed']}{differs}",
         box=box.SIMPLE_HEAD,
         title_justify="left",
         show_header=False,

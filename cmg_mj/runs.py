@@ -11,6 +11,7 @@ from typing import Any
 import tomli_w
 
 from cmg_mj.comparison import Compared
+from cmg_mj.differences import in_words
 from cmg_mj.distribution_plot import plot_worlds
 from cmg_mj.engine import quiet
 from cmg_mj.experiment import Experiment
@@ -34,6 +35,7 @@ def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[s
         "outcome": outcome.kind,
         "end_time_s": outcome.time_s,
         "fell": outcome.fell,
+        "differs": experiment.differences,
     }
     if outcome.reason:
         summary["reason"] = outcome.reason
@@ -63,7 +65,8 @@ def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *
     """
     trajectory = trajectory_with_metadata(experiment, result)
     scenario = experiment.scenario
-    title = f"{scenario.title or 'Run'}: {scenario.observer.kind}, seed {scenario.seed}"
+    differs = in_words(experiment.differences)
+    title = f"{scenario.title or 'Run'}: {scenario.observer.kind}, seed {scenario.seed}{differs}"
     writers = (
         trajectory.save,
         lambda path: _write_json(path, summary_of(experiment, result)),

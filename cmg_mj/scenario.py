@@ -16,7 +16,7 @@ from cmg_mj.complaint import complaint
 from cmg_mj.errors import InputError
 from cmg_mj.overrides import override
 from cmg_mj.plausible import out_of_size, unreadable
-from cmg_mj.resources import find
+from cmg_mj.resources import bundled, find, folder
 from cmg_mj.schema import ObserverSettings, Scenario
 
 LARGEST_FILE = 1_000_000
@@ -44,6 +44,8 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
     """
     path = find("scenarios", name, ".toml", "scenario")
     fields = _read(path, name)
+    if path.stem in bundled("scenarios"):
+        fields.setdefault("based_on", path.stem)
     changes = []
     if observer is not None:
         changes.append(f"--observer {observer}")
@@ -83,6 +85,13 @@ def _read(path: Path, name: str) -> dict[str, Any]:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{name}: not valid TOML: a number of too many digits, or no date") from error
+
+
+def base_of(scenario: Scenario) -> Scenario | None:
+    """The bundled scenario that one is told apart from, if there is one."""
+    if scenario.based_on not in bundled("scenarios"):
+        return None
+    return load_scenario(str(folder("scenarios") / f"{scenario.based_on}.toml"))
 
 
 def _find_model(scenario: Scenario, beside: Path) -> Scenario:

@@ -110,6 +110,8 @@ class Scenario(BaseModel):
     metrics: MetricsSettings = Field(default_factory=MetricsSettings)
     compare: CompareSettings | None = None
     """Written by `cmg-mj compare`, so that its scenario runs to the same comparison."""
+    based_on: str = ""
+    """The bundled scenario that this one is told apart from in folders' names, titles and summaries."""
     versions: dict[str, str] = Field(default_factory=dict)
     """Written by a run, not read."""
     _where: str = PrivateAttr("")

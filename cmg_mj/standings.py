@@ -58,6 +58,7 @@ class Row:
                 "observer": self.reference,
                 "rides_along_in": self.entry.kind,
                 "seed": own["seed"],
+                "differs": own["differs"],
                 "worlds": own["worlds"],
                 **means,
                 "velocity_rms_error_std_rad_s": float(errors.std(ddof=1)) if len(errors) > 1 else None,

@@ -47,15 +47,18 @@ class Chosen:
         scenario = load_scenario(self.name, self.settings, observer)
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
-    def folder(self, default: str, names: Sequence[str], experiment: Experiment) -> RunFolder:
-        """The folder to write these files to."""
+    def folder(self, what: str, names: Sequence[str], experiment: Experiment) -> RunFolder:
+        """The folder to write these files to: without --out it is named for what is run and what differs in it."""
         import tomli_w
 
+        from cmg_mj.differences import in_a_name, safe_name
         from cmg_mj.run_folder import unused_folder
 
         if self.out is not None:
             return claim(named(self.out), names)
-        return released_at_the_end(unused_folder(Path("runs"), default, names, tomli_w.dumps(experiment.resolved())))
+        parts = (safe_name(Path(self.name).stem), safe_name(what), str(experiment.scenario.seed))
+        name = "-".join(parts) + in_a_name(experiment.differences)
+        return released_at_the_end(unused_folder(Path("runs"), name, names, tomli_w.dumps(experiment.resolved())))
 
 
 def of_a_run(command: Callable) -> Callable:

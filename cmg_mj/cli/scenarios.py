@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import click
 
@@ -52,9 +51,7 @@ def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
     say_hints(experiment.hints)
     if scenario.compare:
         say("[compare] is for cmg-mj compare; this is one run")
-    kind = runs.file_name(scenario.observer.kind)
-    default = f"{Path(chosen.name).stem}-{kind}-{scenario.seed}"
-    folder = chosen.folder(default, runs.files_of_run(plot=plot), experiment)
+    folder = chosen.folder(runs.file_name(scenario.observer.kind), runs.files_of_run(plot=plot), experiment)
     with CtrlC() as ctrl_c:
         with progress(scenario.title or chosen.name, scenario.duration_s, ctrl_c) as on_progress:
             result = experiment.run(driver=driver, on_progress=on_progress)  # type: ignore[arg-type]
@@ -101,6 +98,7 @@ def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown:
     scenario.toml runs to the same comparison: cmg-mj compare FOLDER/scenario.toml.
     """
     from cmg_mj import comparison, report, runs
+    from cmg_mj.differences import in_words
     from cmg_mj.schema import CompareSettings
     from cmg_mj.standings import standings
 
@@ -120,7 +118,7 @@ def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown:
     own = comparison.rerunnable(scenario, experiments, worlds)
     say_hints(own.hints)
     files = runs.files_of_comparison(names, plot=plot)
-    folder = chosen.folder(f"{Path(chosen.name).stem}-compare-{scenario.seed}", files, own)
+    folder = chosen.folder("compare", files, own)
     with CtrlC() as ctrl_c:
         with progress(f"{scenario.title or chosen.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
             compared = comparison.compare(experiments, worlds, on_progress)
@@ -131,7 +129,8 @@ def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown:
         try:
             place = runs.save_comparison(folder, own, compared, plot=plot, complete=len(compared) == len(names))
         finally:
-            title = f"{scenario.title or chosen.name}: {worlds} worlds an observer, seed {scenario.seed}"
+            differs = in_words(own.differences)
+            title = f"{scenario.title or chosen.name}: {worlds} worlds an observer, seed {scenario.seed}{differs}"
             table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
             show(summaries, table, chosen.as_json)
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", chosen.as_json)

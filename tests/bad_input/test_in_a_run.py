@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 
-from cmg_mj import Estimate, Measurement
+from cmg_mj import Estimate, Measurement, runs
+from cmg_mj.experiment import Experiment
+from cmg_mj.trajectory import Trajectory
 from tests.bad_input.complaints import assert_in_order, table
 from tests.bad_input.test_users_observer import Mine
 from tests.command import cmg_mj
+from tests.run_folders import FILES, assert_whole, names
 
 
 @table(
@@ -27,16 +31,45 @@ def test_a_plant_that_diverges(command: str, given: str, fragments: list[str]) -
     assert (Path("it") / "recording.rrd").exists()
 
 
-@pytest.mark.parametrize("name", ["scenario.toml", "summary.json", "trajectory.parquet", "recording.rrd", "plot.png"])
-def test_a_file_that_cannot_be_written_keeps_no_other_from_being(quick: str, name: str) -> None:
-    (Path("it") / name / "in the way").mkdir(parents=True)
-    plot = ["--plot"] if name == "plot.png" else []
-    said = cmg_mj("run", quick, "--out", "it", "--json", *plot)
+class PutsInTheWay(Mine):
+    """Makes a folder where a file is to be."""
+
+    def estimate(self, k: int, y: Measurement, rate: Any) -> Any:
+        if k == 10:
+            Path("it/plot.png/mine").mkdir(parents=True)
+        return Estimate(y.y1, rate, y.y2)
+
+
+def test_what_comes_in_the_way_of_a_file(quick: str) -> None:
+    said = cmg_mj("run", quick, "--out", "it", "--json", "--plot", "--observer", f"{__name__}:PutsInTheWay")
+    assert said.status == 0
+    assert said.err.startswith("Written to it/incomplete; what it has held stays as it was. Open")
+    assert said.out.startswith("{")  # the summary is not lost
+    assert names("it") == ["incomplete", "plot.png"]
+    assert names("it/plot.png") == ["mine"]
+    assert names("it/incomplete") == sorted([*FILES, "plot.png"])
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_that_cannot_be_written_keeps_no_other_from_being(
+    quick: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(path: Path, *arguments: object) -> None:
+        path.write_text("begun")
+        raise IsADirectoryError(21, "Is a directory")
+
+    writer = {
+        "scenario.toml": (Experiment, "save"),
+        "trajectory.parquet": (Trajectory, "save"),
+        "summary.json": (runs, "_write_json"),
+        "recording.rrd": (runs, "_record"),
+    }[name]
+    monkeypatch.setattr(*writer, fails if isinstance(writer[0], ModuleType) else lambda _, path: fails(path))
+    said = cmg_mj("run", quick, "--out", "it", "--json")
     assert said.status == 2
     assert said.err == f"cmg-mj: it/{name}: cannot be written: Is a directory\n"
     assert said.out.startswith("{")  # the summary is not lost
-    files = {path.name for path in Path("it").iterdir() if path.is_file()}
-    assert files == {"scenario.toml", "summary.json", "trajectory.parquet", "recording.rrd"} - {name}
+    assert names("it") == [file for file in FILES if file != name]
 
 
 class Removes(Mine):
@@ -48,8 +81,7 @@ class Removes(Mine):
         return Estimate(y.y1, rate, y.y2)
 
 
-def test_a_folder_that_disappears(quick: str) -> None:
+def test_a_folder_that_disappears_is_made_again(quick: str) -> None:
     said = cmg_mj("run", quick, "--out", "it", "--observer", f"{__name__}:Removes")
-    assert said.status == 2
-    (line,) = said.err.splitlines()
-    assert line.startswith("cmg-mj: it/trajectory.parquet: cannot be written: ")
+    assert said.status == 0
+    assert_whole("it")
