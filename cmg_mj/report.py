@@ -11,6 +11,7 @@ from typing import Any
 from rich import box
 from rich.console import Group
 from rich.table import Table
+from rich.text import Text
 
 from cmg_mj import markdown
 from cmg_mj.description import assignments
@@ -45,7 +46,7 @@ def comparison_table(summaries: Sequence[Mapping[str, Any]], title: str) -> Grou
 def _compared(
     summaries: Sequence[Mapping[str, Any]], title: str, columns: Sequence[str], cell: Callable[..., list[str]]
 ) -> Table:
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=0)
+    table = Table(title=_title(title), box=box.SIMPLE_HEAD, title_justify="left", padding=0)
     table.add_column("observer", vertical="bottom", overflow="fold")
     for key in columns:
         unit = [f"[{KEYS[key].unit}]"] if KEYS[key].unit else []
@@ -118,7 +119,7 @@ def summary_table(summary: Mapping[str, Any]) -> Group:
     end = ends.get(outcome, outcome + " at {:g} s").format(summary["end_time_s"])
     differs = in_words(summary["differs"])
     table = Table(
-        title=f"{summary['scenario'] or 'Run'}: {summary['observer']}, seed {summary['seed']}{differs}",
+        title=_title(f"{summary['scenario'] or 'Run'}: {summary['observer']}, seed {summary['seed']}{differs}"),
         box=box.SIMPLE_HEAD,
         title_justify="left",
         show_header=False,
@@ -136,6 +137,11 @@ def summary_table(summary: Mapping[str, Any]) -> Group:
     for name, figures in riding_along(summary).items():
         riding.add_row(name, *(written(key, figures.get(key)) for key in RIDING))
     return Group(table, riding) if riding.row_count else Group(table)
+
+
+def _title(text: str) -> Text:
+    """A table's title on one line, even if the table is not as wide."""
+    return Text(text, style="table.title", no_wrap=True, overflow="ignore")
 
 
 def _capitalised(text: str) -> str:
