@@ -14,7 +14,6 @@ import click
 from cmg_mj.cli import scenarios, studies
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, say
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.plausible import is_text
 
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, real sensors, velocity observers.
 
@@ -103,10 +102,6 @@ def _status(arguments: Sequence[str]) -> Any:
     if not arguments:
         click.echo(cli.make_context("cmg-mj", [], resilient_parsing=True).get_help(), err=True)
         return WRONG_INPUT
-    for argument in arguments:
-        if not is_text(argument):  # it would end up in files, which are UTF-8
-            say(f"{argument!r}: not UTF-8 text; settings and names of files and folders must be")
-            return WRONG_INPUT
     try:
         cli.main(args=list(arguments), prog_name="cmg-mj", standalone_mode=False)
     except SystemExit as exit:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +45,8 @@ class Chosen:
         """The scenario with what the options change."""
         from cmg_mj.scenario import load_scenario
 
-        scenario = load_scenario(self.name, self.settings, observer)
+        settings = [_letters(setting) for setting in self.settings]
+        scenario = load_scenario(self.name, settings, observer)
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
     def folder(self, what: str, names: Sequence[str], experiment: Experiment) -> RunFolder:
@@ -59,6 +61,14 @@ class Chosen:
         parts = (safe_name(Path(self.name).stem), safe_name(what), str(experiment.scenario.seed))
         name = "-".join(parts) + in_a_name(experiment.differences)
         return released_at_the_end(unused_folder(Path("runs"), name, names, tomli_w.dumps(experiment.resolved())))
+
+
+def _letters(argument: str) -> str:
+    """The letters that were typed, also where Python takes a terminal for one of ASCII."""
+    try:
+        return os.fsencode(argument).decode("utf-8")
+    except UnicodeError:
+        return argument
 
 
 def of_a_run(command: Callable) -> Callable:
