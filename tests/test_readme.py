@@ -24,6 +24,7 @@ COMMANDS = [part.strip() for line in SHELL for part in line.split("&&") if part.
 INLINE = re.findall(r"`(cmg-mj \w+ [^`]+)`", README)
 
 CHEAPER = {
+    "check": "",
     "run": "",
     "compare": "--worlds 2 --set duration_s=2.5 --set push.0.start_s=1.0",
     "tune": "--worlds 2 --set duration_s=3.0",
