@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019 import comparison
 from cmg_mj.papers.sokolov2019.backlash import Cycle
 from cmg_mj.papers.sokolov2019.cycles import WITH_Y2, Cycles
@@ -56,7 +57,7 @@ def lags() -> Lags:
 def cycles() -> Cycles:
     """What test_sokolov2019_backlash.py sees MuJoCo do."""
     ends = {"linear": 0.166, "luenberger": 0.219, "homogeneous": 0.097, WITH_Y2: 0.219}
-    foreseen = {"linear": Foreseen(0.155, 3.2), "luenberger": Foreseen(0.205, 0.8)}
+    foreseen: dict[str, Foreseen | None] = {"linear": Foreseen(0.155, 3.2), "luenberger": Foreseen(0.205, 0.8)}
     return Cycles({name: Cycle(True, size, 1.0) for name, size in ends.items()}, foreseen)
 
 
@@ -84,10 +85,9 @@ def test_every_figure_shows_its_own_observers_runs(found: Loops, lags: Lags, cyc
         assert claim.figures["cycle_amplitude_deg"] == cycles.ends[name].amplitude_deg
         (drawn,) = claim.pictures
         for panel, result in zip(drawn.panels[2:4], (own, gap), strict=True):
-            assert result.trajectory is not None
-            rates = [line.y for line in panel.lines]
-            np.testing.assert_array_equal(rates[0], result.trajectory[f"estimate/{name}/x2_rad_s"][:, 0])
-            np.testing.assert_array_equal(rates[1], result.trajectory["x2_rad_s"][:, 0])
+            rates, recorded = [line.y for line in panel.lines], trajectory_of(result)
+            np.testing.assert_array_equal(rates[0], recorded[f"estimate/{name}/x2_rad_s"][:, 0])
+            np.testing.assert_array_equal(rates[1], recorded["x2_rad_s"][:, 0])
     assert claims["linear"].figures["gyro"] == numbers(found.gyro)
     four = claims["linear"].figures
     assert four["main_frequency_hz"] == pytest.approx(four["predicted_frequency_hz"], rel=0.15)
@@ -98,15 +98,11 @@ def test_every_figure_shows_its_own_observers_runs(found: Loops, lags: Lags, cyc
 def test_only_the_runs_behind_a_gap_have_one(found: Loops) -> None:
     """There the gimbal rests at many ticks; without a gap the command is never exactly zero."""
     for name in OBSERVERS:
-        for result in (found.by_bias[e][name] for e in found.by_bias):
-            assert result.trajectory is not None
-            assert not (result.trajectory["u_rad_s"][1:] == 0.0).any()
-        assert found.gap[name].trajectory is not None
-        assert (found.gap[name].trajectory["u_rad_s"] == 0.0).mean() > 0.1
+        for by_name in found.by_bias.values():
+            assert not (trajectory_of(by_name[name])["u_rad_s"][1:] == 0.0).any()
+        assert (trajectory_of(found.gap[name])["u_rad_s"] == 0.0).mean() > 0.1
     # The same seeds: until the push the rigs differ by their bias alone.
-    one, other = (found.by_bias[e]["homogeneous"].trajectory for e in (0.0, 0.5))
-    assert one is not None
-    assert other is not None
+    one, other = (trajectory_of(found.by_bias[e]["homogeneous"]) for e in (0.0, 0.5))
     noise = one["y1_rad"] - one["x1_rad"], other["y1_rad"] - other["x1_rad"]
     assert np.corrcoef(noise[0][:100, 0], noise[1][:100, 0])[0, 1] > 0.9
 
@@ -117,8 +113,7 @@ def test_the_late_window_does_not_hold_the_pushs_tail(found: Loops) -> None:
         assert late is not None
         assert tail(found.quiet[name]) < 0.1 * late.mean
         # An end at 7 s would be mostly tail with (9): the window is judged by what it leaves out.
-        assert found.quiet[name].trajectory is not None
-        early = found.quiet[name].trajectory.between(3.0, 7.0)["x1_rad"]
+        early = trajectory_of(found.quiet[name]).between(3.0, 7.0)["x1_rad"]
         assert np.degrees(early).std() > 5.0 * tail(found.quiet[name])
 
 

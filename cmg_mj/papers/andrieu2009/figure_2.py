@@ -142,7 +142,7 @@ def bias_of_constant_gain(done: Study) -> Claim:
 def bias_of_updated_gains(done: Study) -> Claim:
     """What makes the biases of the two whose gain is updated."""
     left = bias_left(done)[1:]
-    due = (left < HALF).all(axis=0)
+    due = np.all(left < HALF, axis=0).tolist()
     windows = [name for name, so in zip(WINDOW_NAMES, due, strict=True) if so]
     others = [name for name, so in zip(WINDOW_NAMES, due, strict=True) if not so]
     return Claim(
@@ -153,7 +153,7 @@ def bias_of_updated_gains(done: Study) -> Claim:
             f"{', '.join(f'{value:.0%}' for value in row)} ({kind})" for kind, row in zip(KINDS[1:], left, strict=True)
         )
         + ".",
-        holds=bool(due.any()),
+        holds=any(due),
         conditions=f"Less than half remains for both in {', '.join(windows)}; not in {', '.join(others)}, where the "
         "bias itself is small."
         if others

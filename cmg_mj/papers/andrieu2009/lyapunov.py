@@ -72,15 +72,18 @@ class Lyapunov:
 
     def h(self, s: np.ndarray) -> np.ndarray:
         """The integrand of W."""
-        return sum(signed_power(s, power) for power in self.powers)
+        first, second = self.powers
+        return signed_power(s, first) + signed_power(s, second)
 
     def h_slope(self, s: np.ndarray) -> np.ndarray:
         """Its derivative."""
-        return sum(power * np.abs(s) ** (power - 1.0) for power in self.powers)
+        first, second = self.powers
+        return first * np.abs(s) ** (first - 1.0) + second * np.abs(s) ** (second - 1.0)
 
     def H(self, s: np.ndarray) -> np.ndarray:
         """Its integral."""
-        return sum(np.abs(s) ** (power + 1.0) / (power + 1.0) for power in self.powers)
+        first, second = (power + 1.0 for power in self.powers)
+        return np.abs(s) ** first / first + np.abs(s) ** second / second
 
     def E(self, at: States) -> tuple[np.ndarray, np.ndarray]:
         """e1 and e2."""
