@@ -7,6 +7,7 @@ must be caught by the test named there.
     python tests/mutations.py              # about twenty minutes on two cores
     python tests/mutations.py adaptive     # only the parameters with this in their names, printed and not written
     python tests/mutations.py papers       # only the reports, printed and not written
+    python tests/mutations.py papers gap   # of these only the ones with this in what is wrong
 """
 
 from __future__ import annotations
@@ -182,11 +183,12 @@ def parameter_table(pool: ThreadPoolExecutor, wanted: str) -> tuple[str, list[st
     return "\n".join(["| parameter | times 0.8 | times 1.2 |", "|---|---|---|", *rows]), survived
 
 
-def report_table(pool: ThreadPoolExecutor) -> tuple[str, list[str]]:
+def report_table(pool: ThreadPoolExecutor, wanted: str) -> tuple[str, list[str]]:
     """The table of wrong reports, and those that no test caught."""
-    found = [pool.submit(report_caught_by, mutant) for mutant in MUTANTS]
-    rows = [f"| {m.wrong} | `{m.file}` | {future.result()} |" for m, future in zip(MUTANTS, found, strict=True)]
-    survived = [m.wrong for m, future in zip(MUTANTS, found, strict=True) if future.result() == "-"]
+    tried = [mutant for mutant in MUTANTS if wanted in mutant.wrong]
+    found = [pool.submit(report_caught_by, mutant) for mutant in tried]
+    rows = [f"| {m.wrong} | `{m.file}` | {future.result()} |" for m, future in zip(tried, found, strict=True)]
+    survived = [m.wrong for m, future in zip(tried, found, strict=True) if future.result() == "-"]
     return "\n".join(["| what is wrong | where, in cmg_mj/papers | caught by |", "|---|---|---|", *rows]), survived
 
 
@@ -202,10 +204,11 @@ def main() -> None:
             parts += ["## Wrong parameters", PARAMETERS_SAY, table]
             survivors += survived
         if wanted in ("", "papers"):
-            whole = sorted({mutants.TESTS + mutant.test for mutant in MUTANTS})
+            part = sys.argv[2] if len(sys.argv) > 2 else ""
+            whole = sorted({mutants.TESTS + mutant.test for mutant in MUTANTS if part in mutant.wrong})
             if (failed := first_failure(lambda copy: None, whole)) != "-":
                 sys.exit(f"{failed} fails without any mutation: mend that first")
-            table, survived = report_table(pool)
+            table, survived = report_table(pool, part)
             parts += ["## Wrong reports", REPORTS_SAY, table]
             survivors += survived
     text = "\n\n".join(parts) + "\n"

@@ -229,6 +229,8 @@ def test_cause_of_a_bias_is_judged_by_what_is_left_without_it(done: Study) -> No
     """Observers that know hbar beside those that do not; the constant gain's bias stays, the others' mostly goes."""
     left = figure_2.bias_left(done)
     assert left[0].min() > 0.7
+    claim = figure_2.bias_of_constant_gain(done)
+    assert claim.figures["share_left_with_exact_hbar"] == left[0].tolist()
     assert left[1:, [0, 2]].max() < 0.4
     shown = done.found[CONSTANT].eta2_error
     gone = done.exact | {CONSTANT: dataclasses.replace(done.exact[CONSTANT], eta2_error=0.1 * shown)}

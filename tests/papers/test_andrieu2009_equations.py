@@ -51,6 +51,8 @@ def test_w_is_homogeneous_in_the_bi_limit(d_inf: float) -> None:
     twice_near, twice_far = at(W, 0.8e-9, -1.4e-9), at(W, 0.4 * (2e12) ** (1.0 - d_inf), -1.4e12)
     assert W.W(twice_near)[0] / W.W(near)[0] == pytest.approx(2.0**W.d_W, rel=1e-3)
     assert W.W(twice_far)[0] / W.W(far)[0] == pytest.approx(2.0**W.d_W, rel=1e-3)
+    without_e2 = [W.W(States(np.array([s]), np.zeros(1)))[0] for s in (0.3e12, 0.3e12 * 2.0 ** (1.0 - d_inf))]
+    assert without_e2[1] / without_e2[0] == pytest.approx(2.0**W.d_W, rel=1e-3)
     assert (W.W(states()) > 0.0).all()
 
 
@@ -104,6 +106,22 @@ def test_constants_hold_on_a_finer_grid() -> None:
         )
         assert min(finer) > 0.0
         assert finer.c1 == pytest.approx(found.decay.c1, rel=0.1)
+
+
+def test_19_holds_for_every_a_within_the_spread() -> None:
+    """c1 by the worst of the four corners of (17), each by itself."""
+    W, grid, spread = lyapunov(0.4), states(np.geomspace(1e-2, 1e2, 7), 9), 0.25
+    grid = States(*(s[np.abs(grid.s1 - grid.s2) > 1e-6 * np.abs(grid.s1)] for s in grid))
+    (e1, e2), (by_e1, by_e2), value = W.E(grid), W.gradient(grid), W.W(grid)
+    k1, k2 = W.K(e1)
+    bound = value + value ** ((W.d_W + 0.4) / W.d_W)
+    corners = [
+        (-(a1 * by_e1 * (e2 + k1) + a2 * by_e2 * k2) / bound).min()
+        for a1 in (1.0 - spread, 1.0 + spread)
+        for a2 in (1.0 - spread, 1.0 + spread)
+    ]
+    assert decay(W, 0.5, spread, grid).c1 == pytest.approx(min(corners))
+    assert decay(W, 0.5, spread, grid).c1 < decay(W, 0.5, 0.0, grid).c1
 
 
 def test_a_poor_w_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
