@@ -1,4 +1,4 @@
-"""(9) of aranovskiy2020, its lag and noise, and (11), the vicinity that its error converges to."""
+"""(9) of aranovskiy2020, its lag and noise, and (11), where its error converges to, and when."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from cmg_mj.papers.aranovskiy2020 import lag, vicinity
+from cmg_mj.papers.aranovskiy2020 import finite_time, lag, vicinity
 from cmg_mj.papers.aranovskiy2020.rig import DT
 
 SEED = 910_000
@@ -33,3 +33,26 @@ def test_vicinity_of_the_homogeneous_differentiator() -> None:
     # By homogeneity the chatter of the sampled observer falls as dt^(alpha/(1 - alpha)).
     coarse, fine = (claim.figures[f"error_left_share{rate}"]["0.55"] for rate in ("", "_2000_hz"))
     assert math.log10(coarse / fine) == pytest.approx(0.55 / 0.45, abs=0.3)
+
+
+def test_the_error_is_gone_in_finite_time() -> None:
+    claim = finite_time.finite_time_claim()
+    assert claim.verdict == "reproduced within stated conditions"
+    gone = list(claim.figures["gone_after_s"].values())
+    assert gone == sorted(gone)
+    assert math.isinf(finite_time.decay(1.0).end_s)
+
+
+def test_decay_of_the_linear_observer_in_closed_form() -> None:
+    """alpha = 1: poles -10 +- sqrt(50) j, half a turn pi/sqrt(50), in which the size falls by exp(-10 pi/sqrt(50))."""
+    found = finite_time.decay(1.0)
+    half_turn = math.pi / math.sqrt(50.0)
+    spans = found.time_s[found.turns]
+    assert spans[2] - spans[1] == pytest.approx(half_turn, rel=2e-3)
+    assert found.decades_a_turn == pytest.approx(10.0 * half_turn / math.log(10.0), rel=2e-3)
+
+
+def test_an_observer_that_is_late_is_not_reproduced(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = finite_time.of_the_observer
+    monkeypatch.setattr(finite_time, "of_the_observer", lambda alpha: 1.05 * right(alpha))
+    assert finite_time.finite_time_claim().verdict == "not reproduced"

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.papers.aranovskiy2020.optimality import inverse_optimality
-from cmg_mj.papers.aranovskiy2020.paper import K_E, printed_model
+from cmg_mj.law import lqr_gains
+from cmg_mj.papers.aranovskiy2020 import optimality
+from cmg_mj.papers.aranovskiy2020.optimality import inverse_optimality, nearest_diagonal
+from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, printed_model
 
 PAIR = printed_model()
 
@@ -41,3 +43,29 @@ def test_a_stabilising_gain_that_is_no_lqrs_is_recognised() -> None:
 def test_optimality_agrees_with_brute_force(scale: float) -> None:
     K = np.array(K_E) * [1.0, scale, 1.0, 1.0]
     assert inverse_optimality(PAIR.A_e, PAIR.B_e, K).optimal == (least_return_difference(K) >= 1.0 - 1e-9)
+
+
+def test_a_diagonal_cost_gives_the_printed_gains_to_their_digits() -> None:
+    """By python-control, which the search does not use; rounded as they are printed."""
+    claim = optimality.lqr_gains()
+    assert claim.verdict == "reproduced"
+    gain = lqr_gains(PAIR, claim.figures["diagonal_within_rounding"], 1.0)
+    assert [round(k) for k in gain[:3]] + [round(gain[3], 1)] == list(K_E)
+    # Another one than the search finds.
+    known = np.array(lqr_gains(PAIR, (405.6, 2.26, 0.223, 0.096), 1.0))
+    assert (np.abs(known - K_E) / K_E_ROUNDING).max() < 1.0
+    np.testing.assert_allclose(known, (34.68, 4.07, -1.325, 0.310), atol=0.005)
+
+
+def test_a_search_that_starts_far_off_comes_near() -> None:
+    weights = np.array([900.0, 3.0, 0.8, 0.2])
+    K = optimality.lqr_gain(PAIR.A_e, PAIR.B_e, weights)
+    found = nearest_diagonal(PAIR.A_e, PAIR.B_e, K, np.array(K_E_ROUNDING), 1.5 * weights)
+    assert found.off < 0.1
+
+
+def test_to_more_digits_no_diagonal_cost_gives_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(optimality, "K_E_ROUNDING", (0.05, 0.05, 0.05, 0.005))
+    claim = optimality.lqr_gains()
+    assert claim.verdict == "reproduced within stated conditions"
+    assert "not even to the digits printed" in claim.why

@@ -9,10 +9,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.observers import Estimate, Measurement
-from cmg_mj.papers.aranovskiy2020 import delicacy, forms_of_10, misprint, update_cost
+from cmg_mj.observers import Estimate, Measurement, make_observer
+from cmg_mj.papers.aranovskiy2020 import by_euler, delicacy, forms_of_10, misprint, update_cost
 from cmg_mj.papers.aranovskiy2020.delicacy import transient
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, printed_model, riccati_slope, settled_gains
+from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
+from cmg_mj.replay import replay
+from cmg_mj.trajectory import Trajectory
 
 SEED = 910_000
 
@@ -95,6 +98,56 @@ def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matte
     assert abs(corrected[0, 1] / corrected[1, 0] - 1.0) < 1e-9
     assert abs(printed[0, 1] / printed[1, 0] - 1.0) > 0.02
     assert 0.0 < rate.difference < 0.02 * rate.error
+
+
+def test_the_misprint_is_one_that_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Judged as printed: symmetric, or as good as what is."""
+    claim = misprint.misprint_claim(SEED)
+    assert claim.verdict == "reproduced within stated conditions"
+    right = misprint.misprint(SEED)
+    mattering = right.rate._replace(difference=0.1 * right.rate.error)
+    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(rate=mattering))
+    assert misprint.misprint_claim(SEED).verdict == "not reproduced"
+    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(printed=right.corrected, rate=mattering))
+    assert misprint.misprint_claim(SEED).verdict == "reproduced"
+
+
+@pytest.mark.parametrize("exact_gain", [False, True])
+def test_ten_by_euler_on_floats_and_arrays_is_the_plain_one(exact_gain: bool) -> None:
+    run = run_of_10(SEED)
+    plain = replay(forms_of_10.Plain(forms_of_10.euler), run).x2
+    found = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), run).x2
+    settled = slice(200 if exact_gain else 0, None)
+    np.testing.assert_allclose(found[settled], plain[settled], atol=2e-4 if exact_gain else 1e-9)
+    columns = {name: np.stack([run[name]] * 2, axis=1) for name in ("y1_rad", "y2_rad", "u_rad_s")}
+    both = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), Trajectory(columns)).x2
+    np.testing.assert_allclose(both[:, 1], found, rtol=1e-9, atol=1e-12)
+
+
+def test_with_the_exact_gain_h_is_the_benchs() -> None:
+    """A step of H at rest, from H_0 and half settled."""
+    y, form = Measurement(0.0, 0.0), by_euler.TenByEuler(0.005, printed_model(), exact_gain=True)
+    state, ours = form.init(y), forms_of_10.ours(0.005)
+    theirs = ours.init(y)
+    for _ in range(20):
+        state, theirs = form.step(state, y, 0.0)[0], ours.step(theirs, y, 0.0)[0]
+        assert state[3:] == pytest.approx((theirs.h11, theirs.h12, theirs.h22, theirs.h33), rel=1e-9)
+
+
+def test_eleven_by_euler_approaches_the_benchs() -> None:
+    """The difference fades with the step."""
+    differences = []
+    for dt in (1e-3, 2.5e-4):
+        euler, ours = by_euler.ElevenByEuler(dt, printed_model()), make_observer("homogeneous", dt, printed_model())
+        y = Measurement(0.01, 0.2)
+        a, b, found = euler.init(y), ours.init(y), (0.0, 0.0)
+        for k in range(round(0.3 / dt)):
+            y = Measurement(0.01 + 0.03 * math.sin(9.0 * (k + 1) * dt), 0.2)
+            (a, first), (b, second) = euler.step(a, y, 0.3), ours.step(b, y, 0.3)
+            found = first.x2, second.x2
+        differences.append(abs(found[0] - found[1]))
+    assert differences[1] < 0.4 * differences[0]
+    assert differences[1] < 0.01
 
 
 def test_what_an_update_costs() -> None:

@@ -54,6 +54,8 @@ def in_velocity_mode(plant: Plant, deadband: float, lag_s: float = LAG_S) -> Non
         model.actuator_gainprm[i, 0] = kv
         model.actuator_biasprm[i, :3] = 0.0, 0.0, -kv
         model.dof_frictionloss[dof] = kv * deadband
+        # MuJoCo's friction creeps, unless it is as hard as the step allows.
+        model.dof_solref[dof], model.dof_solimp[dof, :2] = (2.0 * model.opt.timestep, 1.0), 0.9999
         model.key_act[plant.key, model.actuator_actadr[i]] = 0.0
 
 

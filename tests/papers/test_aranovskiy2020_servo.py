@@ -1,0 +1,112 @@
+"""Section II of aranovskiy2020: servos in velocity mode; Section I: two pairs at right angles."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+
+from cmg_mj.papers.aranovskiy2020 import servo, two_axes
+from cmg_mj.papers.aranovskiy2020.paper import TABLE_1, printed_model
+from cmg_mj.papers.recorded import trajectory_of
+from cmg_mj.plant import load_plant
+from cmg_mj.simulate import Result
+
+SEED = 910_000
+
+
+@pytest.mark.parametrize(("command", "expected"), [(0.05, 0.0), (-0.05, 0.0), (0.5, 0.4), (-0.5, -0.4)])
+def test_a_gimbal_with_a_deadband_of_a_tenth(command: float, expected: float) -> None:
+    """Upright without a push, after a few lags: it stands, or turns slower by the deadband."""
+    plant = load_plant(timestep_s=0.001, initial_tilt_deg=0.0, equilibrium_bias_deg=0.0)
+    servo.in_velocity_mode(plant, 0.1)
+    data = plant.new_data()
+    for cube in plant.cubes:
+        data.ctrl[cube.servo] = cube.direction * command
+    mujoco.mj_step(plant.model, data, 20)
+    for cube in plant.cubes:
+        assert cube.direction * data.qvel[cube.gimbal] == pytest.approx(expected, abs=0.01)
+
+
+@pytest.fixture(scope="module")
+def servos() -> servo.Servos:
+    return servo.run(2, SEED, 4.0)
+
+
+def test_servos_of_a_small_deadband_are_not_noticed(servos: servo.Servos) -> None:
+    claim = servo.servo_claim(servos)
+    assert claim.verdict == "reproduced within stated conditions"
+    tilts = [ratio.mean for ratio in claim.figures["tilt_rms_by_none"]]
+    assert tilts[0] == pytest.approx(1.0)
+    assert tilts[-2] > tilts[3] > 1.0  # a large one is
+    stiff, soft = claim.figures["tracking_error_share"][0].mean, claim.figures["tracking_error_share_soft"].mean
+    assert soft > 2.0 * stiff
+
+
+def test_a_servo_that_is_noticed_is_not_reproduced(servos: servo.Servos) -> None:
+    worst = servos.velocity[servo.DEADBANDS[-1]]
+    swapped = servos._replace(velocity=dict(servos.velocity) | {servo.RESOLUTION: worst})
+    assert servo.servo_claim(swapped).verdict == "not reproduced"
+
+
+def test_tracking_is_the_rate_less_the_command(servos: servo.Servos) -> None:
+    """Of a recording whose gimbal turns at 0.9 of the command: a tenth."""
+    run = trajectory_of(servos.soft)
+    time = run["time_s"]
+    command = np.tile(np.sin(time)[:, None], (1, 2))
+    angle = 0.9 * np.vstack([np.zeros((1, 2)), np.cumsum(command, axis=0)[:-1]]) * (time[1] - time[0])
+    columns = dict(run.columns) | {"u_rad_s": command, "x3_rad": angle}
+    made = Result(servos.soft.outcomes, servos.soft.summaries, dataclasses.replace(run, columns=columns))
+    found = servo.tracking(made)
+    assert found is not None
+    assert found.mean == pytest.approx(0.1, rel=1e-6)
+
+
+# --- two axes -------------------------------------------------------------------------------------------------
+
+
+def test_the_body_of_two_pairs_has_the_papers_numbers() -> None:
+    """Both axes alike: four halves and their wheels and gimbals above the joint, worked out from Table 1."""
+    model = two_axes.two_pairs()
+    own = 0.5 * (13e-3 + 10e-3) * 2.0 + TABLE_1["m"] * (two_axes.HEIGHT_M**2 + 0.095**2) * 2.0
+    for axis in range(2):
+        reduced = two_axes.reduced(model, axis)
+        assert reduced.gravity_torque == pytest.approx(2.0 * TABLE_1["m"] * 9.81 * two_axes.HEIGHT_M, rel=1e-6)
+        assert pytest.approx(own, rel=0.05) == reduced.J1  # gimbals and wheels besides
+    pitch, roll = (two_axes.reduced(model, axis) for axis in range(2))
+    assert pytest.approx(roll.J1, rel=1e-12) == pitch.J1
+
+
+def test_a_command_tilts_its_own_axis_as_the_reduced_model_says() -> None:
+    """Upright, gimbals turned at 1 rad/s by hand: J_d omega_d/J1 on its own axis, nothing on the other."""
+    model = two_axes.two_pairs()
+    expected = TABLE_1["J_d"] * TABLE_1["omega_d"] / two_axes.reduced(model, 0).J1
+    for axis in range(2):
+        at, data = two_axes.addresses(model, axis), two_axes.at_rest(model)
+        for sign, gimbal in zip(at.signs, at.gimbals, strict=True):
+            data.qvel[gimbal] = sign
+        mujoco.mj_forward(model, data)
+        assert data.qacc[at.tilt] == pytest.approx(expected, rel=0.02)  # the other pair's gimbals are free for a moment
+        other = two_axes.addresses(model, 1 - axis).tilt
+        assert abs(data.qacc[other]) < 1e-6 * expected
+
+
+def test_the_axes_are_separate_and_a_coupling_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = two_axes.coupling(1.0)
+    assert two_axes.axes_claim({1.0: found}).verdict == "reproduced within stated conditions"
+    assert 0.0 < found.share < 0.01
+    right = two_axes.addresses
+
+    def one_gimbal(model: mujoco.MjModel, axis: int) -> two_axes.Addresses:
+        """A pair whose second gimbal stands still: its one wheel's momentum leans on the other axis as well."""
+        return right(model, axis)._replace(signs=[right(model, axis).signs[0], 0.0])
+
+    monkeypatch.setattr(two_axes, "addresses", one_gimbal)
+    coupled = two_axes.coupling(1.0)
+    assert coupled.share > 10.0 * found.share
+
+
+def test_the_reduced_model_of_the_rig_is_lighter() -> None:
+    assert two_axes.reduced(two_axes.two_pairs(), 0).J1 > 2.0 * printed_model().J1
