@@ -130,7 +130,7 @@ def test_a_fit_to_the_gyro_need_not_be_one_for_the_loop() -> None:
     assert claim.verdict == "reproduced within stated conditions"
     assert "In 1 of the 2 experiments tried" in claim.why
     assert "the tuned are worse than Table 2's for (9) at a push, 100 ug/rtHz." in claim.why
-    assert "At a push, 200 ug/rtHz it is closer than (9), (10) and (11) at their best" in claim.why
+    assert "At a push, 200 ug/rtHz zero is closer than (9), (10) and (11) at their best" in claim.why
     assert Tried(at, loop).worse == ["(9)"]
     assert Tried(at, loop).beaten == []
     fallen = Tried(at, dict.fromkeys(OBSERVERS, Interval(float("nan"), float("-inf"), float("inf"))))

@@ -90,6 +90,10 @@ def lqr_gain(A: np.ndarray, B: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
     return (B.T @ solve_continuous_are(A, B, np.diag(diagonal), np.eye(1)))[0]
 
 
+LEAST_WEIGHT = 1e-3
+"""Of a diagonal Q: a state that hardly counts."""
+
+
 def nearest_diagonal(
     A: np.ndarray, B: np.ndarray, K: np.ndarray, rounding: np.ndarray, start: np.ndarray, searches: int = 3
 ) -> Diagonal:
@@ -100,23 +104,26 @@ def nearest_diagonal(
         B: Input matrix, (n, 1).
         K: The gain as printed, (n,).
         rounding: Half a unit of the digit that each entry of it is printed with, (n,).
-        start: A diagonal near the one sought; entries below 0.01 count as 0.01. (n,).
+        start: A diagonal near the one sought, (n,); entries below 0.01 count as 0.01.
         searches: How often the search starts again from where it ended: a simplex may collapse.
 
     Returns:
         The best that was found.
     """
 
+    def weights(logarithms: np.ndarray) -> np.ndarray:
+        return np.maximum(np.exp(logarithms), LEAST_WEIGHT)
+
     def off(logarithms: np.ndarray) -> float:
         try:
-            return float((np.abs(lqr_gain(A, B, np.exp(logarithms)) - K) / rounding).max())
+            return float((np.abs(lqr_gain(A, B, weights(logarithms)) - K) / rounding).max())
         except LinAlgError:  # Q with entries too far apart for the solver
             return math.inf
 
     best = np.log(np.maximum(start, 0.01))
     for _ in range(searches):
         best = minimize(off, best, method="Nelder-Mead", options={"maxiter": 150, "xatol": 1e-3, "fatol": 1e-3}).x
-    return Diagonal(np.exp(best), lqr_gain(A, B, np.exp(best)), off(best))
+    return Diagonal(weights(best), lqr_gain(A, B, weights(best)), off(best))
 
 
 def lqr_gains() -> Claim:

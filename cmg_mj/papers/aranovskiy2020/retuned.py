@@ -42,12 +42,12 @@ def _gentle(torque_n_m: float) -> list[str]:
     return [f"push.0.torque_n_m={torque_n_m}", "plant.equilibrium_bias_deg=0.0"]
 
 
-STRONG = Push("1 N m, e = 0.5 deg", [], (100.0, 200.0, DEFAULT_NOISE, 800.0, 3200.0), 0.45)
+STRONG = Push("1 N m, e = 0.5 deg", [], (100.0, 200.0, DEFAULT_NOISE, 3200.0), 0.45)
 """That of Figs 5 to 7."""
 PUSHES = (
     STRONG,
-    Push("0.3 N m, e = 0", _gentle(0.3), (50.0, 100.0, 200.0, DEFAULT_NOISE), 0.37),
-    Push("0.1 N m, e = 0", _gentle(0.1), (25.0, 50.0), 0.18),
+    Push("0.3 N m, e = 0", _gentle(0.3), (100.0, 200.0, DEFAULT_NOISE), 0.33),
+    Push("0.1 N m, e = 0", _gentle(0.1), (25.0, 50.0), 0.22),
 )
 
 

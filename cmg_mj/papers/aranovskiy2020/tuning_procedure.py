@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from cmg_mj.intervals import Interval
-from cmg_mj.papers.aranovskiy2020.joint import Together, experiments
+from cmg_mj.papers.aranovskiy2020.joint import Together, experiments, listed
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.retuned import CASES, DEFAULT_NOISE, PUSHES, SEED, STRONG, Studies, in_the_loop
 from cmg_mj.papers.claim import Claim, OnShare
@@ -69,7 +69,7 @@ def procedure_claim(studies: Studies, loops: list[Tried]) -> Claim:
         for level in study.levels
     ]
     tried = list(experiments(studies))
-    good = [together.words for together in tried if together.worth_it]
+    good = [together for together in tried if together.worth_it]
     return Claim(
         place="Section V, tuning",
         says="Fitting an observer to the gyro's rate, recorded with the loop closed on the gyro and a push, tunes it.",
@@ -79,8 +79,8 @@ def procedure_claim(studies: Studies, loops: list[Tried]) -> Claim:
         ),
         holds=bool(good),
         conditions=(
-            f"In {len(good)} of the {len(tried)} experiments tried, in which all three, tuned, follow the gyro better "
-            f"than an estimate of zero: {'; '.join(good)}. {_zero(loops)}{_worse(loops)}"
+            f"In {len(good)} of the {len(tried)} experiments tried: there all three, tuned, follow the gyro better than "
+            f"an estimate of zero. It is {listed(good) if good else 'none'}. {_zero(loops)}{_worse(loops)}"
         ),
         otherwise="In none of the experiments tried do all three, tuned, follow the gyro better than zero does.",
         figures={
@@ -116,7 +116,7 @@ def _in_words(tried: Tried) -> str:
 def _zero(loops: list[Tried]) -> str:
     """Where an estimate of zero does better than the tuned, of the experiments whose loop was closed."""
     return "".join(
-        f"At {each.together.words} it is closer than {listed_and(each.beaten)} at their best, which know the command, "
+        f"At {each.together.words} zero is closer than {listed_and(each.beaten)} at their best, which know the command, "
         "but not the push. "
         for each in loops
         if each.beaten
