@@ -227,7 +227,7 @@ def claim(paper: Paper) -> Claim:
         f"The checker can say yes: constant m1 has Psi = {_text(constant.Psi)}, "
         + ", ".join(f"m1 = {decision.m1} has Psi = {_text(decision.Psi)}" for decision in others)
         + ", their B_(i) skew-symmetric by substitution in the definition. The paper's necessary condition is also "
-        "sufficient: a column of Psi serves exactly if it is a Killing field of M, and an m1 > 0 on the whole line has "
+        "sufficient: a column of Psi serves exactly if it is a Killing field of M. An m1 > 0 on the whole line has "
         "two independent ones exactly if m1 = (A exp(k q2) + D exp(-k q2))^2 with A, D >= 0."
         + (" The paper prints no proof; this is one." if paper == "sokolov2019" else ""),
         holds=not result.wrong,

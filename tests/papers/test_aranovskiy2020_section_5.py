@@ -94,7 +94,7 @@ def test_the_order_is_judged_by_the_velocity_on_all_angles() -> None:
     claim = comparison.order(of_measures({"measured": right, "estimated": turned}, both))
     assert claim.verdict == "not reproduced"
     claim = comparison.order(of_measures(both, {"measured": turned, "estimated": right}))
-    assert "By the tilt RMS it does not hold: best is (11) and (9)." in claim.why or "best is (11) and (9)" in claim.why
+    assert "By the tilt RMS it does not hold: best is (11) and (9)." in claim.why
 
 
 # --- Figs 5 to 7 ------------------------------------------------------------------------------------------------
@@ -104,6 +104,7 @@ def result_of(observer: str, angles: Angles, error: float, *, fell: int = 0, set
     """Runs of three worlds with made-up summaries, and a recording of the observer for the pictures."""
     summary = {
         "velocity_rms_error_rad_s": error,
+        "velocity_rms_error_push_rad_s": 2.0 * error,
         "tilt_rms_deg": 10.0 * error,
         "command_rms_rad_s": error,
         "settle_time_s": 1.0 if settles else None,

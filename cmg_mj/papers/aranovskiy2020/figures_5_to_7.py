@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import pushed, trajectory_of
+from cmg_mj.papers.scales import on_common_scales
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.simulate import Result
@@ -21,8 +22,6 @@ from cmg_mj.trajectory import Trajectory
 FIGURES = {"linear": "Fig. 5", "ltv": "Fig. 6", "homogeneous": "Fig. 7"}
 ANGLES: tuple[Angles, Angles] = ("measured", "estimated")
 """Which angles the law is fed with."""
-Ranges = Mapping[str, tuple[float, float]]
-"""Panel -> its ordinates, which Figs 5 to 7 share."""
 SEED = 72_001
 WORLDS = 20
 
@@ -33,24 +32,15 @@ def in_the_loop(observer: str, angles: Angles, worlds: int, seed: int, duration_
     return push_recovery(observer, seed, settings, duration_s).run_many(worlds)
 
 
-def figure(name: str, results: Mapping[Angles, Result], ranges: Ranges | None = None) -> Claim:
-    """One of Figs 5 to 7.
-
-    Args:
-        name: The observer in the loop.
-        results: Which angles the law is fed with -> runs.
-        ranges: Of the picture's ordinates; by default those of its own lines.
-
-    Returns:
-        The claim.
-    """
+def figure(name: str, results: Mapping[Angles, Result]) -> Claim:
+    """One of Figs 5 to 7."""
     error = {angles: known_interval(result.values("velocity_rms_error_rad_s")) for angles, result in results.items()}
     tilt = {angles: known_interval(result.values("tilt_rms_deg")) for angles, result in results.items()}
     fell = {angles: float(result.fell.mean()) for angles, result in results.items()}
     settled = {angles: float(np.isfinite(result.values("settle_time_s")).mean()) for angles, result in results.items()}
-    listed = "; ".join(
-        f"{angles} angles: {plus_minus(error[angles])} rad/s, tilt RMS {plus_minus(tilt[angles], 3)} deg, "
-        f"{fell[angles]:.0%} fall, {settled[angles]:.0%} settle within 1 deg"
+    listed = " ".join(
+        f"On {angles} angles the velocity RMS error is {plus_minus(error[angles])} rad/s, the tilt RMS "
+        f"{plus_minus(tilt[angles], 3)} deg; {fell[angles]:.0%} fall, {settled[angles]:.0%} settle within 1 deg."
         for angles in results
     )
     worlds = len(results["measured"].outcomes)
@@ -58,8 +48,8 @@ def figure(name: str, results: Mapping[Angles, Result], ranges: Ranges | None = 
         place=FIGURES[name],
         says=f"With the estimate of {OBSERVERS[name]} in the law the rig stands, and recovers from a push.",
         found=(
-            f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, velocity RMS error with "
-            f"the law on {listed}."
+            f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, the law on measured or "
+            f"on estimated angles. {listed}"
         ),
         holds=max(fell.values()) == 0.0 and min(settled.values()) == 1.0,
         otherwise="It falls in some worlds, or does not settle.",
@@ -73,41 +63,11 @@ def figure(name: str, results: Mapping[Angles, Result], ranges: Ranges | None = 
                 (f"settled_fraction_{angles}_angles", settled[angles]),
             )
         },
-        pictures=[_picture(name, _examples(results), ranges or ranges_of([_examples(results)]))],
+        pictures=[_picture(name, {angles: trajectory_of(result).world(0) for angles, result in results.items()})],
     )
 
 
-def _examples(results: Mapping[Angles, Result]) -> dict[Angles, Trajectory]:
-    """World 0 of each."""
-    return {angles: trajectory_of(result).world(0) for angles, result in results.items()}
-
-
-def ranges_of(pictures: Sequence[Mapping[Angles, Trajectory]]) -> Ranges:
-    """The ranges that hold what is drawn in several pictures.
-
-    A range ends where a thousandth of the noisier lines lies beyond it, or where the true motion ends.
-    """
-    runs = [example for examples in pictures for example in examples.values()]
-    drawn = {
-        "tilt": [(np.degrees(run["y1_rad"]), np.degrees(run["x1_rad"])) for run in runs],
-        "rate": [(run[name], run["x2_rad_s"]) for run in runs for name in run.columns if _is_rate(name)],
-        "gimbal": [(np.degrees(run["x3_rad"]), np.degrees(run["x3_rad"])) for run in runs],
-        "command": [(run["u_rad_s"], run["u_rad_s"]) for run in runs],
-    }
-    ranges = {}
-    for panel, pairs in drawn.items():
-        low = min(min(float(np.nanquantile(noisy, 0.001)), float(np.nanmin(true))) for noisy, true in pairs)
-        high = max(max(float(np.nanquantile(noisy, 0.999)), float(np.nanmax(true))) for noisy, true in pairs)
-        margin = 0.05 * (high - low)
-        ranges[panel] = (low - margin, high + margin)
-    return ranges
-
-
-def _is_rate(column: str) -> bool:
-    return column.startswith("estimate/") and column.endswith("/x2_rad_s")
-
-
-def _picture(name: str, examples: Mapping[Angles, Trajectory], ranges: Ranges) -> Picture:
+def _picture(name: str, examples: Mapping[Angles, Trajectory]) -> Picture:
     """Two columns: the law on measured angles, the law on estimated ones."""
     rows: list[list[Panel]] = [[], [], [], []]
     for angles, example in examples.items():
@@ -122,13 +82,10 @@ def _picture(name: str, examples: Mapping[Angles, Trajectory], ranges: Ranges) -
         ]
         gimbal = [Line(t, np.degrees(example["x3_rad"]), "true x3", color=0)]
         command = [Line(t, example["u_rad_s"], "u", color=3, width=0.6)]
-        for row, label, lines, panel, title in (
-            (rows[0], "tilt [deg]", tilt, "tilt", f"{angles} angles"),
-            (rows[1], "tilt rate [rad/s]", rates, "rate", ""),
-            (rows[2], "gimbal angle [deg]", gimbal, "gimbal", ""),
-            (rows[3], "command u [rad/s]", command, "command", ""),
-        ):
-            row.append(Panel(label, lines, title, shaded=shaded, y_range=ranges[panel]))
+        rows[0].append(Panel("tilt [deg]", tilt, f"{angles} angles", shaded=shaded))
+        rows[1].append(Panel("tilt rate [rad/s]", rates, shaded=shaded))
+        rows[2].append(Panel("gimbal angle [deg]", gimbal, shaded=shaded))
+        rows[3].append(Panel("command u [rad/s]", command, shaded=shaded))
     number = FIGURES[name].removeprefix("Fig. ")
     return Picture(
         f"aranovskiy2020-fig-{number}",
@@ -146,17 +103,13 @@ def claims(on_share: OnShare) -> list[Claim]:
         for j, name in enumerate(OBSERVERS):
             results[angles][name] = in_the_loop(name, angles, WORLDS, SEED)
             on_share((3 * i + j + 1) / 9.0)
-    by_name: dict[str, dict[Angles, Result]] = {
-        name: {angles: results[angles][name] for angles in ANGLES} for name in FIGURES
-    }
-    ranges = ranges_of([_examples(found) for found in by_name.values()])
     exact = {
         second_place.TEN: results["measured"]["ltv"].values("velocity_rms_error_rad_s"),
         second_place.ELEVEN: results["measured"]["homogeneous"].values("velocity_rms_error_rad_s"),
     }
     errors = second_place.all_errors(exact, WORLDS, SEED, lambda share: on_share((6.0 + 3.0 * share) / 9.0))
     return [
-        *(figure(name, by_name[name], ranges) for name in FIGURES),
+        *on_common_scales([figure(name, {angles: results[angles][name] for angles in ANGLES}) for name in FIGURES]),
         comparison.order(comparison.measured(results)),
         second_place.cause(errors),
     ]

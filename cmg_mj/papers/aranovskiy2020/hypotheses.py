@@ -179,7 +179,7 @@ def hypothesis_3(ran: Ran) -> Claim:
         says="The flywheels' speed is held constant and far above the rates of tilt and gimbals.",
         found=(
             f"With a speed loop of 0.11 s and at most 0.5 N m the speed strays by at most {off:.2f} rad/s "
-            f"({off / nominal:.2%}) under the push; it is {nominal / max(gimbal, tilt):.0f} times the fastest gimbal "
+            f"({off / nominal:.2%}) under the push. It is {nominal / max(gimbal, tilt):.0f} times the fastest gimbal "
             f"rate ({gimbal:.2f} rad/s) and {nominal / tilt:.0f} times the fastest tilt rate. The term with omega_d' "
             f"that (3) leaves out is {share:.2%} of the tilt acceleration (RMS)."
         ),

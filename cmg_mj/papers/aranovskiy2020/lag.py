@@ -63,14 +63,17 @@ def lag_claim(seed: int = SEED) -> Claim:
     lag_off = max(abs(t.lag_s / foreseen(tau).lag_s - 1.0) for tau, t in found.items())
     noise_off = max(abs(t.noise_gain_1_s / foreseen(tau).noise_gain_1_s - 1.0) for tau, t in found.items())
     gains = [t.noise_gain_1_s for t in found.values()]
-    listed = "; ".join(f"{tau:g} s: {t.lag_s * 1e3:.1f} ms, {t.noise_gain_1_s:.2f} 1/s" for tau, t in found.items())
+    taus = ", ".join(f"{tau:g}" for tau in found)
+    lags = ", ".join(f"{1e3 * t.lag_s:.0f}" for t in found.values())
+    noises = ", ".join(f"{t.noise_gain_1_s:.2f}" for t in found.values())
     return Claim(
         place="(9), lag and noise",
         says="A filter with the differentiator reduces noise, but lag distorts the estimate: tau trades them.",
         found=(
-            f"By tau, the lag on a steady acceleration and the noise gain (RMS of the estimate by that of white noise "
-            f"in y1 at 200 Hz): {listed}. The lag is 2 tau to {lag_off:.1g}, the noise gain that of "
-            f"the transfer function to {noise_off:.1%}; for a long tau it falls as sqrt(dt/(4 tau^3))."
+            f"With tau = {taus} s the lag on a steady acceleration is {lags} ms. The noise gain, the RMS of the "
+            f"estimate by that of white noise in y1 at 200 Hz, is {noises} 1/s. The lag is 2 tau to {lag_off:.1g}, the "
+            f"noise gain that of the transfer function to {noise_off:.1%}. For a long tau it falls as "
+            "sqrt(dt/(4 tau^3))."
         ),
         holds=lag_off < 0.01 and noise_off < 0.05 and gains == sorted(gains, reverse=True),
         otherwise="Lag or noise is not what the transfer function says.",

@@ -134,9 +134,9 @@ def lqr_gains() -> Claim:
     near = nearest_diagonal(model.A_e, model.B_e, K, np.array(K_E_ROUNDING), found.diagonal)
     negative = [f"q{i + 1} = {q:.3g}" for i, q in enumerate(found.diagonal) if q < 0.0]
     digits = (
-        f"To the last digit of K_e no diagonal Q does it (the only candidate has {', '.join(negative)}); "
+        f"No diagonal Q does it exactly: the only candidate has {', '.join(negative)}. "
         if negative
-        else "To the last digit of K_e a diagonal Q does it: " + ", ".join(f"{q:.3g}" for q in found.diagonal) + "; "
+        else "A diagonal Q does it exactly: " + ", ".join(f"{q:.3g}" for q in found.diagonal) + ". "
     )
     some = (
         f"and a Q >= 0 of rank 1 returns K_e from the Riccati equation to {found.recovered:.0e}"
@@ -151,8 +151,8 @@ def lqr_gains() -> Claim:
         found=(
             f"The return difference |1 + K_e (jw - A_e)^-1 B_e| is nowhere below {found.least:.6f}: K_e "
             f"{'is' if found.optimal else 'is not'} optimal for some quadratic cost, {some}. {digits}"
-            f"to the digits printed Q = diag({weights}), R = 1 {'does' if near.off < 1.0 else 'comes nearest'}: it "
-            f"gives ({gains}), at most {near.off:.2f} of half a unit of the last digit from K_e."
+            f"To the digits printed Q = diag({weights}), R = 1 {'does' if near.off < 1.0 else 'comes nearest'}: it "
+            f"gives ({gains}), off K_e by at most {near.off:.2f} of half a unit of the last digit."
         ),
         holds=found.optimal and found.recovered < 1e-6,
         conditions=(

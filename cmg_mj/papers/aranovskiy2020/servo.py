@@ -118,10 +118,10 @@ def servo_claim(found: Servos) -> Claim:
             f"Servos in velocity mode with a lag of {1e3 * LAG_S:g} ms and a deadband, (11) in the loop, "
             f"{len(smooth.outcomes)} seeds, the push of Figs 5 to 7. Over {MEANS_S:g} s the gimbal is off its command "
             f"by {_share(tracked[0.0])} of it (RMS) without a deadband, by {_share(near)} with the resolution of the "
-            f"MX-106, {RESOLUTION:g} rad/s; with a lag of {1e3 * SOFT_LAG_S:g} ms, and so less torque against the "
-            f"flywheel's, by {_share(tracking(found.soft))}. By deadband [rad/s], velocity RMS error and tilt RMS by "
-            f"those without: {listed}. The rig falls with {', '.join(falling) or 'none'}. The bench's own servo, which "
-            f"integrates its command, has {bench.mean:.2f} times the velocity error."
+            f"MX-106, {RESOLUTION:g} rad/s. With a lag of {1e3 * SOFT_LAG_S:g} ms, and so less torque against the "
+            f"flywheel's, it is {_share(tracking(found.soft))}. By deadband [rad/s], velocity RMS error and tilt RMS "
+            f"by those without: {listed}. The rig falls with {', '.join(falling) or 'none'}. The bench's own servo, "
+            f"which integrates its command, has {bench.mean:.2f} times the velocity error."
         ),
         holds=RESOLUTION in unnoticed and near is not None and near.mean < WITHIN,
         conditions=(

@@ -36,16 +36,15 @@ def table_2_claim(case: Tuned, studies: Studies, together: Together) -> Claim:
         says=f"{case.printed}, tuned to fit the gyro best.",
         found=(
             f"Fitted on {len(level.rms)} seeds, scored on as many others, from the push to a second after it. At "
-            f"{together.words}, where the three lines of Table 2 come nearest to being the best together, the tuned "
-            f"are {_sizes(level)}: Table 2's error {level.given_rms.mean():.4f} rad/s, theirs "
-            f"{level.rms.mean():.4f}, the ratio {_ratio(level)}; that of an estimate of zero {level.zero_rms:.4f}. "
+            f"{together.words}, where the three lines come nearest to being the best together, the best is "
+            f"{_sizes(level)}. Table 2's error is {level.given_rms.mean():.4f} rad/s, that of the tuned "
+            f"{level.rms.mean():.4f}, the ratio {_ratio(level)}. That of an estimate of zero is {level.zero_rms:.4f}. "
             f"{_elsewhere(case, studies)}"
         ),
         holds=is_best(level) and good,
         conditions=(
-            f"At {together.words}, the same for all three lines (the bench's own noise is {DEFAULT_NOISE:g}). The paper "
-            "gives neither its push nor its noise. "
-            f"{_scenario(case, studies)}"
+            f"At {together.words}, the same for all three lines (the bench's own noise is {DEFAULT_NOISE:g}). The "
+            f"paper gives neither its push nor its noise. {_scenario(case, studies)}"
         ),
         otherwise=(
             f"In the experiment in which all three could have been tuned they have {level.ratio.mean:.2f} times the "

@@ -79,8 +79,8 @@ def procedure_claim(studies: Studies, loops: list[Tried]) -> Claim:
         ),
         holds=bool(good),
         conditions=(
-            f"In {len(good)} of the {len(tried)} experiments tried: there all three, tuned, follow the gyro better than "
-            f"an estimate of zero. It is {listed(good) if good else 'none'}. {_zero(loops)}{_worse(loops)}"
+            f"In {len(good)} of the {len(tried)} experiments tried: there all three, tuned, follow the gyro better "
+            f"than an estimate of zero. These are {listed(good) if good else 'none'}. {_zero(loops)}{_worse(loops)}"
         ),
         otherwise="In none of the experiments tried do all three, tuned, follow the gyro better than zero does.",
         figures={
@@ -116,8 +116,8 @@ def _in_words(tried: Tried) -> str:
 def _zero(loops: list[Tried]) -> str:
     """Where an estimate of zero does better than the tuned, of the experiments whose loop was closed."""
     return "".join(
-        f"At {each.together.words} zero is closer than {listed_and(each.beaten)} at their best, which know the command, "
-        "but not the push. "
+        f"At {each.together.words} zero is closer than {listed_and(each.beaten)} at their best, which know the "
+        "command, but not the push. "
         for each in loops
         if each.beaten
     )

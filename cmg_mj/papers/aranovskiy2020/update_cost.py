@@ -47,7 +47,7 @@ def cost() -> Claim:
         says="The observer (10) is computationally heavy: its gain takes differential equations solved online.",
         found=(
             f"An update takes, by that of (9): (11) {ratios['homogeneous']:.1f}, (10) {ratios['ltv']:.1f} with the "
-            "exact step on the 2x2 block that is left of H; written out with 3x3 matrices "
+            "exact step on the 2x2 block that is left of H. Written out with 3x3 matrices it takes "
             f"{ratios['ltv, plain Euler']:.0f} with Euler and {ratios['ltv, plain Runge-Kutta 4']:.0f} with "
             f"Runge-Kutta 4 (one world, in Python). The arithmetic alone, on {worlds} worlds at once: (11) "
             f"{arithmetic['homogeneous']:.1f}, (10) {arithmetic['ltv']:.1f}. (10) takes {one['ltv']:.0f} us of the "

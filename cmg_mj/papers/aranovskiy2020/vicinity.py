@@ -123,10 +123,11 @@ def vicinity_claim(seed: int = SEED) -> Claim:
         says="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
         found=(
             "k1, k2 of Table 2, at rest. Without bias and noise a first error of 1 rad/s has fallen after 2.5 s, by "
-            f"alpha, to {_listed(left, '.0e')} rad/s at 200 Hz, to {_listed(often, '.0e')} at 2000 Hz: near 1/2 "
+            f"alpha, to {_listed(left, '.0e')} rad/s at 200 Hz. At 2000 Hz it is {_listed(often, '.0e')}: near 1/2 "
             "what is left is chatter between samples. With a bias e the rate rests off by "
-            f"k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), to {off:.0e} of it for e from {BIASES_DEG[0]:g} to "
-            f"{BIASES_DEG[-1]:g} deg where that is above {SEEN_RAD_S:g} rad/s, else to {apart:.0e} rad/s; at 0.5 deg "
+            "k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), for e from "
+            f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg: to {off:.0e} of it where that is above {SEEN_RAD_S:g} "
+            f"rad/s, else to {apart:.0e} rad/s. At 0.5 deg it is "
             f"{_listed({a: values[2] for a, values in found.by_bias.items()}, '.4f')} rad/s. With noise in y1 and e = "
             "0 its RMS rises with the noise to the power "
             f"{_listed(slopes, '.2f')}: the vicinity shrinks to the origin "
