@@ -19,13 +19,13 @@ COLOURS: dict[str, Colour] = {
     "homogeneous": (251, 96, 0),
     "luenberger": (255, 134, 181),
     "finite_difference": (179, 45, 0),
-    "super_twisting": (148, 42, 178),
+    "super_twisting": (44, 61, 254),
     "linear_high_gain": (177, 179, 252),
-    "high_gain": (44, 61, 254),
+    "high_gain": (148, 42, 178),
     "adaptive": (243, 54, 196),
     "homogeneous_adaptive": (231, 180, 33),
 }
-"""The bundled observers."""
+"""The bundled observers. Those that are often among the best are no shades of one colour."""
 
 YARDSTICKS: dict[str, Colour] = {
     "true": (165, 165, 165),

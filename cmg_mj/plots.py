@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.colours import colour, colours, hexadecimal
-from cmg_mj.legible import axis_range, best, by_observer, shortened
+from cmg_mj.legible import JUDGED_BY, axis_range, best, by_observer, shortened
 from cmg_mj.picture import Panel, Picture
+from cmg_mj.summary_keys import written
 from cmg_mj.trajectory import Trajectory, whole_file
 
 
@@ -144,7 +145,8 @@ def plot_run(
         axes.margins(x=0.0)
     for axes in panels[:5]:
         axes.tick_params(labelbottom=axes is panels[4])
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
+        legend = {"fontsize": "small", "ncols": 6, "frameon": False, "borderpad": 0, "columnspacing": 1.4}
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), **legend)
     panels[4].set_xlabel("time [s]")
     figure.align_ylabels(panels[:5])
     figure.suptitle(title, x=0.01, ha="left", parse_math=False)
@@ -176,12 +178,17 @@ def _draw_estimates(
     rates.plot(t, trajectory["fog_rad_s"], color=MEASURED, linewidth=0.6, label="gyro")
     rates.plot(t, true, color=INK, linewidth=1.8, label="true $x_2$")
     labels = shortened(trajectory.observers)
+    judged_by = next((key for key in JUDGED_BY if any(summaries[name].get(key) is not None for name in palette)), "")
+    if judged_by:
+        errors.plot([], [], " ", label="RMS in push windows:" if "push" in judged_by else "RMS:")
     for name, color in palette.items():
         label = labels[name].lstrip("_")  # matplotlib hides what begins with an underscore
         style = {"color": color, "linewidth": 0.8}
-        rms = summaries[name].get("velocity_rms_error_rad_s")
+        rms = summaries[name].get(judged_by)
         rates.plot(t, estimates[name], **style, label=f"{label} $\\hat x_2$")
-        errors.plot(t, estimates[name] - true, **style, label=label if rms is None else f"{label}: RMS {rms:.3g}")
+        errors.plot(
+            t, estimates[name] - true, **style, label=f"{label} {written(judged_by, rms)}" if judged_by else label
+        )
     rates.set_ylabel("tilt rate\n[rad/s]")
     errors.set_ylabel("error $\\hat x_2 - x_2$\n[rad/s]")
     _fit(errors, [true], [estimate - true for estimate in estimates.values()])

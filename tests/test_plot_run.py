@@ -63,13 +63,14 @@ def test_eleven_lines_on_one_page(
     assert height <= PAGE[1]
     tilt, rate, error, _, command, *small = figure.axes
     assert len(small) == len(OBSERVERS) - 3
+    assert min(axes.get_position().height * height for axes in figure.axes) > 0.7
     assert "settle band" in labels(tilt)
     assert "push" in labels(tilt)
     assert "rate limit" in labels(command)
     assert [line.get_ydata()[0] for line in command.lines[-2:]] == [LIMIT, -LIMIT]
-    assert len(error.lines) == 3
+    assert len(error.lines) == 1 + 3
     np.testing.assert_allclose(
-        error.lines[0].get_ydata(), trajectory["estimate/homogeneous/x2_rad_s"] - trajectory["x2_rad_s"]
+        error.lines[1].get_ydata(), trajectory["estimate/homogeneous/x2_rad_s"] - trajectory["x2_rad_s"]
     )
     shown = [text.split(" ")[0] for text in labels(rate)[2:]]
     assert shown[0] == trajectory.observers[0]
@@ -99,6 +100,20 @@ def test_an_estimate_that_goes_astray_takes_no_axis(
         assert low <= true.min()
         assert true.max() <= high
         assert high - low < 8.0 * np.ptp(true)
+
+
+def test_long_names_do_not_narrow_the_panels(
+    ridden: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+) -> None:
+    trajectory, summary = ridden
+    longest = sorted(OBSERVERS, key=len)[-3:]
+    figures_of = summary["companions"] | {"homogeneous": summary}
+    companions = {name: dict.fromkeys(figures_of[name], 0.0) for name in longest[1:]}
+    signals = tuple(trajectory.extra_signals(name) for name in longest)
+    layout = replace(trajectory.layout, observers=tuple(longest), extra_signals=signals)
+    few = replace(trajectory, layout=layout)
+    figure = plotted(tmp_path, few, {**figures_of[longest[0]], "companions": companions}, figures)
+    assert figure.axes[0].get_position().x0 < 0.15
 
 
 @pytest.mark.parametrize("ticks", [0, 1, 2])

@@ -54,7 +54,8 @@ def default_blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint
         A dashboard for one run; for several, one that compares them, and a tab for each. Of more than a few observers
         the best are switched on, and another tab has all of them.
     """
-    boards = [_dashboard(branch) for branch in branches]
+    names = _page_names(branches)
+    boards = [_dashboard(branch, names) for branch in branches]
     if len(branches) > 1:
         boards = [*_comparison(plant, branches), *boards]
     elif len(branches[0].run.observers) > FEW:
@@ -69,26 +70,23 @@ def default_blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint
     )
 
 
-def _dashboard(branch: Branch) -> rrb.Container:
+def _dashboard(branch: Branch, names: Sequence[str]) -> rrb.Container:
     """Everything about one run."""
     tilt = (*TILT_PLOTS, BIAS_PLOT) if _has_bias(branch) else TILT_PLOTS
     mechanism = rig(branch, f"Rig (flywheels drawn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed)")
-    few = best_observers(branch.run)
-    names = _page_names([branch])
     return _columns(
         branch.label,
         [9, 8, 6],
-        rrb.Vertical(mechanism, pages(names, names[-2]), row_shares=[5, 4]),
-        _below_lanes([branch], tilt, [plot(what, branch, Choice(few)) for what in tilt]),
-        _stack(ACTUATOR_PLOTS, [plot(what, branch, Choice(few)) for what in ACTUATOR_PLOTS]),
+        rrb.Vertical(mechanism, pages(names, "Observers" if branch.run.companions else "Summary"), row_shares=[1, 1]),
+        _below_lanes([branch], tilt, [plot(what, branch, _best_of(what, branch)) for what in tilt]),
+        _stack(ACTUATOR_PLOTS, [plot(what, branch, _best_of(what, branch)) for what in ACTUATOR_PLOTS]),
     )
 
 
 def _all_riding_along(branch: Branch) -> rrb.Container:
     """What every observer of a run says, each to be switched on in the legend."""
-    observers = Choice(best_observers(branch.run), listed=True)
-    rates = [plot(what, branch, observers) for what in ESTIMATE_PLOTS]
-    bias = [plot(BIAS_PLOT, branch, observers)] if _has_bias(branch) else []
+    rates = [plot(what, branch, _best_of(what, branch, listed=True)) for what in ESTIMATE_PLOTS]
+    bias = [plot(BIAS_PLOT, branch, _best_of(BIAS_PLOT, branch, listed=True))] if _has_bias(branch) else []
     return _columns(ALL, [3, 2], rrb.Vertical(*rates), rrb.Vertical(*bias, pages(_page_names([branch]), "Observers")))
 
 
@@ -122,13 +120,19 @@ def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]
     return [board, more]
 
 
+def _best_of(what: Plot, branch: Branch, *, listed: bool = False) -> Choice:
+    """The best of those that have a line in a plot."""
+    there = {row.observer for path, row in branch.series.items() if path.startswith(what.entities)}
+    return Choice(best_observers(branch.run, there), listed)
+
+
 def _has_bias(branch: Branch) -> bool:
     return any(path.startswith("bias/") for path in branch.series)
 
 
 def _page_names(branches: Sequence[Branch]) -> list[str]:
-    """The pages there are; the last but one is in front of a dashboard."""
-    riding = any(len(branch.run.observers) > 1 for branch in branches)
+    """The pages there are."""
+    riding = len(branches) == 1 or any(branch.run.companions for branch in branches)
     return ["Summary", *(["Observers"] if riding else []), "Scenario"]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,10 +41,16 @@ class Run:
         """The observer in the loop, then those riding along, each with its numbers."""
         return by_observer(self.trajectory.observers, self.summary)
 
+    @property
+    def companions(self) -> tuple[str, ...]:
+        """Those riding along."""
+        return self.trajectory.observers[1:]
 
-def best_observers(run: Run) -> list[str]:
-    """The one in the loop, and the best of those riding along."""
-    return best(run.observers, always=run.trajectory.observers[:1])
+
+def best_observers(run: Run, among: Collection[str] | None = None) -> list[str]:
+    """The one in the loop, and the best of those riding along; only those in `among`, if it is given."""
+    there = {name: of for name, of in run.observers.items() if among is None or name in among}
+    return best(there, always=[name for name in run.trajectory.observers[:1] if name in there])
 
 
 def best_runs(runs: Sequence[Run]) -> list[str]:

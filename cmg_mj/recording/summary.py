@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from cmg_mj import markdown
 from cmg_mj.legible import FEW, shortened
@@ -12,11 +13,11 @@ from cmg_mj.recording.run import Run, best_observers, best_runs
 from cmg_mj.summary_keys import KEYS, RIDING, heading, written
 
 ROW_TABLES = (
-    ("velocity_rms_error_rad_s", "settle_time_s"),
-    ("velocity_rms_error_push_rad_s", "velocity_fit", "velocity_fit_push"),
-    ("tilt_rms_deg", "gimbal_peak_deg", "command_rms_rad_s"),
+    ("velocity_rms_error_push_rad_s", "velocity_fit"),
+    ("velocity_rms_error_rad_s", "settle_time_s", "tilt_rms_deg"),
+    ("velocity_fit_push", "gimbal_peak_deg", "command_rms_rad_s"),
 )
-"""What is shown where each run is a row, table by table."""
+"""What is shown where each run is a row, table by table: first that by which the best are found."""
 
 BOLD = "In bold: those that are switched on in the plots; the legends of the other tab switch on any."
 
@@ -44,20 +45,22 @@ def page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: Metr
 
 
 def observers_page(runs: Sequence[Run]) -> str:
-    """The estimates of those in the loop and those riding along; empty where nobody rides along."""
-    parts = []
-    for run in runs:
-        if len(run.observers) > 1:
-            names = _marked(list(run.observers), best_observers(run))
-            names += list(run.summary.get("references", ()))
-            figures = [*run.observers.values(), *run.summary.get("references", {}).values()]
-            bold = f" {BOLD}" if len(run.observers) > FEW else ""
-            parts.append(f"In the run of {run.name}; the others ride along.{bold}")
-            for keys in RIDING_TABLES:
-                said = [[written(key, of.get(key)) for key in keys] for of in figures]
-                rows = [(name, *row) for name, row in zip(names, said, strict=True)]
-                parts.append(markdown.table(("", *map(heading, keys)), rows))
-    return _paragraphs(*parts) if parts else ""
+    """What is estimated in a run, by all that ride along; of several runs, of those with companions."""
+    return _paragraphs(*(part for run in runs if len(runs) == 1 or run.companions for part in _estimates(run)))
+
+
+def _estimates(run: Run) -> list[str]:
+    """One run's observers, then what they are judged beside, table by table."""
+    references: Mapping[str, Mapping[str, Any]] = run.summary.get("references") or {}
+    names = [*_marked(list(run.observers), best_observers(run)), *references]
+    figures = [*run.observers.values(), *references.values()]
+    said = f"In the run of {run.name}.{' The others ride along.' if len(names) > 1 else ''}"
+    parts = [f"{said} {BOLD}" if len(run.observers) > FEW else said]
+    for keys in RIDING_TABLES:
+        rows = [[written(key, of.get(key)) for key in keys] for of in figures]
+        rows = [(name, *row) for name, row in zip(names, rows, strict=True)]
+        parts.append(markdown.table(("", *map(heading, keys)), rows))
+    return parts
 
 
 def scenario_page(toml: str) -> str:
@@ -105,4 +108,4 @@ def _pushes(pushes: Sequence[Push]) -> str:
 
 
 def _paragraphs(*parts: str) -> str:
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(parts) + "\n" if parts else ""
