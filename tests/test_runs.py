@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import subprocess
 import tomllib
 from collections.abc import Callable
@@ -278,6 +279,23 @@ def test_a_title_of_any_letters_under_an_ascii_locale(command: str) -> None:
     assert done.returncode == 0, done.stderr
     assert b"Sto\\xdf" in done.stdout
     assert tomllib.loads(Path("it/scenario.toml").read_text(encoding="utf-8"))["title"] == "Stoß – 1°"
+
+
+@pytest.mark.parametrize("command", ["run", "compare", "tune"])
+@pytest.mark.parametrize("locale", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}], ids=["", "C"])
+def test_a_folder_and_a_file_named_in_bytes_that_are_no_letters(command: str, locale: dict[str, str]) -> None:
+    Path(os.fsdecode(b"my\xff.toml")).write_text("duration_s = 0.2\n[observer]\nkind = 'linear'")
+    options = {"run": [], "compare": ["--observers", "linear", "--worlds", "1"], "tune": ["--worlds", "2"]}[command]
+    for place in (["--out", b"it\xff"], []):
+        done = subprocess.run(
+            [*COMMAND, command, b"my\xff.toml", *options, *place],
+            env=environment(**locale),
+            capture_output=True,
+            timeout=HANGS_AFTER_S,
+        )
+        assert done.returncode == 0, done.stderr
+    assert len(os.listdir(b"it\xff")) > 2
+    assert all(name.decode().isascii() for name in os.listdir(b"runs"))
 
 
 @pytest.mark.usefixtures("elsewhere")
