@@ -171,7 +171,7 @@ def test_a_comparison_of_one_world_equals_single_runs() -> None:
         single = json.loads(cmg_mj("run", file, "--observer", entry["observer"], "--json", "--out", name).out)
         shared = {key: entry[key] for key in single.keys() & entry.keys()}
         assert shared == {key: single[key] for key in shared}
-        assert len(shared) == 14
+        assert len(shared) == 15
         columns = Trajectory.load(Path(f"it/trajectory-{name}.parquet")).columns
         assert all(
             (columns[key] == values).all()
