@@ -23,12 +23,14 @@ def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[st
         scenario: The other.
 
     Returns:
-        Field, `section.field` -> its value in the other; None where it has no such field.
+        Field, `section.field` -> its value in the other; None where it has no such field. The parameters of different
+        observers are not compared.
     """
+    left_out = TOLD_OTHERWISE | ({"observer"} if base["observer"]["kind"] != scenario["observer"]["kind"] else set())
     return {
         name: value
         for name, value in _differing(base, scenario)
-        if name not in TOLD_OTHERWISE and name.partition(".")[0] not in TOLD_OTHERWISE
+        if name not in left_out and name.partition(".")[0] not in left_out
     }
 
 

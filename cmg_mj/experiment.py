@@ -179,10 +179,14 @@ class Experiment:
         base = base_of(self.scenario)
         if base is None:
             return {}
-        base = base.with_observer(self.scenario.observer.kind)
-        if base.model_dump(mode="json") == self.scenario.model_dump(mode="json"):
+        other = base.with_observer(self.scenario.observer.kind)
+        if other.model_dump(mode="json") == self.scenario.model_dump(mode="json"):
             return {}
-        return differences(prepare(base).resolved(), self.resolved())
+        try:
+            bundled = prepare(other)
+        except InputError:  # it does not suit this observer
+            bundled = prepare(base)
+        return differences(bundled.resolved(), self.resolved())
 
     def save(self, path: Path) -> None:
         """Write the resolved scenario as TOML: running that file again gives the same run."""

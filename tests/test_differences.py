@@ -68,7 +68,8 @@ def test_any_value_makes_a_file_name(value: object) -> None:
 
 
 def test_a_field_that_is_not_there() -> None:
-    assert differences({"a": {"x": 1, "y": 2}}, {"a": {"x": 1}}) == {"a.y": None}
+    observer = {"observer": {"kind": "ltv"}}
+    assert differences({"a": {"x": 1, "y": 2}, **observer}, {"a": {"x": 1}, **observer}) == {"a.y": None}
     assert in_a_name({"a.y": None}) == "-y=none"
 
 
@@ -101,6 +102,12 @@ def test_folder_title_and_summary_tell(command: list[Any]) -> None:
         assert entry["differs"] == {"duration_s": 0.1, "plant.equilibrium_bias_deg": 1.0, "push": []}
     again = cmg_mj("run", f"runs/{folder}/scenario.toml")
     assert again.out.splitlines()[0].endswith("equilibrium_bias_deg=1, push=none")
+
+
+def test_an_observer_that_the_bundled_scenario_does_not_suit() -> None:
+    """No trimming without an estimate of the bias."""
+    found = prepare(load_scenario("bias_estimation", ["controller.trim_s=0"], "linear")).differences
+    assert found == {"controller.trim_s": 0.0}
 
 
 def test_a_long_name_of_a_users_file() -> None:
