@@ -1,4 +1,4 @@
-"""plot.png: what is on it, and that no line takes an axis for itself."""
+"""Plots: what is on plot.png, that no line takes an axis for itself, colours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import pytest
 from cmg_mj.colours import colour, hexadecimal
 from cmg_mj.experiment import prepare
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.plots import PAGE, plot_run
+from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.plots import PAGE, draw, plot_run
 from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
 
@@ -114,6 +115,12 @@ def test_long_names_do_not_narrow_the_panels(
     few = replace(trajectory, layout=layout)
     figure = plotted(tmp_path, few, {**figures_of[longest[0]], "companions": companions}, figures)
     assert figure.axes[0].get_position().x0 < 0.15
+
+
+def test_a_picture_has_the_observers_colours(tmp_path: Path, figures: list[matplotlib.figure.Figure]) -> None:
+    lines = [Line([0.0, 1.0], [0.0, 1.0], "(10) ltv", color="ltv"), Line([0.0, 1.0], [1.0, 0.0], "other", color=3)]
+    draw(tmp_path / "it.png", Picture("it", "A title", [Panel("y", lines)]))
+    assert [line.get_color() for line in figures[-1].axes[0].lines] == [hexadecimal(colour("ltv")), "C3"]
 
 
 @pytest.mark.parametrize("ticks", [0, 1, 2])
