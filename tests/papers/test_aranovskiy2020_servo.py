@@ -46,9 +46,15 @@ def test_servos_of_a_small_deadband_are_not_noticed(servos: servo.Servos) -> Non
 
 
 def test_a_servo_that_is_noticed_is_not_reproduced(servos: servo.Servos) -> None:
-    worst = servos.velocity[servo.DEADBANDS[-1]]
-    swapped = servos._replace(velocity=dict(servos.velocity) | {servo.RESOLUTION: worst})
-    assert servo.servo_claim(swapped).verdict == "not reproduced"
+    """In the tilt alone, in the estimate alone, or in what the gimbal does."""
+    small = servos.velocity[servo.RESOLUTION]
+    for key in ("tilt_rms_deg", "velocity_rms_error_rad_s"):
+        summaries = [summary | {key: 1.2 * summary[key]} for summary in small.summaries]
+        swapped = dict(servos.velocity) | {servo.RESOLUTION: dataclasses.replace(small, summaries=summaries)}
+        assert servo.servo_claim(servos._replace(velocity=swapped)).verdict == "not reproduced"
+    loose = dataclasses.replace(small, trajectory=servos.velocity[servo.DEADBANDS[-1]].trajectory)
+    swapped = dict(servos.velocity) | {servo.RESOLUTION: loose}
+    assert servo.servo_claim(servos._replace(velocity=swapped)).verdict == "not reproduced"
 
 
 def test_tracking_is_the_rate_less_the_command(servos: servo.Servos) -> None:

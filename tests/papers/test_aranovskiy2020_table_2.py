@@ -42,12 +42,12 @@ def test_tuned_again_on_other_seeds() -> None:
 
 
 def test_the_tuned_are_set_in_the_loop() -> None:
-    """Gains that follow nothing let the rig fall, or do worse than Table 2's by far."""
+    """Table 2's own gains are as good as Table 2's, and slower ones worse by far."""
     same = dataclasses.replace(level(200.0, 1.0), parameters=TABLE_2["linear"])
     slow = dataclasses.replace(same, sizes={"tau": 0.04}, parameters={"tau": 0.04})
     found = retuned.in_the_loop(retuned.LINEAR, same, STRONG, 3, SEED)
     assert found == pytest.approx((1.0, 1.0, 1.0))
-    assert retuned.in_the_loop(retuned.LINEAR, slow, STRONG, 3, SEED).mean != pytest.approx(1.0, abs=0.05)
+    assert retuned.in_the_loop(retuned.LINEAR, slow, STRONG, 3, SEED).high < 0.5  # Table 2's by that of the slow
 
 
 # --- verdicts, from made-up levels ----------------------------------------------------------------------------
