@@ -144,11 +144,6 @@ def _title(text: str) -> Text:
     return Text(text, style="table.title", no_wrap=True, overflow="ignore")
 
 
-def _title(text: str) -> Text:
-    """A table's title on one line, even if the table is not as wide."""
-    return Text(text, style="table.title", no_wrap=True, overflow="ignore")
-
-
 def _capitalised(text: str) -> str:
     return text[:1].upper() + text[1:]
 

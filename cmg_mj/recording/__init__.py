@@ -74,21 +74,23 @@ def write_recording(
             raise InputError("the environment variable RERUN turns recording off: unset it")
         # Rerun's own writing to a file hides a full disk, or waits for ever.
         memory = rec.memory_recording()
-        rec.send_blueprint(default_blueprint(plant, branches), make_active=False, make_default=True)
-        rec.set_log_time_enabled(False)
-        rec.set_log_tick_enabled(False)
-        rec.send_recording_name(f"{title or 'Run'}: {', '.join(labels)}")
-        _log_properties(rec, runs, title)
-        end = max(run.outcome.time_s for run in runs)
-        for branch in branches:
-            log_rig(rec, branch.path, plant, branch.run, pushes, branch.rig)
-            log_series(rec, branch)
-            log_phases(rec, branch, pushes, settings, end)
-        _log_page(rec, "summary", page(title, runs, pushes, settings, notes))
-        if observers := observers_page(runs):
-            _log_page(rec, "observers", observers)
-        _log_page(rec, "scenario", scenario_page(scenario_toml))
-        content = memory.drain_as_bytes()
+        try:
+            rec.send_blueprint(default_blueprint(plant, branches), make_active=False, make_default=True)
+            rec.set_log_time_enabled(False)
+            rec.set_log_tick_enabled(False)
+            rec.send_recording_name(f"{title or 'Run'}: {', '.join(labels)}")
+            _log_properties(rec, runs, title)
+            end = max(run.outcome.time_s for run in runs)
+            for branch in branches:
+                log_rig(rec, branch.path, plant, branch.run, pushes, branch.rig)
+                log_series(rec, branch)
+                log_phases(rec, branch, pushes, settings, end)
+            _log_page(rec, "summary", page(title, runs, pushes, settings, notes))
+            if observers := observers_page(runs):
+                _log_page(rec, "observers", observers)
+            _log_page(rec, "scenario", scenario_page(scenario_toml))
+        finally:  # of what is left in it, rerun would complain on standard error
+            content = memory.drain_as_bytes()
     with whole_file(path) as temporary:
         temporary.write_bytes(content)
 
