@@ -196,4 +196,4 @@ def test_a_companion_that_gives_nan_harms_nobody(quick: str) -> None:
     kind = f"{__name__}:GivesNan"
     said = cmg_mj("run", quick, "--set", f"companions=['{kind}']")
     assert said.status == 0
-    assert re.search(rf"{kind} \[rad/s\]\s+-", said.out)
+    assert re.search(rf"{kind}\s+-\s+-", said.out)
