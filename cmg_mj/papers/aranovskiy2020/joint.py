@@ -86,7 +86,7 @@ def joint_claim(studies: Studies) -> Claim:
         place="Table 2, the three together",
         says="The three observers were tuned on the same collected data: Fig. 4's one experiment.",
         found=(
-            f"{len(studies)} pushes at {len(tried)} noises in all, each recorded once for all three. In {len(worth)} "
+            f"{len(studies)} pushes at several noises, {len(tried)} experiments, each recorded once for all three. In {len(worth)} "
             "of them all three can be tuned to follow the gyro better than an estimate of zero does. Of these Table "
             f"2's lines come nearest to being the best together at {found.words}. Table 2's error by that of the "
             f"tuned there: {ratios}. Zero left aside it is {least.words}, where the worst has {least.worst:.2f} times "

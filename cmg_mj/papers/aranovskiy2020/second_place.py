@@ -72,8 +72,8 @@ def cause(errors: Errors) -> Claim:
             f"The loop closed on either, {len(errors[TEN])} seeds, e = 0.5 deg, 400 ug/rtHz, the law on measured "
             f"angles. Velocity RMS error of (10) less that of (11): {plus_minus(exact)} rad/s with exact steps, "
             f"{plus_minus(by_euler)} with one explicit Euler step a sample in both. The method makes "
-            f"{plus_minus(method)} of it, {told}. With the exact H and Euler in the estimate alone (10) has "
-            f"{plus_minus(gain, signed=True)} rad/s less error than with all of it by Euler."
+            f"{plus_minus(method)} of it, {told}. With H by Euler, too, (10) has "
+            f"{plus_minus(gain, signed=True)} rad/s more error than with the exact H and Euler in the estimate alone."
         ),
         holds=_positive(method) and _positive(exact),
         conditions=(
