@@ -86,11 +86,11 @@ def joint_claim(studies: Studies) -> Claim:
         place="Table 2, the three together",
         says="The three observers were tuned on the same collected data: Fig. 4's one experiment.",
         found=(
-            f"{len(studies)} pushes at several noises, {len(tried)} experiments, each recorded once for all three. In {len(worth)} "
-            "of them all three can be tuned to follow the gyro better than an estimate of zero does. Of these Table "
-            f"2's lines come nearest to being the best together at {found.words}. Table 2's error by that of the "
-            f"tuned there: {ratios}. Zero left aside it is {least.words}, where the worst has {least.worst:.2f} times "
-            f"the error of the tuned. {_apart(studies)}"
+            f"{len(studies)} pushes at several noises, {len(tried)} experiments, each recorded once for all three. In "
+            f"{len(worth)} of them all three can be tuned to follow the gyro better than an estimate of zero does. Of "
+            f"these Table 2's lines come nearest to being the best together at {found.words}. There Table 2's error by "
+            f"that of the tuned is {ratios}. Zero left aside it is {least.words}, where the worst has "
+            f"{least.worst:.2f} times the error of the tuned. {_apart(studies)}"
         ),
         holds=found.worth_it and not others,
         conditions=f"At {found.words} (the bench's own noise is {DEFAULT_NOISE:g}); the paper gives neither.",
