@@ -234,7 +234,7 @@ def test_newest_delivered_sample_at_each_tick(rate_hz: float, latency_s: float, 
         ("rate_hz", 300.0, r"sensors\.{kind}\.rate_hz = 300 Hz: not a whole number of physics steps of 0\.001 s"),
         ("rate_hz", 5000.0, r"sensors\.{kind}\.rate_hz = 5000 Hz: not a whole number"),
         ("latency_s", -0.001, r"sensors\.{kind}\.latency_s = -0\.001: .*greater than or equal to 0"),
-        ("rate_hz", 0.0, r"sensors\.{kind}\.rate_hz = 0\.0: .*greater than 0"),
+        ("rate_hz", 0.0, r"sensors\.{kind}\.rate_hz = 0\.0: .*greater than or equal to 0\.1"),
     ],
 )
 @pytest.mark.parametrize("kind", ["accelerometer", "encoder", "fog"])
