@@ -86,6 +86,13 @@ def test_a_world_reads_the_same_alone_and_in_a_batch_and_in_any_pieces() -> None
     assert not np.array_equal(batch, other)
 
 
+@pytest.mark.parametrize("stream", range(3))
+def test_its_noise_is_none_of_the_other_sensors(stream: int) -> None:
+    rate, gyro = np.zeros((50, 1)), MemsGyro()
+    theirs = gyro.meter(DT, normals(5, 4, stream, gyro.channels))(rate)
+    assert not np.array_equal(References(gyro, DT, 5, 4).rates(rate)["mems_gyro"], theirs)
+
+
 def test_zero_is_zero() -> None:
     assert not References(MemsGyro(), DT, 0, 0).rates(np.ones((5, 1)))["zero"].any()
 

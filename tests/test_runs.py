@@ -224,10 +224,12 @@ def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
     [
         ("push_recovery", "linear,ltv", ["linear", "ltv"]),  # without the scenario's own observer
         ("bias_estimation", f"linear,{__name__}:Mine,adaptive", ["linear", f"{__name__}:Mine", "adaptive"]),  # trimmed
+        ("bias_estimation --set observer.kind=linear --set observer.tau=0.03", "linear,adaptive", ["linear", "adaptive"]),
     ],
 )
 def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, observers: str, same: list[str]) -> None:
-    settings = ["--set", "duration_s=0.4", "--set", "push=[]", "--set", "plant.equilibrium_bias_deg=0.3"]
+    scenario, *settings = scenario.split()
+    settings += ["--set", "duration_s=0.4", "--set", "push=[]", "--set", "plant.equilibrium_bias_deg=0.3"]
     first = cmg_mj("compare", scenario, "--observers", observers, "--worlds", 2, "--out", "a", "--json", *settings)
     assert first.status == 0, first.err
     again = cmg_mj("compare", "a/scenario.toml", "--out", "b", "--json")
