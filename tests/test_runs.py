@@ -224,7 +224,11 @@ def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
     [
         ("push_recovery", "linear,ltv", ["linear", "ltv"]),  # without the scenario's own observer
         ("bias_estimation", f"linear,{__name__}:Mine,adaptive", ["linear", f"{__name__}:Mine", "adaptive"]),  # trimmed
-        ("bias_estimation --set observer.kind=linear --set observer.tau=0.03", "linear,adaptive", ["linear", "adaptive"]),
+        (
+            "bias_estimation --set observer.kind=linear --set observer.tau=0.03",
+            "linear,adaptive",
+            ["linear", "adaptive"],
+        ),
     ],
 )
 def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, observers: str, same: list[str]) -> None:
