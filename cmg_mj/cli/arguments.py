@@ -71,14 +71,6 @@ def _letters(argument: str) -> str:
         return argument
 
 
-def _letters(argument: str) -> str:
-    """The letters that were typed, also where Python takes a terminal for one of ASCII."""
-    try:
-        return os.fsencode(argument).decode("utf-8")
-    except UnicodeError:
-        return argument
-
-
 def of_a_run(command: Callable) -> Callable:
     """Arguments of every command that runs a scenario, which it takes as one `Chosen`."""
 
