@@ -20,6 +20,7 @@ from cmg_mj.law import Law
 from cmg_mj.loop_check import hints
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.resolved import resolved
+from cmg_mj.resources import folder
 from cmg_mj.scenario import base_of, located
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Driver, Result, simulate
@@ -204,6 +205,8 @@ def load_rig(scenario: Scenario) -> Plant:
         period = common_period(scenario) if scenario.plant.timestep_s is None else None
         plant = load_plant(scenario.plant, period_s=period)
         check_steps(scenario, plant.timestep)
+        if plant.path.resolve().parent != folder("models").resolve():
+            _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
         return plant
     except InputError as error:
         raise InputError(located(scenario._where, str(error))) from error

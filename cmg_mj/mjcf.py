@@ -33,7 +33,7 @@ def parse(path: Path) -> mujoco.MjSpec:
     check_files(path)
     try:
         return mujoco.MjSpec.from_file(str(path))
-    except (ValueError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
 
 
@@ -47,7 +47,7 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
             model = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise InputError(f"{path}: does not compile: {_one_line(error)}") from error
     for warning in warned:
         if "singular" in str(warning.message):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,11 @@ _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _ELEMENT = re.compile(r"<(\w+)\b([^<>]*)>")
 _NAMED = re.compile(r"""\b(file\w*|meshdir|texturedir|assetdir)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _XML = ("include", "model")
+_COUNT = re.compile(
+    r"""<(replicate|composite|flexcomp|texture)\b[^<>]*?\b(count|width|height)\s*=\s*["']([^"']*)["']"""
+)
+LARGEST_COUNT = 10_000
+"""Of copies of an element and of a picture's pixels in a row; MuJoCo makes all of them before it looks at them."""
 
 
 def check_files(path: Path) -> None:
@@ -36,6 +42,9 @@ def _check(path: Path, root: Path, within: tuple[Path, ...]) -> None:
             f"{root}: contains itself: {' in '.join(p.name for p in (*within[within.index(here) :], here))}"
         )
     text = _COMMENT.sub("", _text(path, root))
+    for element, name, count in _COUNT.findall(text):
+        if math.prod(int(number) for number in re.findall(r"\d{1,20}", count)) > LARGEST_COUNT:
+            raise InputError(f"{root}: <{element} {name}={count!r}>: at most {LARGEST_COUNT} are allowed")
     named = [(element, *pair) for element, attributes in _ELEMENT.findall(text) for pair in _attributes(attributes)]
     folders = [value for _, name, value in named if name.endswith("dir")]
     for element, name, value in named:

@@ -191,6 +191,16 @@ AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
         {"rig": ('outer" pos="0.14250000000000004 0', 'outer" pos="0.14250000000000004 0.08')},
         "'accelerometer_outer' must lie on the radial line, from the tilt axis through the centre of mass; it lies",
     ),
+    (
+        "a mesh that is none",
+        {"rig": ("<asset>", '<asset><mesh name="rig" file="rig.xml"/>')},
+        "does not compile: no decoder found for mesh file 'rig.xml'",
+    ),
+    (
+        "a picture without end",
+        {"rig": ('width="256"', 'width="100000000"')},
+        "<texture width='100000000'>: at most 10000",
+    ),
     ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml is not UTF-8 text (at byte "),
 )
 def test_a_model_that_is_set_wrongly(given: dict[str, Any], fragments: list[str]) -> None:
@@ -247,6 +257,16 @@ def test_a_hint_for_momenta_that_do_not_cancel() -> None:
         "a pipe in a folder",
         '<compiler meshdir="meshes"/><asset><mesh file="pipe"/></asset>',
         "<mesh file='pipe'>: is no ordinary file",
+    ),
+    (
+        "a billion copies",
+        '<worldbody><replicate count="1000000000"/></worldbody>',
+        "<replicate count='1000000000'>: at most 10000",
+    ),
+    (
+        "copies in three directions",
+        "<composite count='1000 1000 3'/>",
+        "<composite count='1000 1000 3'>: at most 10000",
     ),
     ("itself", '<asset><model name="a" file="my.xml"/></asset>', "my.xml: contains itself: my.xml in my.xml"),
     ("itself further in", '<asset><model file="outer.xml"/></asset>', "contains itself: my.xml in outer.xml in my.xml"),
