@@ -28,8 +28,8 @@ def theorem_2() -> Claim:
     shrinking = all(a > b > c for a, b, c in limits.values())
     growing = chain_errors(BiLimitCorrection((1.0, 2.0, 0.9), 0.2), (1.0,), 3, 40.0)
     by_simulation = (
-        "Convergence is shown by simulation from random errors. The Lyapunov function W, and with it (19) and (20), "
-        "is not constructed: its proof is in another report."
+        "Convergence is shown by simulation from random errors, the construction of W for two dimensions only, by the "
+        "claim on (19) and (20)."
     )
     return Claim(
         place="Section 4.2, Theorem 2 (and Definition 1)",
