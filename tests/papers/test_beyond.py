@@ -132,8 +132,8 @@ def test_the_papers_order_holds_where_noise_is_high(rows: list[dict[str, Any]]) 
     assert order_claim([row for row in rows if row["noise_ug_rthz"] == 200.0]).verdict == "not reproduced"
     for noise in NOISES_UG:
         for bias in BIASES_DEG:
-            assert f"**{noise:g} ug/rtHz, e = {bias:g} deg** (floor " in claim.found
-    lines = [line for line in claim.found.splitlines() if line.startswith("| `")]
+            assert f"**{noise:g} ug/rtHz, e = {bias:g} deg** (floor " in claim.table
+    lines = [line for line in claim.table.splitlines() if line.startswith("| `")]
     assert len(lines) == len(rows)
     last = [cell.strip() for cell in lines[-1].strip("|").split("|")]
     assert last[:2] == ["`luenberger`", "-"]
@@ -166,7 +166,7 @@ def test_the_bias_fed_in_helps_where_it_is_large() -> None:
     assert larger["gain_rad_s"] is None
     claim = fed_bias_claim(rows)
     assert claim.verdict == "reproduced"
-    assert "- [100% fell]" in claim.found
+    assert "- [100% fell]" in claim.table
     worse = large | {"gain_rad_s": Interval(-0.01, -0.02, -0.005)}
     assert fed_bias_claim([worse, larger]).why == "It helps at e = 1.5 deg of those tried."
     assert fed_bias_claim([worse]).verdict == "not reproduced"

@@ -53,9 +53,9 @@ def order_claim(rows: Sequence[Row]) -> Claim:
         found=(
             f"{rows[0]['worlds']} seeds a cell. The smallest velocity error: {winners} of {len(cells)} cells. The "
             f"paper's order holds at {where or 'none of them'}. The floor is the error of the filter that knows the "
-            "model, e, the push, the gimbals' motion and the noise exactly: none of the observers knows e or the "
-            f"push.\n\n{league_table(rows)}"
+            "model, e, the push, the gimbals' motion and the noise exactly: none of the observers knows e or the push."
         ),
+        table=league_table(rows),
         holds=bool(ordered),
         conditions="" if len(ordered) == len(cells) else "The order turns round where noise is low or the bias large.",
         otherwise="Another order is found at every noise and bias tried.",
