@@ -86,12 +86,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
             stream.reconfigure(errors="backslashreplace")  # a title's letters where the terminal has only ASCII
     if "" not in sys.path:
         sys.path.append("")  # a user's own observer in the current folder; last, so that it can hide nothing
+    status: Any = DONE
     try:
         status = _status(sys.argv[1:] if arguments is None else arguments)
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
     except OSError as error:
-        status = DONE if isinstance(error, BrokenPipeError) else WRONG_INPUT
+        if not isinstance(error, BrokenPipeError):  # the reader, such as head, has had enough
+            status = WRONG_INPUT
         _give_up_streams(error)
     if status != DONE:
         sys.exit(status)
@@ -107,14 +109,11 @@ def _status(arguments: Sequence[str]) -> Any:
     except SystemExit as exit:
         return exit.code
     except (InputError, RunStopped, click.ClickException) as error:
-        say(error.format_message() if isinstance(error, click.ClickException) else str(error))
-        return WRONG_INPUT
+        return _said(error.format_message() if isinstance(error, click.ClickException) else str(error), WRONG_INPUT)
     except MemoryError:
-        say("there is not enough memory for this; take a shorter run or fewer worlds")
-        return WRONG_INPUT
+        return _said("there is not enough memory for this; take a shorter run or fewer worlds", WRONG_INPUT)
     except (KeyboardInterrupt, click.Abort):  # before or after a command
-        say("interrupted")
-        return INTERRUPTED
+        return _said("interrupted", INTERRUPTED)
     return DONE
 
 
@@ -123,6 +122,13 @@ def _open_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
+
+
+def _said(complaint: str, status: int) -> int:
+    """The status, whether anyone has read the complaint or not."""
+    with suppress(BrokenPipeError):
+        say(complaint)
+    return status
 
 
 def _give_up_streams(error: OSError) -> None:
