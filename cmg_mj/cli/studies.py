@@ -42,7 +42,7 @@ def bench(observers: str, worlds: int, as_json: bool) -> None:
 def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     """Reproduce PAPER, or all of them: aranovskiy2020, sokolov2019, dao2023, andrieu2009.
 
-    And beyond, which is in none of them and takes half an hour: every observer, 100 seeds each, in one table.
+    And beyond, which is in none of them and takes some minutes: every observer, 100 seeds each, in one table.
 
     Writes a folder: report.md, its plots, and figures.json. Every claim of the paper stands beside what is obtained
     here, with a verdict: reproduced, reproduced within stated conditions, or not reproduced and why.

@@ -1,6 +1,6 @@
 """A step beyond the papers: friction in the observer, the bias fed in, and all observers in one table.
 
-Not part of `reproduce all`: a hundred seeds a cell take about half an hour.
+Not part of `reproduce all`: a hundred seeds a cell take some minutes.
 """
 
 from __future__ import annotations
