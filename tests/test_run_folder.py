@@ -193,6 +193,16 @@ def test_an_interrupted_run_does_not_replace_a_complete_one(either_way: str) -> 
     assert holds("it") == {"a": "next", "incomplete/notes": "mine"}
 
 
+def test_what_was_set_aside_stays_until_a_complete_result_comes(either_way: str) -> None:
+    with RunFolder(Path("it")) as folder:
+        write("mine", "it/a")
+        assert folder.write(writers("whole", "a", "b")) == Path("it/incomplete")
+    assert fill("it", "half", "b", complete=False) == Path("it")
+    assert holds("it") == {"a": "mine", "b": "half", "incomplete/a": "whole", "incomplete/b": "whole"}
+    fill("it", "next", "b")
+    assert holds("it") == {"a": "mine", "b": "next"}
+
+
 def test_a_result_that_has_been_deleted_is_replaced() -> None:
     fill("it", "whole", "a", "b")
     Path("it/a").unlink()
