@@ -51,7 +51,8 @@ def plot_worlds(path: Path, compared: Sequence[Compared], title: str) -> None:
     first.set_yticks(range(len(rows)), [_label(row, names[row.name]) for row in rows])
     first.invert_yaxis()  # shared: the table's order in every panel
     worlds = len(rows[0].entry.result.outcomes)
-    said = f"{title or 'Comparison'}: {worlds} worlds an observer. Lines: mean and its 95 % interval."
+    said = f"{title or 'Comparison'}: {worlds} worlds an observer. "
+    said += "Lines: mean and its 95 % interval; arrows: beyond the axis."
     if not all(row.entry.result.stood.all() for row in rows):
         said += " Crosses: worlds that did not stand to the end, until then."
     figure.suptitle(said, x=0.01, ha="left", parse_math=False)
