@@ -276,6 +276,8 @@ class Controller:
                 states[i], estimate = observer.step(states[i], y, u)
                 if not self._fits(estimate, self._widths[i], y):
                     estimate = self._fitted(estimate, self._widths[i], y)
+                elif not self._single:  # the record keeps a copy: an observer may go on changing its arrays in place
+                    estimate = _estimate([part.copy() for part in estimate])
             except (Exception, SystemExit) as error:  # a user's observer may fail in any way
                 if i == 0:
                     self._blame(observer, f"raised {raised(error)}", step, error)

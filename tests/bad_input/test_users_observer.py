@@ -7,9 +7,10 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from cmg_mj import Estimate, Measurement
+from cmg_mj import Estimate, Measurement, load_scenario, prepare
 from tests.bad_input.complaints import assert_in_order, table
 from tests.command import cmg_mj
 from tests.run_folders import assert_whole
@@ -100,6 +101,18 @@ class GivesNan(Mine):
 class GivesInfinity(Mine):
     def estimate(self, k: int, y: Measurement, rate: Any) -> Any:
         return Estimate(y.y1, rate * 0.0 + (math.inf if k >= 30 else 0.0), y.y2)
+
+
+class ChangesInPlace(Mine):
+    """Keeps its rate in one object, which on arrays it changes in place: on floats `+=` makes a new one."""
+
+    def init(self, y: Measurement) -> Any:
+        return y.y1, 0.0 * y.y1
+
+    def step(self, state: Any, y: Measurement, u: Any) -> Any:
+        y1, rate = state
+        rate += 0.05 * ((y.y1 - y1) / self.dt - rate)
+        return (y.y1, rate), Estimate(y.y1, rate, y.y2)
 
 
 class NamesNoSignals(Mine):
@@ -197,3 +210,15 @@ def test_a_companion_that_gives_nan_harms_nobody(quick: str) -> None:
     said = cmg_mj("run", quick, "--set", f"companions=['{kind}']")
     assert said.status == 0
     assert re.search(rf"{kind}\s+-\s+-", said.out)
+
+
+def test_an_observer_that_changes_its_own_arrays_is_judged_as_in_one_world(quick: str) -> None:
+    """What it has said at a tick is not what it says later."""
+    experiment = prepare(load_scenario(quick, [], f"{__name__}:ChangesInPlace"))
+    one, many = experiment.run(), experiment.run_many(2)
+    assert one.trajectory is not None
+    assert many.trajectory is not None
+    name = f"estimate/{__name__}:ChangesInPlace/x2_rad_s"
+    np.testing.assert_array_equal(many.trajectory[name][:, 0], one.trajectory[name])
+    key = "velocity_rms_error_rad_s"
+    assert many.summaries[0][key] == pytest.approx(one.summaries[0][key], rel=1e-12)
