@@ -94,7 +94,8 @@ class _Panel:
         means = [known.mean() for row in self.stood if len(known := row[np.isfinite(row)])] or [low, high]
         quarter, three = np.quantile(means, [0.25, 0.75])
         room = FAR_OUT * (three - quarter)
-        near = values[(values >= quarter - room) & (values <= three + room)] if room else values
+        best = KEYS[self.key].better == "more"  # whose good end is near, 1: what is there is always seen
+        near = values[(values >= quarter - room) & ((values <= three + room) | best)] if room else values
         low, high = float(near.min()), float(near.max())
         margin = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
         self.limits = low - margin, high + margin

@@ -14,6 +14,7 @@ import pytest
 from scipy import stats
 
 from cmg_mj.comparison import Compared, compare, prepare_comparison
+from cmg_mj.distribution_plot import _Panel
 from cmg_mj.report import comparison_markdown
 from cmg_mj.scenario import load_scenario
 from cmg_mj.simulate import Outcome, Result
@@ -84,6 +85,18 @@ def test_more_of_a_fit_is_better() -> None:
     good, bad = entry("ltv", [0.1, 0.1], more={FIT: 0.7}), entry("linear", [0.1, 0.1], more={FIT: -0.3})
     assert best([bad, good], FIT) is good
     assert by_name([bad, good])["linear"]["less_best"][FIT]["mean"] == pytest.approx(-1.0)
+
+
+def test_a_plot_of_fits_shows_the_best() -> None:
+    """One that is far off on the worse side is at the edge; one on the better side is not."""
+    fits = {"linear": -0.06, "ltv": -0.1, "homogeneous": 0.13, "high_gain": 0.05, "finite_difference": -10.0}
+    compared = [entry(kind, [0.1, 0.2], more={FIT: fit}) for kind, fit in fits.items()]
+    for of in compared:
+        for summary in of.result.summaries:
+            summary["references"]["mems_gyro"][FIT] = 0.96
+    low, high = _Panel(FIT, rows_of(compared)).limits
+    assert -5.0 < low < -0.1
+    assert 0.96 < high < 1.1
 
 
 def test_references_ride_along_with_the_best_in_the_push_window() -> None:
