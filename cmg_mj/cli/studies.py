@@ -95,9 +95,9 @@ def tune(
     """Fit an observer's parameters to the gyro, as section V of aranovskiy2020 does; observer_tuning is its experiment.
 
     The loop is closed on the gyro, whatever the scenario says, and the recording replayed through the observer. Scored
-    is the estimated rate less the gyro's from the first push to one second after the last, on worlds that were not
-    fitted, beside the observer's parameters as given (by default, the paper's). With several noise densities it says at
-    which the given parameters are the best ones.
+    is the estimated rate less the gyro's, from each push to one second after it, on worlds that were not fitted, beside
+    the observer's parameters as given (by default, the paper's). With several noise densities it says at which the
+    given parameters are the best ones.
 
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """
