@@ -117,7 +117,10 @@ def main() -> None:
     print(table(headings, rows, text_columns=3), "\n")
 
     keys = ("velocity_rms_error_rad_s", "tilt_rms_deg", "settle_time_s", "fell_fraction")
-    means = {name: json.loads(run(*at, COMPARE, options.worlds)) for name, at in checkouts.items()}
+    means = {
+        name: [row for row in json.loads(run(*at, COMPARE, options.worlds)) if row["observer"] in OBSERVERS]
+        for name, at in checkouts.items()
+    }  # later checkouts have rows of what observers are judged beside as well
     rows = [
         (f"`{old['observer']}`", *("-" if s[key] is None else f"{s[key]:.4f}" for key in keys for s in (old, new)))
         for old, new in zip(means["before"], means["after"], strict=True)
