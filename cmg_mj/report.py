@@ -99,7 +99,7 @@ def _with_half(text: str, key: str, ends: Sequence[float] | None) -> list[str]:
 def comparison_note(summaries: Sequence[Mapping[str, Any]]) -> str:
     """What the tables of a comparison do not say by themselves."""
     lines = [
-        "Means over the worlds that stood to the end, with 95 % intervals.",
+        "Means over the worlds that stood to the end (settle time: that settled), with 95 % intervals.",
         "Push window: from a push's start to 1 s after its end.",
         "Fit: 1 - RMS error / RMS of the true velocity; 1 is the truth, 0 an estimate of zero.",
     ]
