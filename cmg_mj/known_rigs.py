@@ -7,7 +7,6 @@ cmg_mj.read_off` writes it anew.
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 from pathlib import Path
@@ -51,12 +50,6 @@ def hash_of_models() -> str:
     return digest.hexdigest()
 
 
-def _moves_otherwise(settings: PlantSettings) -> bool:
-    """Whether a setting changes how large the physics step may be."""
-    changed = {name for name, value in dataclasses.asdict(settings).items() if value != getattr(PlantSettings, name)}
-    return bool(changed - {"model", "equilibrium_bias_deg", "initial_tilt_deg", "lock_thrust_bearing"})
-
-
 def known_rig(settings: PlantSettings) -> RigFacts | None:
     """What is known of a scenario's rig without loading it.
 
@@ -70,11 +63,9 @@ def known_rig(settings: PlantSettings) -> RigFacts | None:
         InputError: There is no such file.
     """
     path = find("models", settings.model, ".xml", "plant.model =")
-    if settings.timestep_s is None and _moves_otherwise(settings):
-        return None
     kept = folder("models") / FILE
-    if settings.changes_of_physics():
-        return None  # only MuJoCo can say whether it goes with them
+    if settings.changes_of_physics() or settings.integrator != PlantSettings.integrator:
+        return None  # only MuJoCo can say whether it goes with them, and at which step
     # What a linked model includes, MuJoCo looks for beside the link.
     if path.is_symlink() or path.resolve().parent != folder("models").resolve():
         return None
