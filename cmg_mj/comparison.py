@@ -45,8 +45,6 @@ class Compared:
         """Means over the worlds that stood to the end, by the names of a run's summary, and the share of falls."""
         result, scenario = self.result, self.experiment.scenario
         worlds = len(result.outcomes)
-        errors = result.values("velocity_rms_error_rad_s")
-        errors = errors[np.isfinite(errors)]
         return finite(
             {
                 "observer": scenario.observer.kind,
@@ -58,9 +56,15 @@ class Compared:
                 "stopped_fraction": len(self.stopped) / worlds,
                 "settled_fraction": sum(summary["settle_time_s"] is not None for summary in result.summaries) / worlds,
                 **{key: result.mean(key) for key in result.summaries[0] if key not in NESTED},
-                "velocity_rms_error_std_rad_s": float(errors.std(ddof=1)) if len(errors) > 1 else None,
+                "velocity_rms_error_std_rad_s": spread_of(result.values("velocity_rms_error_rad_s")),
             }
         )
+
+
+def spread_of(values: np.ndarray) -> float | None:
+    """Standard deviation over the worlds that have a figure, (n_worlds,); None of fewer than two."""
+    known = values[np.isfinite(values)]
+    return float(known.std(ddof=1)) if len(known) > 1 else None
 
 
 def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Experiment]:

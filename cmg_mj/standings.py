@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmg_mj.comparison import Compared
+from cmg_mj.comparison import Compared, spread_of
 from cmg_mj.intervals import known_interval
 from cmg_mj.references import REFERENCES
 from cmg_mj.summary_keys import KEYS, finite
@@ -50,8 +50,6 @@ class Row:
         if self.reference is None:
             return own
         means = {key: _mean(self.values(key)) for key in own if key in KEYS}
-        errors = self.values(ERROR)
-        errors = errors[np.isfinite(errors)]
         return finite(
             {
                 **dict.fromkeys(own),
@@ -61,7 +59,7 @@ class Row:
                 "differs": own["differs"],
                 "worlds": own["worlds"],
                 **means,
-                "velocity_rms_error_std_rad_s": float(errors.std(ddof=1)) if len(errors) > 1 else None,
+                "velocity_rms_error_std_rad_s": spread_of(self.values(ERROR)),
             }
         )
 
