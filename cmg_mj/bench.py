@@ -135,7 +135,7 @@ def update_us(experiment: Experiment, worlds: int | None) -> float | None:
     """
     result = _finished(experiment.run() if worlds is None else experiment.run_many(worlds))
     assert result.trajectory is not None
-    columns = [result.trajectory[name][:UPDATES] for name in ("y1_rad", "y2_rad", "u_rad_s")]
+    columns = [result.trajectory[name][:UPDATES] for name in ("y1_rad", "y2_rad", "acceleration_rad_s2", "u_rad_s")]
     if worlds is None:
         columns = [column.tolist() for column in columns]
     try:
@@ -144,19 +144,22 @@ def update_us(experiment: Experiment, worlds: int | None) -> float | None:
         return None
 
 
-def time_of_update(observer: Observer, y1: Sequence[Any], y2: Sequence[Any], u: Sequence[Any]) -> float:
+def time_of_update(
+    observer: Observer, y1: Sequence[Any], y2: Sequence[Any], acceleration: Sequence[Any], u: Sequence[Any]
+) -> float:
     """Microseconds of one update along given signals, the median of some repeats.
 
     Args:
         observer: The observer.
         y1: Measured tilt, (n_ticks,) floats or (n_ticks, n_worlds) [rad].
         y2: Measured gimbal angle, the same [rad].
+        acceleration: Measured angular acceleration of the tilt, the same [rad/s^2].
         u: Gimbal rate, the same [rad/s].
 
     Returns:
         The time [us].
     """
-    samples = [(Measurement(a, b), held) for a, b, held in zip(y1, y2, u, strict=True)]
+    samples = [(Measurement(*y), held) for *y, held in zip(y1, y2, acceleration, u, strict=True)]
     times = []
     with np.errstate(all="ignore"):  # worlds that have fallen are NaN
         for _ in range(REPEATS):

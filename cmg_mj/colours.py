@@ -18,6 +18,7 @@ COLOURS: dict[str, Colour] = {
     "ltv": (69, 148, 253),
     "homogeneous": (251, 96, 0),
     "luenberger": (255, 134, 181),
+    "gyro_free": (17, 136, 136),
     "finite_difference": (179, 45, 0),
     "super_twisting": (44, 61, 254),
     "linear_high_gain": (177, 179, 252),

@@ -58,6 +58,7 @@ class Tick(NamedTuple):
 
     y1: Scalar
     y2: Scalar
+    acceleration: Scalar
     fog: Scalar
     u: Scalar
     x_e: Scalar
@@ -207,15 +208,17 @@ class Controller:
                 sensor.sample(step, ideal)
         if step % self.period:
             return False
-        y1 = self.tilt(*self._accelerometer.read(step))
+        forces = self._accelerometer.read(step)
+        y1 = self.tilt(*forces)
+        acceleration = self.tilt.acceleration(forces[0], forces[2])
         encoders = self._encoder.read(step)
         fog = self._fog.read(step)
         y2 = -self._offset
         for share, angle in zip(self._shares, encoders, strict=True):
             y2 = y2 + share * angle
-        y = Measurement(y1, y2)
+        y = Measurement(y1, y2, acceleration)
         if not self._single:
-            read_only(*y)  # observers share them
+            read_only(*y, y.acceleration)  # observers share them
         if self._states is None:
             self._states = [self._start(observer, y, step) for observer in self._observers]
             zero = 0.0 * y1
@@ -235,7 +238,7 @@ class Controller:
         u, self._x_e = self.law(x1, x2, x3, x_e)
         if not self._single:
             read_only(u)  # observers get it at the next tick, the trajectory later
-        self.tick = Tick(y1, y2, fog, u, x_e, estimates)
+        self.tick = Tick(y1, y2, acceleration, fog, u, x_e, estimates)
         return True
 
     def _start(self, observer: Observer, y: Measurement, step: int) -> Any:

@@ -12,13 +12,15 @@ from cmg_mj.complaint import fields_of, not_allowed
 from cmg_mj.controller import trim_of
 from cmg_mj.errors import InputError
 from cmg_mj.grid import check_times
+from cmg_mj.known_rigs import RigFacts
 from cmg_mj.law import Law
-from cmg_mj.observers import Observer, make_observer, observer_class
+from cmg_mj.observers import GIVEN, Observer, make_observer, observer_class
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.rehearsal import rehearse
 from cmg_mj.scenario import as_json, located
 from cmg_mj.schema import Scenario
+from cmg_mj.tilt import TiltNoise
 
 
 @dataclass(frozen=True)
@@ -29,21 +31,26 @@ class Design:
 
     Attributes:
         scenario: What it was made from.
-        model: The reduced model it was made for.
+        rig: The rig it was made for.
         law: The control law.
     """
 
     scenario: Scenario
-    model: ReducedModel
+    rig: RigFacts
     law: Law
+
+    @property
+    def given(self) -> tuple[float, ReducedModel, TiltNoise]:
+        """What every observer is given: the control period [s], the reduced model, the noise by the datasheet."""
+        return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors.accelerometer)
 
     def observer(self) -> Observer:
         """The observer in the loop, fresh."""
-        return self.scenario.observer.make(self.law.dt, self.model)
+        return self.scenario.observer.make(*self.given)
 
     def companions(self) -> dict[str, Observer]:
         """Those that ride along, by name, fresh."""
-        return {name: make_observer(name, self.law.dt, self.model) for name in self.scenario.companion_names()}
+        return {name: make_observer(name, *self.given) for name in self.scenario.companion_names()}
 
     def rehearse(self, worlds: int | None = None) -> None:
         """Try every observer once, so that one that cannot work is found before a run and not at its first sample.
@@ -64,12 +71,12 @@ class Design:
                     raise InputError(f"{field} {name!r}: {error}") from error
 
 
-def design(scenario: Scenario, model: ReducedModel) -> Design:
+def design(scenario: Scenario, rig: RigFacts) -> Design:
     """Check what pydantic could not, construct the law and the observers, and try them once.
 
     Args:
         scenario: The scenario.
-        model: The reduced model of its rig.
+        rig: Its rig.
 
     Returns:
         The design.
@@ -80,7 +87,7 @@ def design(scenario: Scenario, model: ReducedModel) -> Design:
     try:
         check_times(scenario)
         _check_observers(scenario)
-        made = Design(scenario, model, scenario.controller.law(model))
+        made = Design(scenario, rig, scenario.controller.law(rig.reduced))
         made.rehearse()
         trim_of(scenario.controller.trim_s, made.law, extra_signals(made.observer()))
     except InputError as error:
@@ -100,7 +107,7 @@ def _check_observers(scenario: Scenario) -> None:
     kind, parameters = scenario.observer.kind, scenario.observer.parameters
     types = fields_of(observer_class(kind))
     for name, value in parameters.items():
-        if name in ("dt", "model"):
+        if name in GIVEN:
             raise InputError(f"observer.{name}: set by the bench, which gives it to every observer")
         if name not in types:
             continue  # a name that the class does not have, or no class of pydantic's: its constructor decides

@@ -226,4 +226,4 @@ def prepare(scenario: Scenario, plant: Plant | None = None) -> Experiment:
         InputError: Something in the scenario does not fit.
     """
     plant = load_rig(scenario) if plant is None else plant
-    return Experiment(scenario, plant, design(scenario, plant.reduced))
+    return Experiment(scenario, plant, design(scenario, plant.facts))

@@ -15,6 +15,8 @@ from typing import NamedTuple
 from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find, folder
+from cmg_mj.sensors import Accelerometer
+from cmg_mj.tilt import RadialTilt, TiltNoise
 
 FILE = "read_off.json"
 
@@ -26,6 +28,8 @@ class RigFacts(NamedTuple):
         path: The model's file.
         cubes: Names of its modules.
         reduced: Its reduced model.
+        tilt: The tilt estimate for its accelerometers.
+        gravity: [m/s^2].
         largest_step: The largest physics step that is accurate enough [s].
         hints: What on it is not what the reduced model takes it for, in clauses.
     """
@@ -33,8 +37,14 @@ class RigFacts(NamedTuple):
     path: Path
     cubes: tuple[str, ...]
     reduced: ReducedModel
+    tilt: RadialTilt
+    gravity: float
     largest_step: float
     hints: tuple[str, ...]
+
+    def noise(self, accelerometer: Accelerometer) -> TiltNoise:
+        """The noise of tilt and angular acceleration with these accelerometers."""
+        return self.tilt.noise(accelerometer.deviation, self.gravity)
 
 
 def name_of(model: str, *, locked: bool) -> str:
@@ -72,8 +82,15 @@ def known_rig(settings: PlantSettings) -> RigFacts | None:
     try:
         known = json.loads(kept.read_text(encoding="utf-8"))
         rig = known["rigs"][name_of(path.name, locked=settings.lock_thrust_bearing)]
-        reduced, step = ReducedModel(**rig["reduced"]), float(rig["largest_step_s"])
-        facts = RigFacts(path, tuple(rig["cubes"]), reduced, step, tuple(rig["hints"]))
+        facts = RigFacts(
+            path,
+            tuple(rig["cubes"]),
+            ReducedModel(**rig["reduced"]),
+            RadialTilt(**rig["tilt"]),
+            float(rig["gravity_m_s2"]),
+            float(rig["largest_step_s"]),
+            tuple(rig["hints"]),
+        )
         return facts if known["sha256"] == hash_of_models() else None
     except (OSError, ValueError, LookupError, TypeError):  # not there, or not as `read_off` writes it
         return None

@@ -226,9 +226,11 @@ class Plant:
             InputError: The observer does not exist or refuses a parameter, or a rate does not fit the physics step.
         """
         law = law or Law(dt=0.005)
+        sensors = sensors or Sensors()
         parameters = {name: options.pop(name) for name in options.keys() - CONTROLLER_OPTIONS}
         if isinstance(observer, str):
-            observer = make_observer(observer, law.dt, self.reduced, **parameters)
+            noise = self.facts.noise(sensors.accelerometer)
+            observer = make_observer(observer, law.dt, self.reduced, noise, **parameters)
         elif parameters:
             name = next(iter(parameters))
             known = {"law", "sensors", *CONTROLLER_OPTIONS}
@@ -237,7 +239,7 @@ class Plant:
             observer,
             law,
             self.radial_tilt,
-            sensors or Sensors(),
+            sensors,
             directions=self.directions,
             gimbal_zero=[cube.gimbal_zero for cube in self.cubes],
             timestep=self.model.opt.timestep,
@@ -250,10 +252,17 @@ class Plant:
         return float(self.model.opt.timestep)
 
     @property
+    def gravity(self) -> float:
+        """[m/s^2]."""
+        return float(np.linalg.norm(self.model.opt.gravity))
+
+    @property
     def facts(self) -> RigFacts:
         """What a scenario's controller and observers are made from."""
         cubes = tuple(cube.name for cube in self.cubes)
-        return RigFacts(self.path, cubes, self.reduced, self.largest_step, tuple(self.hints))
+        return RigFacts(
+            self.path, cubes, self.reduced, self.radial_tilt, self.gravity, self.largest_step, tuple(self.hints)
+        )
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
         """What an observer of the bias should find: e less the tilt that the accelerometers' own bias makes.
@@ -266,8 +275,7 @@ class Plant:
         Returns:
             The bias at the equilibrium [rad].
         """
-        gravity = float(np.linalg.norm(self.model.opt.gravity))
-        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.bias, gravity)
+        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.bias, self.gravity)
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""

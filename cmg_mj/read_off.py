@@ -28,7 +28,9 @@ def read_off() -> dict[str, Any]:
                 "cubes": cubes,
                 "largest_step_s": plant.largest_step,
                 "hints": plant.hints,
+                "gravity_m_s2": plant.gravity,
                 "reduced": dataclasses.asdict(plant.reduced),
+                "tilt": dataclasses.asdict(plant.radial_tilt),
             }
     return {"sha256": hash_of_models(), "rigs": rigs}
 

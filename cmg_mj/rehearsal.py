@@ -16,8 +16,8 @@ def rehearse(observer: Observer, worlds: int | None) -> None:
     """Two samples of one observer, on floats or on arrays of so many worlds."""
 
     def sample(tilt: float) -> Measurement:
-        y = Measurement(tilt, -tilt)
-        return y if worlds is None else Measurement(*(np.full(worlds, angle) for angle in y))
+        y = Measurement(tilt, -tilt, tilt)
+        return y if worlds is None else Measurement(*(np.full(worlds, number) for number in (*y, y.acceleration)))
 
     hint = (
         ""
@@ -27,7 +27,7 @@ def rehearse(observer: Observer, worlds: int | None) -> None:
     u: Any = 0.1 if worlds is None else np.full(worlds, 0.1)
     first, second = sample(0.01), sample(0.011)
     if worlds is not None:
-        read_only(*first, *second, u)
+        read_only(*first, first.acceleration, *second, second.acceleration, u)
     call = "init(y)"
     try:
         names = ("x1", "x2", "x3", *extra_signals(observer))

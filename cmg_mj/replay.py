@@ -11,7 +11,7 @@ from cmg_mj.trajectory import Trajectory
 
 
 def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
-    """What the observer makes of the recorded measurements y1, y2 and command u.
+    """What the observer makes of the recorded measurements y1, y2, angular acceleration (if recorded) and command u.
 
     The loop may have been closed on anything else: the observer only rides along. From the first row on, its
     estimates are bitwise those of a companion in the same run.
@@ -25,10 +25,12 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
         (n_ticks, n_worlds); NaN after a world's end.
     """
     y1, y2, u = (_rows(trajectory[name]) for name in ("y1_rad", "y2_rad", "u_rad_s"))
-    state = observer.init(Measurement(y1[0], y2[0]))
+    measured = trajectory.columns.get("acceleration_rad_s2")
+    acceleration = _rows(np.full_like(trajectory["y1_rad"], np.nan) if measured is None else measured)
+    state = observer.init(Measurement(y1[0], y2[0], acceleration[0]))
     rows = [Estimate(y1[0], 0.0 * y1[0], y2[0])]
     for k in range(1, len(y1)):
-        state, estimate = observer.step(state, Measurement(y1[k], y2[k]), u[k - 1])
+        state, estimate = observer.step(state, Measurement(y1[k], y2[k], acceleration[k]), u[k - 1])
         rows.append(estimate)
     shape = trajectory["y1_rad"].shape
     columns = zip(*(row[:3] for row in rows), strict=True)

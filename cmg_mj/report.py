@@ -16,7 +16,7 @@ from rich.text import Text
 from cmg_mj import markdown
 from cmg_mj.description import assignments
 from cmg_mj.differences import in_words
-from cmg_mj.observers import OBSERVERS, observer_class
+from cmg_mj.observers import GIVEN, OBSERVERS, observer_class
 from cmg_mj.resources import bundled
 from cmg_mj.scenario import load_scenario
 from cmg_mj.summary_keys import KEYS, RIDING, difference, heading, spread, written
@@ -161,7 +161,7 @@ def observer_list() -> str:
     lines = ["Observers, and the defaults of their parameters (--set observer.NAME=VALUE)"]
     for name in OBSERVERS:
         cls = observer_class(name)
-        parameters = [p for p in inspect.signature(cls).parameters.values() if p.name not in ("dt", "model")]
+        parameters = [p for p in inspect.signature(cls).parameters.values() if p.name not in GIVEN]
         title = (sys.modules[cls.__module__].__doc__ or "").partition("\n")[0]
         defaults = assignments({p.name: p.default for p in parameters}) or "no parameters"
         indent = " " * (width + 4)

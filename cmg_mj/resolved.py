@@ -14,6 +14,7 @@ import tomli_w
 from pydantic import TypeAdapter
 
 from cmg_mj.design import Design
+from cmg_mj.observers import GIVEN
 from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.resources import folder
 from cmg_mj.schema import ControllerSettings, Scenario
@@ -55,7 +56,7 @@ def _parameters(given: dict[str, Any], observer: Any) -> dict[str, Any]:
     """What was given, and the defaults of the rest as far as they can be known and TOML can hold them."""
     if not dataclasses.is_dataclass(observer):
         return given
-    names = [f.name for f in dataclasses.fields(observer) if f.init and f.name not in ("dt", "model")]
+    names = [f.name for f in dataclasses.fields(observer) if f.init and f.name not in GIVEN]
     kept = {name: _plain(getattr(observer, name, None)) for name in names if name not in given}
     return {name: value for name, value in kept.items() if _is_toml(value)} | given
 

@@ -80,7 +80,7 @@ class Rows:
         self._waiting = []
         q, v = self._columns(qs), self._columns(vs)
         *signals, estimates = zip(*ticks, strict=True)
-        y1, y2, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
+        y1, y2, acceleration, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
         push = np.broadcast_to(np.array(torques)[:, None], u.shape)
         estimated = [self._columns(estimate) for estimate in zip(*estimates, strict=True)]
         x1 = q[self._rig.tilt] - self._rig.tilt_zero + self._bias
@@ -98,6 +98,7 @@ class Rows:
                 x3,
                 y1,
                 y2,
+                acceleration,
                 fog,
                 u,
                 x_e,

@@ -15,6 +15,7 @@ from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.push import Push
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.sensors import Sensors
+from cmg_mj.tilt import TiltNoise
 
 FORBID = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -74,9 +75,9 @@ class ObserverSettings(BaseModel):
         """What was given besides the kind."""
         return dict(self.__pydantic_extra__ or {})
 
-    def make(self, dt: float, model: ReducedModel) -> Observer:
+    def make(self, dt: float, model: ReducedModel, noise: TiltNoise) -> Observer:
         """Construct the observer."""
-        return make_observer(self.kind, dt, model, **self.parameters)
+        return make_observer(self.kind, dt, model, noise, **self.parameters)
 
 
 class CompareSettings(BaseModel):

@@ -67,6 +67,12 @@ class Accelerometer:
         return self.noise_density_ug_rthz * 1e-6 * STANDARD_GRAVITY * math.sqrt(self.rate_hz / 2.0)
 
     @property
+    def deviation(self) -> float:
+        """Of one sample from the mean, with what the resolution adds: what a filter is told [m/s^2]."""
+        step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
+        return math.hypot(self.sigma, step / math.sqrt(12.0))
+
+    @property
     def bias(self) -> tuple[float, float]:
         """Offsets of the tangential axes of the inner and the outer accelerometer [m/s^2]."""
         inner, outer = (bias * 1e-3 * STANDARD_GRAVITY for bias in self.bias_mg)

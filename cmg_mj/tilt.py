@@ -1,4 +1,4 @@
-"""Tilt from two accelerometers on one radial line through the pivot.
+"""Tilt, and its angular acceleration, from two accelerometers on one radial line through the pivot.
 
 S. Trimpe and R. D'Andrea, "Accelerometer-based tilt estimation of a rigid body with only rotational
 degrees of freedom", ICRA 2010 (reference [8] of aranovskiy2020).
@@ -11,6 +11,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from cmg_mj.elementwise import Scalar, atan2
+
+
+@dataclass(frozen=True)
+class TiltNoise:
+    """The noise of one sample of what `RadialTilt` makes of two accelerometers.
+
+    Attributes:
+        tilt: Standard deviation of the tilt y1 [rad].
+        acceleration: Standard deviation of the angular acceleration [rad/s^2].
+        correlation: Of both, which come from the same two readings.
+    """
+
+    tilt: float
+    acceleration: float
+    correlation: float
 
 
 @dataclass(frozen=True)
@@ -51,6 +66,34 @@ class RadialTilt:
         gravity_x = w_inner * inner_x - w_outer * outer_x
         gravity_z = w_inner * inner_z - w_outer * outer_z
         return atan2(-gravity_x, gravity_z)
+
+    def acceleration(self, inner_x: Scalar, outer_x: Scalar) -> Scalar:
+        """Angular acceleration of the tilt: gravity is the same at both places, r alpha is not.
+
+        Args:
+            inner_x: Inner accelerometer, tangential axis [m/s^2].
+            outer_x: Outer accelerometer, tangential axis [m/s^2].
+
+        Returns:
+            y1'' [rad/s^2].
+        """
+        return (outer_x - inner_x) / (self.r_outer - self.r_inner)
+
+    def noise(self, sigma: float, gravity: float) -> TiltNoise:
+        """The noise of tilt and angular acceleration, to first order in the noise of the accelerometers.
+
+        Args:
+            sigma: Standard deviation of one axis' sample, independent from axis to axis [m/s^2].
+            gravity: [m/s^2].
+
+        Returns:
+            Of one sample, near upright.
+        """
+        w_inner, w_outer = self._weights
+        both = math.hypot(w_inner, w_outer)
+        span = self.r_outer - self.r_inner
+        correlation = (w_inner + w_outer) / (math.sqrt(2.0) * both)
+        return TiltNoise(sigma * both / gravity, sigma * math.sqrt(2.0) / span, correlation)
 
     def offset(self, tilt: float, bias: tuple[float, float], gravity: float) -> float:
         """How far y1 is off, at rest, for a bias of the accelerometers' tangential axes.

@@ -20,6 +20,7 @@ SIGNALS = (
     "x3_rad",
     "y1_rad",
     "y2_rad",
+    "acceleration_rad_s2",
     "fog_rad_s",
     "u_rad_s",
     "x_e_rad_times_s",

@@ -113,10 +113,11 @@ def test_every_observer_works_without_mujoco() -> None:
 import sys
 from cmg_mj.observers import OBSERVERS, Measurement, make_observer
 from cmg_mj.reduced import ReducedModel
+from cmg_mj.tilt import TiltNoise
 model = {PAPER!r}
 for kind in OBSERVERS:
-    observer = make_observer(kind, 0.005, model)
-    observer.step(observer.init(Measurement(0.0, 0.0)), Measurement(0.01, 0.0), 0.0)
+    observer = make_observer(kind, 0.005, model, TiltNoise(0.006, 0.4, 0.9))
+    observer.step(observer.init(Measurement(0.0, 0.0, 0.0)), Measurement(0.01, 0.0, 1.0), 0.0)
 print("mujoco" in sys.modules)
 """
     assert in_a_fresh_interpreter(code) == ["False"]

@@ -179,5 +179,5 @@ def check(file: str) -> None:
         from cmg_mj.experiment import load_rig  # MuJoCo, which a bundled rig does without
 
         rig = load_rig(scenario).facts
-    words = (rig_description if is_model else description)(file, scenario, design(scenario, rig.reduced), rig)
+    words = (rig_description if is_model else description)(file, scenario, design(scenario, rig), rig)
     click.echo(words, file=own_stdout())

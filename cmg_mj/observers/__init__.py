@@ -1,6 +1,16 @@
 """Velocity observers, one a file."""
 
-from cmg_mj.observers.protocol import Estimate, Measurement, Observer
-from cmg_mj.observers.registry import OBSERVERS, make_observer, observer_class
+from cmg_mj.observers.protocol import NEEDS, Estimate, Measurement, Observer, needs
+from cmg_mj.observers.registry import GIVEN, OBSERVERS, make_observer, observer_class
 
-__all__ = ["OBSERVERS", "Estimate", "Measurement", "Observer", "make_observer", "observer_class"]
+__all__ = [
+    "GIVEN",
+    "NEEDS",
+    "OBSERVERS",
+    "Estimate",
+    "Measurement",
+    "Observer",
+    "make_observer",
+    "needs",
+    "observer_class",
+]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
@@ -18,6 +20,8 @@ class FiniteDifference:
         dt: Sample period [s].
         model: The reduced model (not used: this observer is model-free).
     """
+
+    needs: ClassVar[tuple[str, ...]] = ()
 
     dt: Positive
     model: ReducedModel

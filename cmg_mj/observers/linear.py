@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -26,6 +27,8 @@ class LinearDifferentiator:
         model: The reduced model (not used: this observer is model-free).
         tau: Time constant [s]. Default: Table 2.
     """
+
+    needs: ClassVar[tuple[str, ...]] = ()
 
     dt: Positive
     model: ReducedModel

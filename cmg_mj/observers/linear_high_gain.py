@@ -7,6 +7,7 @@ observers", Systems & Control Letters 57 (2008).
 from __future__ import annotations
 
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -33,6 +34,8 @@ class LinearHighGain:
         a1: First coefficient of s^2 + a1 s + a2. Default: sqrt(2), Butterworth poles.
         a2: Second coefficient.
     """
+
+    needs: ClassVar[tuple[str, ...]] = ()
 
     dt: Positive
     model: ReducedModel

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
@@ -9,13 +10,27 @@ from typing import Any, NamedTuple, Protocol
 from cmg_mj.elementwise import Scalar
 
 
-class Measurement(NamedTuple):
-    """y of aranovskiy2020 (5): floats for one world, arrays (n_worlds,) for many."""
-
+class _Angles(NamedTuple):
     y1: Scalar
     """Tilt q_b + pi/4 from the accelerometers [rad]."""
     y2: Scalar
     """Gimbal angle q_c - pi/2, half the difference of the two encoders [rad]."""
+
+
+class Measurement(_Angles):
+    """y of aranovskiy2020 (5), two angles: floats for one world, arrays (n_worlds,) for many.
+
+    Beside them, `acceleration` is what the same two accelerometers say of the tilt's angular acceleration [rad/s^2]; it
+    is no part of the papers' y, so that `y1, y2 = y` takes the angles alone. NaN where it is not measured.
+    """
+
+    acceleration: Scalar = math.nan
+
+    def __new__(cls, y1: Scalar, y2: Scalar, acceleration: Scalar = math.nan) -> Measurement:
+        """The angles [rad], and the angular acceleration if it is measured [rad/s^2]."""
+        y = super().__new__(cls, y1, y2)
+        y.acceleration = acceleration
+        return y
 
 
 class Estimate(NamedTuple):
@@ -38,6 +53,9 @@ class Observer(Protocol):
     An observer that estimates more than x names it in an attribute `extra_signals`, a tuple of names that end in
     their unit, such as ("bias_rad",), and appends the values to its estimate in that order. `BIAS` among them is what
     the summary judges and the controller can trim its integrator with.
+
+    Its constructor is given `dt` and `model`, and `noise` (`TiltNoise`, of the sensors' datasheet) if it takes that. An
+    attribute `needs` says what it cannot do without (`NEEDS`).
     """
 
     def init(self, y: Measurement) -> Any:
@@ -58,10 +76,21 @@ class Observer(Protocol):
         ...
 
 
+NEEDS = ("model", "gimbals", "acceleration")
+"""What an observer may need beside y1: the reduced model, y2 and u, the angular acceleration."""
+
 BIAS = "bias_rad"
 """The extra signal of an observer that estimates e, the equilibrium bias [rad]."""
 
 RESERVED = ("x1_rad", "x2_rad_s", "x3_rad")
+
+
+def needs(observer: Any) -> tuple[str, ...]:
+    """What an observer, or its class, cannot do without beside y1, out of `NEEDS`.
+
+    One that does not say counts as needing the model and the gimbals, as the papers' observers do.
+    """
+    return tuple(getattr(observer, "needs", ("model", "gimbals")))
 
 
 def extra_signals(observer: Observer) -> tuple[str, ...]:

@@ -12,12 +12,14 @@ from cmg_mj.complaint import complaint
 from cmg_mj.errors import InputError, nearest, raised
 from cmg_mj.observers.protocol import Observer
 from cmg_mj.reduced import ReducedModel
+from cmg_mj.tilt import TiltNoise
 
 OBSERVERS = {
     "linear": "cmg_mj.observers.linear:LinearDifferentiator",
     "ltv": "cmg_mj.observers.ltv:LinearTimeVarying",
     "homogeneous": "cmg_mj.observers.homogeneous:Homogeneous",
     "luenberger": "cmg_mj.observers.luenberger:Luenberger",
+    "gyro_free": "cmg_mj.observers.gyro_free:GyroFree",
     "finite_difference": "cmg_mj.observers.finite_difference:FiniteDifference",
     "super_twisting": "cmg_mj.observers.super_twisting:SuperTwisting",
     "linear_high_gain": "cmg_mj.observers.linear_high_gain:LinearHighGain",
@@ -26,6 +28,9 @@ OBSERVERS = {
     "homogeneous_adaptive": "cmg_mj.observers.homogeneous_adaptive:HomogeneousAdaptive",
 }
 """Name a user types -> dotted path of the class."""
+
+GIVEN = ("dt", "model", "noise")
+"""What the bench gives every observer whose constructor takes it; all else is the user's choice."""
 
 
 def observer_class(kind: str) -> type:
@@ -58,13 +63,16 @@ def observer_class(kind: str) -> type:
     return found
 
 
-def make_observer(kind: str, dt: float, model: ReducedModel, /, **parameters: Any) -> Observer:
+def make_observer(
+    kind: str, dt: float, model: ReducedModel, noise: TiltNoise | None = None, /, **parameters: Any
+) -> Observer:
     """Construct an observer.
 
     Args:
         kind: A name of `OBSERVERS`, or `package.module:Class`.
         dt: Sample period [s].
         model: The reduced model read off the plant.
+        noise: Of tilt and angular acceleration as the sensors' datasheet says, for the observers that take it.
         **parameters: The observer's design parameters; those left out keep their defaults.
 
     Returns:
@@ -74,15 +82,21 @@ def make_observer(kind: str, dt: float, model: ReducedModel, /, **parameters: An
         InputError: Unknown observer or parameter, or a parameter that the observer refuses.
     """
     cls = observer_class(kind)
-    allowed = [name for name in inspect.signature(cls).parameters if name not in ("dt", "model")]
+    taken = inspect.signature(cls).parameters
+    allowed = [name for name in taken if name not in GIVEN]
     for name in parameters:
         if name not in allowed and not _takes_any(cls):
             what = nearest(name, allowed) if allowed else "it has none"
             raise InputError(f"observer.{name}: {kind} has no such parameter; {what}")
+    given: dict[str, Any] = {"dt": dt, "model": model}
+    if "noise" in taken:
+        if noise is None and taken["noise"].default is inspect.Parameter.empty:
+            raise InputError(f"observer {kind}: needs the noise of its sensors (a TiltNoise after the model)")
+        given["noise"] = noise
     try:
-        return cls(dt=dt, model=model, **parameters)
+        return cls(**given, **parameters)
     except ValidationError as error:
-        clause = complaint(cls, error.errors()[0], {"dt": dt, "model": model, **parameters})
+        clause = complaint(cls, error.errors()[0], {**given, **parameters})
         raise InputError(f"observer.{clause} (observer {kind})") from error
     except (Exception, SystemExit) as error:  # a user's own class may refuse its parameters in its own way
         raise InputError(f"observer {kind}: {raised(error)}") from error

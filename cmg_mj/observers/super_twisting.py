@@ -5,7 +5,7 @@ A. Levant, "Robust exact differentiation via sliding mode technique", Automatica
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from pydantic.dataclasses import dataclass
 
@@ -38,6 +38,8 @@ class SuperTwisting:
         l0: First gain. Default: Levant's 1.5.
         l1: Second gain. Default: Levant's 1.1.
     """
+
+    needs: ClassVar[tuple[str, ...]] = ()
 
     dt: Positive
     model: ReducedModel

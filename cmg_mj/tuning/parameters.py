@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.observers import Observer, observer_class
+from cmg_mj.observers import GIVEN, Observer, observer_class
 
 SPAN = 1000.0
 """A parameter is searched up to so many times its given value, and down to as small a part of it."""
@@ -56,7 +56,7 @@ def parameters_of(kind: str, observer: Observer, given: Mapping[str, Any]) -> di
         Values by name; without those that cannot be read off the observer.
     """
     signature = inspect.signature(observer_class(kind)).parameters.values()
-    defaults = {p.name: p.default for p in signature if p.name not in ("dt", "model")}
+    defaults = {p.name: p.default for p in signature if p.name not in GIVEN}
     values = {name: getattr(observer, name, default) for name, default in {**defaults, **given}.items()}
     return {name: _plain(value) for name, value in values.items() if value is not inspect.Parameter.empty}
 

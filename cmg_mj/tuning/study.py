@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.experiment import prepare
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.intervals import Interval, PairedVerdict, paired_verdict, ratio_interval
-from cmg_mj.observers import make_observer
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.observers import Observer, make_observer
 from cmg_mj.schema import ObserverSettings, Scenario
 from cmg_mj.tuning.parameters import Number, narrowed, numbers_of, parameters_of, replaced
 from cmg_mj.tuning.recorded import WARM_UP_S, Recorded, Window, record
@@ -152,9 +152,8 @@ def tune(
     kind, settings = scenario.observer.kind, scenario.observer
     experiment = prepare(scenario)
     experiment.rehearse(worlds=2)
-    dt, model = experiment.law.dt, experiment.plant.reduced
-    given = parameters_of(kind, settings.make(dt, model), settings.parameters)
-    numbers = numbers_of(kind, given, lambda **p: make_observer(kind, dt, model, **p), parameters)
+    given = parameters_of(kind, experiment.design.observer(), settings.parameters)
+    numbers = numbers_of(kind, given, _maker(experiment), parameters)
     numbers = narrowed(numbers, ranges or {}, "--range")
 
     levels: list[Level] = []
@@ -170,7 +169,7 @@ def tune(
             recorded(scenario, span, noise_ug_rthz=density, warm_up_s=warm_up_s)
             for span in (range(worlds), range(worlds, 2 * worlds))
         )
-        fitter = _Fitter(kind, dt, model, given, fit, share)
+        fitter = _Fitter(kind, _maker(experiment, density), given, fit, share)
         if not levels:
             still, window = fitter.idle(numbers), fit.window
             if len(still) == len(numbers):
@@ -195,13 +194,22 @@ def _names(numbers: Sequence[Number]) -> str:
     return ", ".join(number.name for number in numbers)
 
 
+def _maker(experiment: Experiment, noise_ug_rthz: float | None = None) -> Callable[..., Observer]:
+    """Makes the scenario's observer of its parameters, told the noise of the sensors it is tuned at."""
+    dt, model, noise = experiment.design.given
+    if noise_ug_rthz is not None:
+        accelerometer = experiment.scenario.sensors.accelerometer
+        noise = experiment.plant.facts.noise(replace(accelerometer, noise_density_ug_rthz=noise_ug_rthz))
+    return partial(make_observer, experiment.scenario.observer.kind, dt, model, noise)
+
+
 class _Fitter:
     """Scores parameters on the fitted worlds, and counts how often."""
 
     def __init__(
-        self, kind: str, dt: float, model: ReducedModel, given: Mapping[str, Any], recorded: Recorded, on_share: OnShare
+        self, kind: str, make: Callable[..., Observer], given: Mapping[str, Any], recorded: Recorded, on_share: OnShare
     ) -> None:
-        self.kind, self.dt, self.model, self.given, self.recorded = kind, dt, model, given, recorded
+        self.kind, self.make, self.given, self.recorded = kind, make, given, recorded
         self.on_share = on_share
         self.expected = 1
         self.count = 0
@@ -210,8 +218,7 @@ class _Fitter:
     def errors(self, parameters: Mapping[str, Any], recorded: Recorded) -> np.ndarray:
         """Velocity RMS errors, (n_worlds,) [rad/s]; not a number where the observer refuses or fails."""
         try:
-            observer = make_observer(self.kind, self.dt, self.model, **parameters)
-            return recorded.errors(observer)
+            return recorded.errors(self.make(**parameters))
         except KeyboardInterrupt:
             raise
         except Exception:  # a user's observer may fail in any way, at parameters nobody has tried

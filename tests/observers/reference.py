@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 
 from cmg_mj.observers import Measurement, Observer, make_observer
 from cmg_mj.reduced import ReducedModel
+from cmg_mj.tilt import TiltNoise
 from tests import paper_model as paper
 
 DT = 0.005
@@ -26,6 +27,9 @@ HEAVY = ReducedModel(J1=0.06, J2=0.05, J_d=2e-3, omega_d=150.0, gravity_torque=2
 EPSILON, BOUND = 0.0287, 10.4
 """Defaults that are not a paper's: epsilon of linear_high_gain and L of super_twisting, from `cmg-mj tune`."""
 
+NOISE = TiltNoise(0.0063, 0.41, 0.89)
+"""Of the bundled rig's accelerometers, 400 ug/rtHz at 200 Hz."""
+
 Signal = Sequence[float] | np.ndarray
 
 Slope = Callable[[np.ndarray, float, float, float], np.ndarray]
@@ -33,7 +37,7 @@ Slope = Callable[[np.ndarray, float, float, float], np.ndarray]
 
 
 def observer(kind: str, dt: float = DT, model: ReducedModel = PAPER, **parameters: Any) -> Observer:
-    return make_observer(kind, dt, model, **parameters)
+    return make_observer(kind, dt, model, NOISE, **parameters)
 
 
 def run(of: Observer, y1: Signal, y2: Signal, u: Signal) -> tuple[np.ndarray, list]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.observers import OBSERVERS, Estimate, Measurement
+from cmg_mj.observers import GIVEN, OBSERVERS, Estimate, Measurement
 from tests import paper_model as paper
 from tests.observers.reference import DT, PAPER, observer, rough_signals
 
@@ -27,17 +27,18 @@ def flat(state: Any) -> list:
 
 
 def walk(of: Any, samples: Sequence[tuple[Any, ...]]) -> tuple[Any, list[Estimate]]:
-    """Last state and all estimates along samples (y1, y2, u held since the sample before)."""
-    state, estimates = of.init(Measurement(*samples[0][:2])), []
-    for y1, y2, u in samples[1:]:
-        state, estimate = of.step(state, Measurement(y1, y2), u)
+    """Last state and all estimates along samples (y1, y2, acceleration, u held since the sample before)."""
+    state, estimates = of.init(Measurement(*samples[0][:3])), []
+    for *y, u in samples[1:]:
+        state, estimate = of.step(state, Measurement(*y), u)
         estimates.append(estimate)
     return state, estimates
 
 
-def samples(n: int = 60, seed: int = 0) -> list[tuple[float, float, float]]:
+def samples(n: int = 60, seed: int = 0) -> list[tuple[float, float, float, float]]:
     y1, y2, u = rough_signals(n, seed)
-    return list(zip(y1.tolist(), y2.tolist(), [0.0, *u.tolist()[:-1]], strict=True))
+    acceleration = np.random.default_rng(seed).normal(0.0, 5.0, n).tolist()
+    return list(zip(y1.tolist(), y2.tolist(), acceleration, [0.0, *u.tolist()[:-1]], strict=True))
 
 
 @pytest.mark.parametrize("kind", EVERY)
@@ -60,9 +61,9 @@ def test_is_a_frozen_value(kind: str) -> None:
 def test_starts_at_rest_at_the_measured_angles(kind: str) -> None:
     """At the equilibrium nothing moves, so the estimate stays (0, 0, y2) while the measurement does."""
     of = observer(kind)
-    state = of.init(Measurement(0.0, 0.3))
+    state = of.init(Measurement(0.0, 0.3, 0.0))
     for _ in range(5):
-        state, estimate = of.step(state, Measurement(0.0, 0.3), 0.0)
+        state, estimate = of.step(state, Measurement(0.0, 0.3, 0.0), 0.0)
         np.testing.assert_allclose(estimate[:3], (0.0, 0.0, 0.3), rtol=0.0, atol=1e-14)
 
 
@@ -72,7 +73,7 @@ def test_step_has_no_memory_but_the_state(kind: str) -> None:
     of, twin = observer(kind), observer(kind)
     state, _ = walk(of, samples())
     before = copy.deepcopy(state)
-    y, u = Measurement(0.02, 0.1), 1.5
+    y, u = Measurement(0.02, 0.1, 3.0), 1.5
     first = of.step(state, y, u)
     walk(of, samples(seed=1))
     assert flat(of.step(state, y, u)) == flat(first)
@@ -84,11 +85,11 @@ def test_step_has_no_memory_but_the_state(kind: str) -> None:
 def test_two_runs_may_share_one_observer(kind: str) -> None:
     of = observer(kind)
     alone = [walk(of, samples(seed=seed))[1] for seed in (0, 1)]
-    states: list[Any] = [of.init(Measurement(*samples(seed=seed)[0][:2])) for seed in (0, 1)]
+    states: list[Any] = [of.init(Measurement(*samples(seed=seed)[0][:3])) for seed in (0, 1)]
     for k in range(1, 60):
         for seed in (0, 1):
-            y1, y2, u = samples(seed=seed)[k]
-            states[seed], estimate = of.step(states[seed], Measurement(y1, y2), u)
+            *y, u = samples(seed=seed)[k]
+            states[seed], estimate = of.step(states[seed], Measurement(*y), u)
             assert estimate == alone[seed][k - 1]
 
 
@@ -96,16 +97,16 @@ def test_two_runs_may_share_one_observer(kind: str) -> None:
 def test_estimate_uses_the_sample_it_is_given(kind: str) -> None:
     """A filter, not a one-step predictor: y1_k and (for y2's model) y2_k move the estimate of sample k."""
     of = observer(kind)
-    state = of.init(Measurement(0.0, 0.1))
-    _, estimate = of.step(state, Measurement(1e-5, 0.1), 0.0)
-    _, moved = of.step(state, Measurement(5e-5, 0.1), 0.0)
+    state = of.init(Measurement(0.0, 0.1, 0.0))
+    _, estimate = of.step(state, Measurement(1e-5, 0.1, 0.0), 0.0)
+    _, moved = of.step(state, Measurement(5e-5, 0.1, 0.0), 0.0)
     assert abs(moved.x2 - estimate.x2) > 1e-6
-    _, turned = of.step(state, Measurement(1e-5, 0.3), 0.0)
+    _, turned = of.step(state, Measurement(1e-5, 0.3, 0.0), 0.0)
     assert abs(turned.x3 - estimate.x3) > 1e-4
 
 
 MODELS = ("ltv", "homogeneous", "luenberger", "high_gain", "adaptive", "homogeneous_adaptive")
-DIFFERENTIATORS = ("linear", "linear_high_gain", "finite_difference", "super_twisting")
+DIFFERENTIATORS = ("linear", "linear_high_gain", "finite_difference", "super_twisting", "gyro_free")
 
 
 def test_every_observer_is_a_model_or_a_differentiator() -> None:
@@ -126,7 +127,7 @@ def test_models_use_the_command_held_since_the_sample_before(kind: str) -> None:
 def test_differentiators_use_no_model(kind: str) -> None:
     """Neither the command nor the gimbal nor the rig's parameters reach the rate."""
     bent = dataclasses.replace(PAPER, J1=1.0, J2=0.3, J_d=0.1, omega_d=10.0, gravity_torque=9.0)
-    still = [(y1, 0.0, 0.0) for y1, _, _ in samples()]
+    still = [(y1, 0.0, acceleration, 0.0) for y1, _, acceleration, _ in samples()]
     rates = [
         [e.x2 for e in walk(of, s)[1]] for of, s in ((observer(kind), samples()), (observer(kind, model=bent), still))
     ]
@@ -138,7 +139,7 @@ def test_differentiators_use_no_model(kind: str) -> None:
 def test_arrays_equal_floats_bit_by_bit(kind: str, n_worlds: int) -> None:
     of = observer(kind)
     worlds = [samples(120, seed) for seed in range(n_worlds)]
-    together = [tuple(np.array([world[k][i] for world in worlds]) for i in range(3)) for k in range(len(worlds[0]))]
+    together = [tuple(np.array([world[k][i] for world in worlds]) for i in range(4)) for k in range(len(worlds[0]))]
     _, many = walk(of, together)
     for i, world in enumerate(worlds):
         _, single = walk(of, world)
@@ -158,9 +159,10 @@ def positive_gains() -> list[tuple[str, str]]:
     found = []
     for kind in EVERY:
         of: Any = observer(kind)
-        names = [field.name for field in dataclasses.fields(of) if field.name not in ("dt", "model")]
+        names = [field.name for field in dataclasses.fields(of) if field.name not in GIVEN]
         found += [(kind, name) for name in names if isinstance(value := getattr(of, name), float) and value > 0.0]
-    return [gain for gain in found if gain != ("high_gain", "d_inf")]  # which may be zero
+    may_be_zero = {("high_gain", "d_inf"), ("gyro_free", "bias_walk"), ("gyro_free", "jerk")}
+    return [gain for gain in found if gain not in may_be_zero]
 
 
 @pytest.mark.parametrize(("kind", "name"), positive_gains())

@@ -11,7 +11,7 @@ from cmg_mj.experiment import prepare
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.scenario import parse_scenario
-from tests.observers.reference import DT, PAPER, observer
+from tests.observers.reference import DT, NOISE, PAPER, observer
 
 
 class Mine:
@@ -49,7 +49,7 @@ MINE = f"{__name__}:Mine"
 
 @pytest.mark.parametrize("kind", sorted(OBSERVERS))
 def test_every_name_makes_its_observer(kind: str) -> None:
-    made = make_observer(kind, DT, PAPER)
+    made = make_observer(kind, DT, PAPER, NOISE)
     assert f"{type(made).__module__}:{type(made).__name__}" == OBSERVERS[kind]
     assert observer_class(OBSERVERS[kind]) is type(made)
 

@@ -27,7 +27,7 @@ class Motor:
         self.rates, self.law, self.tick = iter(rates), experiment().law, None
 
     def update(self, step: int, ideal: Any) -> bool:
-        self.tick: Any = Tick(0.0, 0.0, 0.0, float(next(self.rates)), 0.0, [])
+        self.tick: Any = Tick(0.0, 0.0, 0.0, 0.0, float(next(self.rates)), 0.0, [])
         return True
 
 

@@ -30,8 +30,9 @@ def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, floa
     if worlds is None:
         cases |= {"ltv, plain Euler": Plain(euler), "ltv, plain Runge-Kutta 4": Plain(rk4)}
     value: Any = 0.01 if worlds is None else np.full(worlds, 0.01)
-    y1, y2, u = ([factor * value] * updates for factor in (1.0, 2.0, 3.0))
-    times = [{name: time_of_update(observer, y1, y2, u) for name, observer in cases.items()} for _ in range(turns)]
+    y1, y2, acceleration, u = ([factor * value] * updates for factor in (1.0, 2.0, 0.0, 3.0))
+    signals = y1, y2, acceleration, u
+    times = [{name: time_of_update(observer, *signals) for name, observer in cases.items()} for _ in range(turns)]
     return {name: statistics.median(turn[name] for turn in times) for name in cases}
 
 
