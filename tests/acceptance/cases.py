@@ -12,6 +12,7 @@ from cmg_mj.simulate import Result
 
 STANDING = {
     # observer -> settings in which it stands: the headline push at 0.5 degrees of bias, unless it cannot
+    "gyro_free": (),
     "homogeneous": (),
     "ltv": (),
     "linear": (),

@@ -62,7 +62,7 @@ def test_order_in_the_push_window() -> None:
 
 
 def test_what_an_estimate_of_zero_does_as_well() -> None:
-    """Over the whole run it beats linear and ltv in their own loops, and every observer on the gyro's.
+    """Over the whole run it beats linear and ltv in their own loops, and every observer but gyro_free on the gyro's.
 
     In the push window linear_high_gain and linear beat it there, and homogeneous does not.
     """
@@ -70,20 +70,22 @@ def test_what_an_estimate_of_zero_does_as_well() -> None:
     for name in ("linear", "ltv"):
         assert_less(error, loop(name, "zero"), loop(name))
     assert_less(error, loop("homogeneous"), loop("homogeneous", "zero"))
-    for name in OBSERVERS:
+    for name in OBSERVERS.keys() - {"gyro_free"}:
         assert_less(error, riding("zero"), riding(name))
-    for name in ("linear_high_gain", "linear"):
+    assert_less(error, riding("gyro_free"), riding("zero"))
+    for name in ("linear_high_gain", "linear", "gyro_free"):
         assert_less(push_error, riding(name), riding("zero"))
     assert_less(push_error, riding("zero"), riding("homogeneous"))
 
 
 def test_a_cheap_gyro_is_far_better() -> None:
-    """Ten times, in the push window and over the whole run."""
+    """Ten times, in the push window and over the whole run; gyro_free comes within a factor of four to ten."""
     for key in ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"):
         for name in STANDING:
             if not STANDING[name]:
                 of, gyro = loop(name), loop(name, "mems_gyro")
-                assert statistics.fmean(x[key] for x in of) > 10.0 * statistics.fmean(x[key] for x in gyro), (name, key)
+                ratio = statistics.fmean(x[key] for x in of) / statistics.fmean(x[key] for x in gyro)
+                assert (4.0 < ratio < 10.0) if name == "gyro_free" else ratio > 10.0, (name, key, ratio)
 
 
 Figures = list[dict[str, float]]
