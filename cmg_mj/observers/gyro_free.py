@@ -52,8 +52,8 @@ class GyroFree:
         model: The reduced model (not used).
         noise: Of tilt and angular acceleration, by the sensors' datasheet.
         rate_start: Standard deviation of the rate at the start, about zero [rad/s].
-        bias_start: The same of b [rad/s^2]. An accelerometer that is 5 mg off makes
-            0.37 of it on the bundled rig.
+        bias_start: The same of b [rad/s^2]. On the bundled rig 5 mg on each accelerometer make 0.5: what its zero moves
+            over ten degrees of temperature (InvenSense PS-MPU-6000A, 6.2: 35 mg over 70).
         bias_walk: How fast b may change: standard deviation after a second [rad/s^2].
         jerk: How far alpha is off the straight line between samples: standard deviation of its mean [rad/s^2].
     """
@@ -63,8 +63,8 @@ class GyroFree:
     dt: Positive
     model: ReducedModel
     noise: TiltNoise
-    rate_start: Positive = 0.1
-    bias_start: Positive = 1.0
+    rate_start: Positive = 0.05
+    bias_start: Positive = 0.5
     bias_walk: NonNegative = 0.01
     jerk: NonNegative = 0.1
 
