@@ -10,9 +10,10 @@ import numpy as np
 
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, RunStopped, raised
+from cmg_mj.ideal import Ideal
 from cmg_mj.law import Law
 from cmg_mj.observers.protocol import BIAS, Estimate, Measurement, Observer, extra_signals
-from cmg_mj.sensors import Ideal, SampledSensor, Sensors, normals
+from cmg_mj.sensors import Sensors, at_work
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.timing import steps_until, whole_steps
 
@@ -170,23 +171,14 @@ class Controller:
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
         self._observers = [self.observer, *self.companions.values()]
-        kinds = ("accelerometer", "encoder", "fog")
-        sampled = [
-            SampledSensor(
-                sensor,
-                self.timestep,
-                normals(self.seed, self.worlds, stream, sensor.channels),
-                f"sensors.{kind}",
-            )
-            for stream, (kind, sensor) in enumerate((kind, getattr(self.sensors, kind)) for kind in kinds)
-        ]
+        sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds)
         self._accelerometer, self._encoder, self._fog = self._sampled = sampled
         self._states: list[Any] | None = None
         self._x_e: Scalar = 0.0
         self.tick: Tick | None = None
         self.step: int | None = None
         """The physics step of the last update."""
-        self.beat = math.gcd(self.period, *(sensor.period for sensor in sampled))
+        self.beat = math.gcd(self.period, *(sensor.beat for sensor in sampled))
         """Physics steps between the moments at which anything may be due."""
 
     def update(self, step: int, ideal: Ideal) -> bool:
@@ -204,7 +196,7 @@ class Controller:
         """
         first, self.step = self.step is None, step
         for sensor in self._sampled:
-            if step % sensor.period == 0 or first:  # a start between two samples still has something to show
+            if sensor.due(step) or first:  # a start between two samples still has something to show
                 sensor.sample(step, ideal)
         if step % self.period:
             return False

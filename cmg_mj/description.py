@@ -37,9 +37,12 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
     observer = {key: value for key, value in fields["observer"].items() if key != "kind"}
     compare = scenario.compare
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
+    imperfections = scenario.sensors.accelerometer.imperfections
+    changes = settings.changes_of_physics()
     rows = [
         ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
         ("plant", f"{fields['plant']['model']}, cubes: {', '.join(rig.cubes)}"),
+        *([("", assignments(changes))] if changes else []),
         ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
         ("law", f"K_e = {number(law.gains)} at {scenario.controller.rate_hz:g} Hz, at most {law.rate_limit:g} rad/s"),
         ("", f"tilt rate from the {scenario.controller.feedback}, {scenario.controller.angles} angles"),
@@ -53,6 +56,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         ),
         ("companions", ", ".join(scenario.companion_names()) or "none"),
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
+        *([("", f"accelerometer: {assignments(imperfections)}")] if imperfections else []),
         *([("compare", f"{', '.join(compare.names())}; {compare.worlds} worlds")] if compare else []),
         *(("push", f"{p.torque_n_m:g} N m from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]

@@ -40,6 +40,8 @@ def check_times(scenario: Scenario) -> None:
         check_steps(scenario, timestep)
         for field, rate in _rates(scenario):
             _check_grid(1.0 / rate, timestep, field, f"{rate:g} Hz", lambda steps: f"{1.0 / (steps * timestep):g} Hz")
+        for field, period, shown in _inside(scenario):
+            whole_steps(period, timestep, field, shown)
         for field, time in _times(scenario):
             _check_grid(time, timestep, field, f"{time:g} s", lambda steps: f"{steps * timestep:g} s")
     for i, push in enumerate(scenario.push):
@@ -71,6 +73,7 @@ def common_period(scenario: Scenario) -> float:
         InputError: It is shorter than `FINEST_S`; the first field that makes it so is named.
     """
     periods = [(field, 1 / _fraction(rate), f"{rate:g} Hz") for field, rate in _rates(scenario)]
+    periods += [(field, _fraction(period), shown) for field, period, shown in _inside(scenario)]
     times = [(field, _fraction(time), f"{time:g} s") for field, time in _times(scenario)]
     common = Fraction(0)
     for field, time, shown in periods + times:
@@ -121,8 +124,18 @@ def _rates(scenario: Scenario) -> Iterator[tuple[str, float]]:
         yield f"sensors.{kind}.rate_hz", getattr(scenario.sensors, kind).rate_hz
 
 
+def _inside(scenario: Scenario) -> Iterator[tuple[str, float, str]]:
+    """Sample periods inside a part, which no field gives [s]: the field that asks for them, and what to call it."""
+    accelerometer = scenario.sensors.accelerometer
+    if accelerometer.bandwidth_hz:
+        rate = accelerometer.raw_rate_hz
+        shown = f"{accelerometer.bandwidth_hz:g} Hz, sampled at {rate:g} Hz inside the part"
+        yield "sensors.accelerometer.bandwidth_hz", 1.0 / rate, shown
+
+
 def _times(scenario: Scenario) -> Iterator[tuple[str, float]]:
     yield "duration_s", scenario.duration_s
+    yield "sensors.accelerometer.skew_s", scenario.sensors.accelerometer.skew_s
     for i, push in enumerate(scenario.push):
         yield f"push.{i}.start_s", push.start_s
         yield f"push.{i}.duration_s", push.duration_s

@@ -13,10 +13,8 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import digitise
 from cmg_mj.fields import STRICT, NonNegative, Positive
+from cmg_mj.flicker import CORNERS_HZ, Flicker
 
-CORNERS_HZ = (0.01, 0.1, 1.0, 10.0)
-"""Corner frequencies of the Gauss-Markov processes whose sum is the 1/f noise: one a decade, so it waves by 6 %.
-Above 15 Hz the white noise is the larger."""
 PIECE = 1000
 """So many samples before the run are made together, whatever the rate."""
 
@@ -61,14 +59,9 @@ class MemsGyro:
         return math.radians(self.noise_density_deg_s_rthz) * math.sqrt(0.5 / dt)
 
     @property
-    def flicker_sigma(self) -> float:
-        """Standard deviation of each Gauss-Markov process [rad/s].
-
-        1/f noise of one-sided density K^2/f has an Allan deviation of K sqrt(2 ln 2) whatever is averaged over;
-        processes of variance v with corners a factor r apart sum to K^2 = v/ln r.
-        """
-        k = math.radians(self.bias_instability_deg_h) / 3600.0 / math.sqrt(2.0 * math.log(2.0))
-        return k * math.sqrt(math.log(CORNERS_HZ[1] / CORNERS_HZ[0]))
+    def floor(self) -> float:
+        """Of the Allan deviation of the 1/f noise [rad/s]."""
+        return math.radians(self.bias_instability_deg_h) / 3600.0
 
     def meter(self, dt: float, noise: Iterator) -> Callable[[np.ndarray], np.ndarray]:
         """The gyro at work.
@@ -80,9 +73,7 @@ class MemsGyro:
         Returns:
             A function: the next samples' true rate (n_rows, n_worlds) -> what the gyro shows, the same shape [rad/s].
         """
-        sigma, flicker = self.sigma(dt), self.flicker_sigma
-        decay = np.exp(-2.0 * math.pi * np.array(CORNERS_HZ) * dt)[:, None]
-        spread = flicker * np.sqrt(1.0 - decay**2)
+        sigma = self.sigma(dt)
         limit = math.radians(self.range_deg_s)
         step = math.radians(1.0 / self.counts_per_deg_s) if self.counts_per_deg_s else 0.0
 
@@ -90,17 +81,12 @@ class MemsGyro:
             """(n, channels, n_worlds)."""
             return np.array(list(islice(noise, n))).reshape(n, self.channels, -1)
 
-        wander = flicker * drawn(1)[0, 1:]  # as if it had been on for ever
+        flicker = Flicker(self.floor, dt, drawn(1)[0, 1:])
 
         def errors(n: int) -> np.ndarray:
             """Of the next n samples, (n, n_worlds) [rad/s]."""
-            nonlocal wander
             normals = drawn(n)
-            driven = spread * normals[:, 1:]
-            for row in driven:
-                row += decay * wander
-                wander = row
-            return sigma * normals[:, 0] + driven.sum(axis=1)
+            return sigma * normals[:, 0] + flicker.advance(normals[:, 1:])
 
         resting = round(self.calibration_s / dt)
         pieces = [min(PIECE, resting - start) for start in range(0, resting, PIECE)]

@@ -12,12 +12,14 @@ import mujoco
 import numpy as np
 from pydantic import ValidationError
 
+from cmg_mj.accelerometer import Accelerometer
 from cmg_mj.complaint import complaint
 from cmg_mj.controller import CONTROLLER_OPTIONS, Controller
 from cmg_mj.elementwise import Scalar
 from cmg_mj.engine import control_callback, quiet
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.grid import fitting_step
+from cmg_mj.ideal import Ideal
 from cmg_mj.known_rigs import RigFacts
 from cmg_mj.law import Law
 from cmg_mj.mjcf import compile_model, load_rig, lock_thrust_bearing, parse
@@ -27,7 +29,7 @@ from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
 from cmg_mj.rig_check import starts
 from cmg_mj.rig_parts import KEYFRAME
-from cmg_mj.sensors import Accelerometer, Ideal, Sensors
+from cmg_mj.sensors import Sensors
 from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.variations import vary
@@ -94,7 +96,8 @@ class Plant:
             gimbals=self._gimbals,
             flywheels=[cube.flywheel for cube in self.cubes],
         )
-        self.largest_step = largest_step(self.model, self.key, own)
+        shaken = max(abs(cube.speed) for cube in self.cubes) if settings.flywheel_imbalance_kg_m else 0.0
+        self.largest_step = largest_step(self.model, self.key, own, shaken)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
                 f"{self._blamed}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
@@ -265,7 +268,7 @@ class Plant:
         )
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
-        """What an observer of the bias should find: e less the tilt that the accelerometers' own bias makes.
+        """What an observer of the bias should find: e less the tilt that the accelerometers' constant errors make.
 
         With y1 = x1 - e + offset, the two cannot be told apart.
 
@@ -275,7 +278,7 @@ class Plant:
         Returns:
             The bias at the equilibrium [rad].
         """
-        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.bias, self.gravity)
+        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.constant_errors(), self.gravity)
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""

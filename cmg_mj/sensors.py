@@ -9,97 +9,22 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.accelerometer import INSIDE_HZ, Accelerometer
 from cmg_mj.elementwise import Scalar, clip, digitise
 from cmg_mj.fields import STRICT, Instant, NonNegative, Positive, Rate
+from cmg_mj.flicker import CORNERS_HZ, Flicker
+from cmg_mj.ideal import Ideal
 from cmg_mj.mems_gyro import MemsGyro
 from cmg_mj.timing import steps_until, whole_steps
 
-STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
-
-
-class Ideal(NamedTuple):
-    """What perfect sensors would show at one instant (floats, or arrays (n_worlds,))."""
-
-    accelerations: Any
-    """Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
-    gimbals: Sequence[Scalar]
-    """Gimbal angles, one a gimbal [rad]."""
-    gyro: Scalar
-    """What a gyro on the frame shows along the tilt axis [rad/s]."""
-    rate: Scalar
-    """The true tilt rate, q_b' [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
-
-
-@dataclass(frozen=True, config=STRICT)
-class Accelerometer:
-    """A pair of accelerometers of the MPU-6050 class (InvenSense PS-MPU-6000A: 400 ug/rtHz, +-2 g, 16384 counts/g).
-
-    Its zero-g offset is tens of mg before calibration; the default is what calibration leaves, zero. An offset
-    on the tangential axes acts like the equilibrium bias e.
-
-    Attributes:
-        rate_hz: Samples a second.
-        noise_density_ug_rthz: White noise, one-sided density; one sample's sigma is density * sqrt(rate/2).
-        bias_mg: Offsets of the tangential axes of the inner and the outer accelerometer [mg].
-        range_g: Readings saturate here [g].
-        counts_per_g: Resolution; 0 for none.
-        latency_s: From sampling to delivery [s].
-    """
-
-    rate_hz: Rate = 200.0
-    noise_density_ug_rthz: NonNegative = 400.0
-    bias_mg: tuple[float, float] = (0.0, 0.0)
-    range_g: Positive = 2.0
-    counts_per_g: NonNegative = 16384.0
-    latency_s: Instant = 0.0
-
-    channels = 4
-
-    @property
-    def sigma(self) -> float:
-        """Standard deviation of one sample [m/s^2]."""
-        return self.noise_density_ug_rthz * 1e-6 * STANDARD_GRAVITY * math.sqrt(self.rate_hz / 2.0)
-
-    @property
-    def deviation(self) -> float:
-        """Of one sample from the mean, with what the resolution adds: what a filter is told [m/s^2]."""
-        step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
-        return math.hypot(self.sigma, step / math.sqrt(12.0))
-
-    @property
-    def bias(self) -> tuple[float, float]:
-        """Offsets of the tangential axes of the inner and the outer accelerometer [m/s^2]."""
-        inner, outer = (bias * 1e-3 * STANDARD_GRAVITY for bias in self.bias_mg)
-        return inner, outer
-
-    def meter(self) -> Callable[[Ideal, Sequence[Scalar]], Sequence[Scalar]]:
-        """A function (ideal reading, standard normals) -> reading: inner x, z, outer x, z [m/s^2]."""
-        sigma = self.sigma
-        limit = self.range_g * STANDARD_GRAVITY
-        step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
-        inner, outer = self.bias
-        bias = np.array([[inner], [0.0], [outer], [0.0]])
-
-        def measure(ideal: Ideal, normal: Sequence[Scalar]) -> Sequence[Scalar]:
-            forces = ideal.accelerations
-            if isinstance(forces, np.ndarray):
-                return digitise(forces + bias + sigma * np.asarray(normal), limit, step)
-            ix, iz, ox, oz = forces
-            n0, n1, n2, n3 = normal
-            return (
-                digitise(ix + inner + sigma * n0, limit, step),
-                digitise(iz + sigma * n1, limit, step),
-                digitise(ox + outer + sigma * n2, limit, step),
-                digitise(oz + sigma * n3, limit, step),
-            )
-
-        return measure
+FLICKER = 4
+"""The stream of the accelerometers' 1/f noise: 0 to 2 are the sensors' white noise, 3 is the cheap gyro's."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -217,19 +142,30 @@ def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) 
 
 
 class SampledSensor:
-    """One sensor at work: it samples at its own rate and delivers after its latency."""
+    """One sensor at work: it samples at its own rate and delivers after its latency.
+
+    Attributes:
+        beat: Physics steps between the moments at which it may be due.
+    """
 
     def __init__(self, sensor: Accelerometer | Encoder | Fog, timestep: float, noise: Iterator, where: str) -> None:
         self.period = whole_steps(1.0 / sensor.rate_hz, timestep, f"{where}.rate_hz", f"{sensor.rate_hz:g} Hz")
+        self.beat = self.period
         self.latency = steps_until(sensor.latency_s, timestep)
         self._measure = sensor.meter()
         self._noise = noise
         self._on_the_way: deque = deque()
         self._delivered: Any = None
 
+    def due(self, step: int) -> bool:
+        """Whether it has something to look at in a physics step."""
+        return step % self.period == 0
+
     def sample(self, step: int, ideal: Ideal) -> None:
-        """Take a sample at a physics step that is a multiple of `period`."""
-        reading = self._measure(ideal, next(self._noise))
+        """Take a sample at a physics step at which it is due, or at the first one."""
+        self._deliver(step, self._measure(ideal, next(self._noise)))
+
+    def _deliver(self, step: int, reading: Any) -> None:
         # Before the start the rig stood still, so the first sample counts as delivered.
         if self.latency == 0 or self._delivered is None:
             self._delivered = reading
@@ -241,3 +177,106 @@ class SampledSensor:
         while self._on_the_way and self._on_the_way[0][0] <= step:
             self._delivered = self._on_the_way.popleft()[1]
         return self._delivered
+
+
+class SampledAccelerometers(SampledSensor):
+    """Both accelerometers at work: each at its own instants, filtering more samples than it delivers.
+
+    Args:
+        sensor: Both.
+        timestep: Physics step [s].
+        noise: Standard normals of the white noise, four a sample.
+        where: The scenario's section.
+        flicker: Standard normals of the 1/f noise, a corner frequency after the other, four each.
+    """
+
+    def __init__(
+        self, sensor: Accelerometer, timestep: float, noise: Iterator, where: str, flicker: Iterator | None = None
+    ) -> None:
+        super().__init__(sensor, timestep, noise, where)
+        inside = f"{sensor.bandwidth_hz:g} Hz, sampled at {INSIDE_HZ:g} Hz inside the part"
+        self._raw = self.period
+        if sensor.bandwidth_hz:
+            self._raw = whole_steps(1.0 / INSIDE_HZ, timestep, f"{where}.bandwidth_hz", inside)
+        self._skew = whole_steps(sensor.skew_s, timestep, f"{where}.skew_s", f"{sensor.skew_s:g} s")
+        self.beat = math.gcd(self.period, self._raw, self._skew)
+        # So long a low-pass needs to forget its start, all but 1e-4 of it.
+        self._settling = math.ceil(2.0 * INSIDE_HZ / sensor.bandwidth_hz) if sensor.bandwidth_hz else 0
+        self._outer: deque = deque()
+        if sensor.bias_instability_ug and flicker is not None:
+            self._measure = sensor.meter(_drift(sensor, flicker))
+
+    def due(self, step: int) -> bool:
+        """Whether one of the two takes a sample in a physics step."""
+        return step % self._raw == 0 or (step + self._skew) % self._raw == 0
+
+    def sample(self, step: int, ideal: Ideal) -> None:
+        """Take what is due: a sample of the inner one, together with the outer's that is older by the skew."""
+        first = self._delivered is None
+        if self._skew:
+            if first or (step + self._skew) % self._raw == 0:
+                self._outer.append((step, ideal.accelerations))
+            while len(self._outer) > 1 and self._outer[1][0] <= step - self._skew:
+                self._outer.popleft()
+        if not first and step % self._raw:
+            return
+        if self._skew:
+            ideal = ideal._replace(accelerations=_together(ideal.accelerations, self._outer[0][1]))
+        reading = self._measure(ideal, next(self._noise))
+        if first:  # before the start the rig stood still
+            for _ in range(self._settling):
+                reading = self._measure(ideal, next(self._noise))
+        if first or step % self.period == 0:
+            self._deliver(step, reading)
+
+
+def _together(inner: Any, outer: Any) -> Any:
+    """The inner accelerometer's forces at one instant and the outer's at another."""
+    if isinstance(inner, np.ndarray):
+        return np.concatenate([inner[:2], outer[2:]])
+    return (*inner[:2], *outer[2:])
+
+
+def _drift(sensor: Accelerometer, noise: Iterator) -> Callable[[], Any]:
+    """What the 1/f noise adds to the next sample of each channel: four floats, or an array (4, n_worlds) [m/s^2]."""
+
+    def drawn() -> np.ndarray:
+        numbers = np.asarray(next(noise))
+        return numbers.reshape(len(CORNERS_HZ), sensor.channels, *numbers.shape[1:])
+
+    flicker = Flicker(sensor.floor, 1.0 / sensor.raw_rate_hz, drawn())
+
+    def drift() -> Any:
+        added = flicker.advance(drawn()[None])[0]
+        return added.tolist() if added.ndim == 1 else added
+
+    return drift
+
+
+def at_work(sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence[int]) -> list[SampledSensor]:
+    """What the controller reads, at work: the accelerometers, the encoders, the gyro.
+
+    Args:
+        sensors: The sensors.
+        timestep: Physics step [s].
+        seed: The run's seed.
+        worlds: The number of one world, on floats, or the numbers of many, on arrays.
+
+    Returns:
+        The sensors, sampled.
+
+    Raises:
+        InputError: A rate or a time does not fit the physics step.
+    """
+
+    def noise(stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
+        return normals(seed, worlds, stream, channels)
+
+    pair = sensors.accelerometer
+    flicker = noise(FLICKER, len(CORNERS_HZ) * pair.channels)
+    where = "sensors.accelerometer"
+    return [
+        SampledAccelerometers(pair, timestep, noise(0, pair.channels), where, flicker),
+        SampledSensor(sensors.encoder, timestep, noise(1, sensors.encoder.channels), "sensors.encoder"),
+        SampledSensor(sensors.fog, timestep, noise(2, sensors.fog.channels), "sensors.fog"),
+    ]

@@ -7,8 +7,10 @@ degrees of freedom", ICRA 2010 (reference [8] of aranovskiy2020).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from cmg_mj.elementwise import Scalar, atan2
 
@@ -95,17 +97,16 @@ class RadialTilt:
         correlation = (w_inner + w_outer) / (math.sqrt(2.0) * both)
         return TiltNoise(sigma * both / gravity, sigma * math.sqrt(2.0) / span, correlation)
 
-    def offset(self, tilt: float, bias: tuple[float, float], gravity: float) -> float:
-        """How far y1 is off, at rest, for a bias of the accelerometers' tangential axes.
+    def offset(self, tilt: float, shown: Callable[[Any], Any], gravity: float) -> float:
+        """How far y1 is off, at rest, for what the accelerometers make of the specific forces.
 
         Args:
             tilt: The true tilt of the radial line [rad].
-            bias: Of the inner and the outer accelerometer [m/s^2].
+            shown: True specific forces (inner x, z, outer x, z) -> what the accelerometers show [m/s^2].
             gravity: [m/s^2].
 
         Returns:
             y1 less the tilt [rad].
         """
         x, z = -gravity * math.sin(tilt), gravity * math.cos(tilt)
-        inner, outer = bias
-        return self(x + inner, z, x + outer, z) - tilt
+        return self(*shown((x, z, x, z))) - tilt

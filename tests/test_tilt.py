@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -70,19 +71,34 @@ def test_offset_of_biased_accelerometers() -> None:
     """At rest and upright: an outward bias b of either shifts the horizontal part of gravity by its weight times b."""
     tilt, g = RadialTilt(0.06, 0.18), 9.81
     weights = (1.5, -0.5)  # r_outer/(r_outer - r_inner), -r_inner/(...)
+
+    def offset(at: float, inner: float, outer: float) -> float:
+        return tilt.offset(at, lambda f: (f[0] + inner, f[1], f[2] + outer, f[3]), g)
+
     for bias in ((0.3, 0.0), (0.0, 0.3), (-0.2, 0.1)):
         shift = weights[0] * bias[0] + weights[1] * bias[1]
-        assert tilt.offset(0.0, bias, g) == pytest.approx(-math.atan2(shift, g), rel=1e-12)
-    assert tilt.offset(0.2, (0.0, 0.0), g) == pytest.approx(0.0, abs=1e-16)
-    both = tilt.offset(0.1, (0.3, 0.3), g)  # alike on both: gravity turned, whatever the distances
+        assert offset(0.0, *bias) == pytest.approx(-math.atan2(shift, g), rel=1e-12)
+    assert offset(0.2, 0.0, 0.0) == pytest.approx(0.0, abs=1e-16)
+    both = offset(0.1, 0.3, 0.3)  # alike on both: gravity turned, whatever the distances
     assert both == pytest.approx(math.atan2(g * math.sin(0.1) - 0.3, g * math.cos(0.1)) - 0.1, rel=1e-12)
 
 
-@pytest.mark.parametrize("bias_mg", [(0.0, 0.0), (8.0, 0.0), (-3.0, 5.0)])
-def test_apparent_bias_is_what_the_tilt_at_rest_lacks(bias_mg: tuple[float, float]) -> None:
+ERRORS = [
+    {},
+    {"bias_mg": (8.0, 0.0)},
+    {"bias_mg": (-3.0, 5.0)},
+    {"scale_error": (0.01, -0.02)},
+    {"misalignment_deg": (0.2, -1.0)},
+    {"cross_axis": (-0.02, 0.02)},
+    {"bias_mg": (-3.0, 5.0), "scale_error": (0.01, 0.0), "misalignment_deg": (0.2, 1.0), "cross_axis": (0.02, 0.01)},
+]
+
+
+@pytest.mark.parametrize("errors", ERRORS, ids=str)
+def test_apparent_bias_is_what_the_tilt_at_rest_lacks(errors: dict[str, Any]) -> None:
     """At the equilibrium gravity pulls at zero; what y1 shows there is the apparent bias, turned round."""
     plant = load_plant(equilibrium_bias_deg=0.8, initial_tilt_deg=0.0)
-    accelerometer = Accelerometer(noise_density_ug_rthz=0.0, bias_mg=bias_mg, counts_per_g=0.0)
+    accelerometer = Accelerometer(noise_density_ug_rthz=0.0, counts_per_g=0.0, **errors)
     data = plant.new_data()
     ideal = plant.ideal(data.sensordata.tolist(), data.qvel.tolist())
     shown = plant.radial_tilt(*accelerometer.meter()(ideal, (0.0, 0.0, 0.0, 0.0)))

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
+from cmg_mj.accelerometer import STANDARD_GRAVITY, Accelerometer
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.sensors import STANDARD_GRAVITY, Accelerometer
 from cmg_mj.tilt import RadialTilt
 
 

@@ -15,11 +15,11 @@ import numpy as np
 from cmg_mj.controller import Controller, Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.experiment import Experiment
+from cmg_mj.ideal import Ideal
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.release import RELEASE, is_sustained
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.plant import Plant
-from cmg_mj.sensors import Ideal
 from cmg_mj.simulate import Result, simulate
 
 GAP_ARCMIN = 20.0

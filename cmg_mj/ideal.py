@@ -1,0 +1,21 @@
+"""What perfect sensors would show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from cmg_mj.elementwise import Scalar
+
+
+class Ideal(NamedTuple):
+    """What perfect sensors would show at one instant (floats, or arrays (n_worlds,))."""
+
+    accelerations: Any
+    """Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
+    gimbals: Sequence[Scalar]
+    """Gimbal angles, one a gimbal [rad]."""
+    gyro: Scalar
+    """What a gyro on the frame shows along the tilt axis [rad/s]."""
+    rate: Scalar
+    """The true tilt rate, q_b' [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
