@@ -62,7 +62,7 @@ class Accelerometer:
     scale_error: tuple[Share, Share] = (0.0, 0.0)
     misalignment_deg: tuple[Angle, Angle] = (0.0, 0.0)
     cross_axis: tuple[Share, Share] = (0.0, 0.0)
-    skew_s: Instant = 0.0
+    skew_s: NonNegative = 0.0
     bias_instability_ug: NonNegative = 0.0
     bandwidth_hz: Annotated[float, Field(ge=0.0, lt=INSIDE_HZ / 2.0)] = 0.0
 

@@ -20,6 +20,17 @@ from cmg_mj.simulate import Result
 
 SHORT = ("duration_s=0.8", "push.0.start_s=0.2", "push.0.duration_s=0.1")
 
+IMPERFECT = (
+    "sensors.accelerometer.scale_error=[0.01,-0.01]",
+    "sensors.accelerometer.misalignment_deg=[0.2,1.0]",
+    "sensors.accelerometer.cross_axis=[0.02,-0.02]",
+    "sensors.accelerometer.skew_s=0.003",
+    "sensors.accelerometer.bias_instability_ug=400",
+    "sensors.accelerometer.bandwidth_hz=94",
+    "sensors.accelerometer.latency_s=0.001",
+    "plant.flywheel_imbalance_kg_m=1e-5",
+)
+
 
 @cache
 def experiment(*settings: str) -> Experiment:
@@ -60,6 +71,7 @@ def test_batch_equals_single_runs(kind: str) -> None:
     [
         pytest.param(("sensors.accelerometer.rate_hz=1000", "sensors.encoder.rate_hz=100"), id="rates"),
         pytest.param(("sensors.accelerometer.latency_s=0.003", "sensors.fog.latency_s=0.01"), id="latency"),
+        pytest.param(IMPERFECT, id="imperfect accelerometers"),
         pytest.param(("controller.feedback=fog", "controller.angles=estimated"), id="gyro, estimated angles"),
         pytest.param(("controller.feedback=truth", "companions=all"), id="companions"),
         pytest.param(("plant.integrator=implicitfast",), id="another integrator"),
