@@ -1,4 +1,6 @@
-"""What a real sensor makes of an ideal reading: noise, bias, range, resolution, rate, latency.
+"""What real sensors make of an ideal reading, and when they show it: encoders, gyro; rate, latency, skew.
+
+The accelerometers are in `accelerometer.py`, the cheap gyro in `mems_gyro.py`.
 
 Defaults are those of a datasheet class, named in each docstring. A value of zero for a resolution, a noise
 or a bandwidth switches that effect off.

@@ -16,6 +16,7 @@ from scipy.signal import butter, lfilter, welch
 
 from cmg_mj.accelerometer import Accelerometer
 from cmg_mj.controller import Controller
+from cmg_mj.errors import InputError
 from cmg_mj.experiment import prepare
 from cmg_mj.ideal import Ideal
 from cmg_mj.low_pass import noise_gain
@@ -341,7 +342,7 @@ def test_the_callback_sees_what_the_loop_sees() -> None:
 
 def test_a_controller_of_ones_own_is_refused_what_does_not_fit() -> None:
     plant = load_plant()
-    for errors in ({"skew_s": 0.0021}, {"bandwidth_hz": 94.0}):
-        with pytest.raises(Exception, match=rf"sensors\.accelerometer\.{next(iter(errors))} = .*not a whole number"):
-            plant.controller(sensors=Sensors(accelerometer=Accelerometer(**errors)))
+    for name, sensor in (("skew_s", Accelerometer(skew_s=0.0021)), ("bandwidth_hz", Accelerometer(bandwidth_hz=94.0))):
+        with pytest.raises(InputError, match=rf"sensors\.accelerometer\.{name} = .*not a whole number"):
+            plant.controller(sensors=Sensors(accelerometer=sensor))
     assert isinstance(plant.controller(sensors=Sensors(accelerometer=Accelerometer(skew_s=0.005))), Controller)
