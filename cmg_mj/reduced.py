@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar, sin
+from cmg_mj.elementwise import Scalar, cos, sin
 
 if TYPE_CHECKING:
     import control
@@ -68,6 +68,29 @@ class ReducedModel:
         """f2(x, u) [rad/s^2], the second line of (4)."""
         drift, gain, damping = self.terms(x1, x3)
         return drift + u * (gain - damping * x2)
+
+    def slopes(
+        self, x1: Scalar, x2: Scalar, x3: Scalar, u: Scalar, torque: Scalar
+    ) -> tuple[Scalar, Scalar, Scalar, Scalar, Scalar]:
+        """f2 of (4) with a tilting torque on the rig beside it, and how it changes.
+
+        Args:
+            x1: Tilt [rad].
+            x2: Tilt rate [rad/s].
+            x3: Gimbal angle [rad].
+            u: Gimbal rate [rad/s].
+            torque: On the whole rig [N m].
+
+        Returns:
+            f2 [rad/s^2]; its slopes in x1 [1/s^2], x2 [1/s], x3 [1/s^2] and in the torque [1/(kg m^2)].
+        """
+        J1, J2, gravity_torque, momentum, twice_J2 = self._numbers
+        s, c = sin(x3), cos(x3)
+        per_D, bent = 1.0 / (J1 + J2 * s * s), twice_J2 * s * c  # bent is dD/dx3
+        per_torque, damping = per_D / self.gimbals, u * bent * per_D
+        f2 = per_D * (gravity_torque * sin(x1) + u * momentum * c) - damping * x2 + per_torque * torque
+        turning = -u * (momentum * s + twice_J2 * (c * c - s * s) * x2)  # of D f2, but for the torque
+        return f2, gravity_torque * cos(x1) * per_D, -damping, per_D * (turning - bent * f2), per_torque
 
     @property
     def A(self) -> np.ndarray:

@@ -16,11 +16,11 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, cos, dot
 from cmg_mj.fields import STRICT, NonNegative, Positive
-from cmg_mj.observers.protocol import BIAS, Measurement
+from cmg_mj.observers.protocol import BIAS, TORQUE, Measurement
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.stability import MARGIN, is_hurwitz
 
-TORQUE, SINUSOID = "torque_n_m", "disturbance_n_m"
+SINUSOID = "disturbance_n_m"
 
 FASTEST = 2.0
 """What the rates of the observer times the sample period must stay below."""

@@ -81,6 +81,8 @@ NEEDS = ("model", "gimbals", "acceleration")
 
 BIAS = "bias_rad"
 """The extra signal of an observer that estimates e, the equilibrium bias [rad]."""
+TORQUE = "torque_n_m"
+"""That of one that estimates a tilting torque on the whole rig [N m]."""
 
 RESERVED = ("x1_rad", "x2_rad_s", "x3_rad")
 

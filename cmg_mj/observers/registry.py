@@ -19,6 +19,7 @@ OBSERVERS = {
     "ltv": "cmg_mj.observers.ltv:LinearTimeVarying",
     "homogeneous": "cmg_mj.observers.homogeneous:Homogeneous",
     "luenberger": "cmg_mj.observers.luenberger:Luenberger",
+    "kalman": "cmg_mj.observers.kalman:Kalman",
     "gyro_free": "cmg_mj.observers.gyro_free:GyroFree",
     "finite_difference": "cmg_mj.observers.finite_difference:FiniteDifference",
     "super_twisting": "cmg_mj.observers.super_twisting:SuperTwisting",

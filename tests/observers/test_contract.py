@@ -105,7 +105,7 @@ def test_estimate_uses_the_sample_it_is_given(kind: str) -> None:
     assert abs(turned.x3 - estimate.x3) > 1e-4
 
 
-MODELS = ("ltv", "homogeneous", "luenberger", "high_gain", "adaptive", "homogeneous_adaptive")
+MODELS = ("ltv", "homogeneous", "luenberger", "kalman", "high_gain", "adaptive", "homogeneous_adaptive")
 DIFFERENTIATORS = ("linear", "linear_high_gain", "finite_difference", "super_twisting", "gyro_free")
 
 
@@ -119,7 +119,7 @@ def test_models_use_the_command_held_since_the_sample_before(kind: str) -> None:
     of = observer(kind)
     state = of.init(Measurement(0.0, 0.0))
     _, still = of.step(state, Measurement(0.0, 0.0), 0.0)
-    _, driven = of.step(state, Measurement(0.0, 0.0), 2.0)
+    _, driven = of.step(state, Measurement(0.0, 2.0 * DT), 2.0)  # and the gimbal has turned
     assert driven.x2 - still.x2 == pytest.approx(paper.J_d * paper.omega_d / paper.J1 * 2.0 * DT, rel=0.1)
 
 
