@@ -25,6 +25,10 @@ COLUMNS = tuple(tuple(PAIRS.index((min(i, j), max(i, j))) for j in range(4)) for
 """Where in that list the entries of a column are."""
 
 
+Four = tuple[Scalar, Scalar, Scalar, Scalar]
+"""x1, x2, x3, torque."""
+
+
 class Covariance(NamedTuple):
     """Of the error of (x1, x2, x3, torque). The other half is this one: so it stays symmetric."""
 
@@ -82,8 +86,8 @@ class Kalman:
         dt: Sample period [s].
         model: The reduced model.
         noise: Of the tilt, by the sensors' datasheet.
-        torque_walk: How fast the torque may change: standard deviation after a second [N m]. Not tuned: it would be none,
-            since nothing changes where it is tuned.
+        torque_walk: How fast the torque may change: standard deviation after a second [N m]. Not tuned: it would be
+            none, since e does not change there.
         torque_white: White torque: the standard deviation of its integral after a second [N m s]. Default, as of the
             next one: `cmg-mj tune observer_tuning --seed 60000`.
         gimbal_white: White part of the gimbals' rate: the standard deviation of its integral after a second [rad].
@@ -149,7 +153,7 @@ class Kalman:
         x, P = _corrected(x, P, 2, y[1], v2)
         return State(*x, P), TorqueEstimate(*x)
 
-    def _predicted(self, state: State, u: Scalar) -> tuple[tuple[Scalar, ...], Covariance]:
+    def _predicted(self, state: State, u: Scalar) -> tuple[Four, Covariance]:
         """The state and its covariance a sample period later: F P F' + Q."""
         x1, x2, x3, torque, P = state
         p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = P
@@ -196,12 +200,10 @@ class Kalman:
         return powers[1], phi, psi, chi
 
 
-def _corrected(
-    x: tuple[Scalar, ...], P: Covariance, part: int, measured: Scalar, variance: float
-) -> tuple[tuple[Scalar, ...], Covariance]:
+def _corrected(x: Four, P: Covariance, part: int, measured: Scalar, variance: float) -> tuple[Four, Covariance]:
     """Bring in one measured part of the state, whose noise has this variance."""
     column = [P[place] for place in COLUMNS[part]]
     gain = [entry / (column[part] + variance) for entry in column]
     off = measured - x[part]
-    moved = tuple(value + k * off for value, k in zip(x, gain, strict=True))
-    return moved, Covariance(*(p - gain[i] * column[j] for p, (i, j) in zip(P, PAIRS, strict=True)))
+    x1, x2, x3, torque = (value + k * off for value, k in zip(x, gain, strict=True))
+    return (x1, x2, x3, torque), Covariance(*(p - gain[i] * column[j] for p, (i, j) in zip(P, PAIRS, strict=True)))

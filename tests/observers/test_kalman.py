@@ -1,0 +1,228 @@
+"""The extended Kalman filter against one of NumPy's matrices, against its own steady state, and against its promise."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad_vec, solve_ivp
+from scipy.linalg import expm, solve_discrete_are
+from scipy.stats import chi2
+
+from cmg_mj.errors import InputError
+from cmg_mj.observers import Measurement
+from cmg_mj.observers.kalman import COLUMNS, PAIRS, Covariance, Kalman, State
+from cmg_mj.reduced import ReducedModel
+from tests.observers.reference import DT, HEAVY, PAPER, observer, rough_signals
+
+C = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
+PAIR = dataclasses.replace(PAPER, gimbals=2)
+
+DEFAULTS = {"torque_walk": 0.03, "torque_white": 0.082, "gimbal_white": 0.017, "rate_start": 0.1, "torque_start": 0.2}
+COUNTS = 4096
+
+
+def kalman(model: ReducedModel = PAIR, **parameters: float) -> Kalman:
+    of = observer("kalman", model=model, **parameters)
+    assert isinstance(of, Kalman)
+    return of
+
+
+def slope(of: Kalman, x: np.ndarray, u: float) -> np.ndarray:
+    """x' of the state (x1, x2, x3, torque) without noise: (4), the torque shared by the gimbals."""
+    m, (x1, x2, x3, torque) = of.model, x
+    D = m.J1 + m.J2 * math.sin(x3) ** 2
+    gyroscopic = u * (m.J_d * m.omega_d * math.cos(x3) - m.J2 * x2 * math.sin(2.0 * x3))
+    f2 = (gyroscopic + m.gravity_torque * math.sin(x1) + torque / m.gimbals) / D
+    return np.array([x2, f2, u, 0.0])
+
+
+def jacobian(of: Kalman, x: np.ndarray, u: float) -> np.ndarray:
+    """By central differences, (4, 4)."""
+    steps = 1e-5 * np.eye(4)
+    return np.array([(slope(of, x + d, u) - slope(of, x - d, u)) / 2e-5 for d in steps]).T
+
+
+def added_noise(of: Kalman, A: np.ndarray) -> np.ndarray:
+    """The covariance that a sample period adds, by quadrature, (4, 4)."""
+    m = of.model
+    per_torque, gyroscopic = 1.0 / (m.gimbals * m.J1), m.J_d * m.omega_d / m.J1
+    into = np.zeros((4, 3))
+    into[3, 0], into[1, 1] = of.torque_walk, per_torque * of.torque_white
+    into[1:3, 2] = gyroscopic * of.gimbal_white, of.gimbal_white
+
+    def at(s: float) -> np.ndarray:
+        grown = expm(A * s) @ into
+        return grown @ grown.T
+
+    return quad_vec(at, 0.0, of.dt, epsabs=1e-16)[0]
+
+
+def measured_noise(of: Kalman) -> np.ndarray:
+    """Covariance of (y1, y2): white noise, and encoders' counts, whose mean is taken, (2, 2)."""
+    return np.diag([of.noise.tilt**2, (2.0 * math.pi / of.encoder_counts) ** 2 / 12.0 / of.model.gimbals])
+
+
+def matrix(P: Covariance) -> np.ndarray:
+    """All sixteen entries, (4, 4)."""
+    whole = np.zeros((4, 4))
+    for (i, j), entry in zip(PAIRS, P, strict=True):
+        whole[i, j] = whole[j, i] = entry
+    return whole
+
+
+def reference(of: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The textbook's extended Kalman filter: estimates (n - 1, 4), and the last covariance (4, 4)."""
+    R = measured_noise(of)
+    Q = added_noise(of, jacobian(of, np.zeros(4), 0.0))
+    x, P = np.array([y1[0], 0.0, y2[0], 0.0]), np.diag([R[0, 0], of.rate_start**2, R[1, 1], of.torque_start**2])
+    estimates = []
+    for k in range(1, len(y1)):
+        held = float(u[k - 1])
+        F = expm(jacobian(of, x, held) * of.dt)
+        x = solve_ivp(lambda t, x, held=held: slope(of, x, held), (0.0, of.dt), x, rtol=1e-11, atol=1e-12).y[:, -1]
+        P = F @ P @ F.T + Q
+        K = P @ C.T @ np.linalg.inv(C @ P @ C.T + R)
+        x = x + K @ (np.array([y1[k], y2[k]]) - C @ x)
+        P = (np.eye(4) - K @ C) @ P @ (np.eye(4) - K @ C).T + K @ R @ K.T
+        estimates.append(x)
+    return np.array(estimates), P
+
+
+def walked(of: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, State]:
+    """Estimates (n - 1, 4), and the last state."""
+    state, estimates = of.init(Measurement(float(y1[0]), float(y2[0]))), []
+    for k in range(1, len(y1)):
+        state, estimate = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        estimates.append(estimate)
+    return np.array(estimates), state
+
+
+@pytest.mark.parametrize("model", [PAIR, HEAVY], ids=["pair", "heavy"])
+def test_equals_the_textbooks_filter(model: ReducedModel) -> None:
+    """But for the third order of a step with the command at its limit: 2 % of the estimate's own noise."""
+    of = kalman(model)
+    signals = rough_signals(200, seed=1)
+    expected, P = reference(of, *signals)
+    estimates, state = walked(of, *signals)
+    off = np.abs(estimates - expected).max(axis=0)
+    assert (off < [2e-6, 2e-4, 1e-9, 1e-4]).all(), off
+    np.testing.assert_allclose(matrix(state.P), P, rtol=2e-3, atol=1e-10)
+
+
+def test_defaults() -> None:
+    assert kalman() == kalman(**DEFAULTS, encoder_counts=COUNTS)
+
+
+def test_settles_at_the_linear_filter() -> None:
+    """About the upright the gains become those of the algebraic Riccati equation."""
+    of = kalman()
+    F, Q = expm(jacobian(of, np.zeros(4), 0.0) * DT), added_noise(of, jacobian(of, np.zeros(4), 0.0))
+    R = measured_noise(of)
+    before = solve_discrete_are(F.T, C.T, Q, R)
+    after = before - before @ C.T @ np.linalg.solve(C @ before @ C.T + R, C @ before)
+    still = np.zeros(8000)
+    _, state = walked(of, still, still, still)
+    np.testing.assert_allclose(matrix(state.P), after, rtol=1e-6, atol=1e-14)
+    gain = after @ C.T @ np.linalg.inv(R)
+    for column, y in ((0, Measurement(1e-9, 0.0)), (1, Measurement(0.0, 1e-9))):
+        moved = np.array(of.step(state, y, 0.0)[1])
+        np.testing.assert_allclose(moved, gain[:, column] * 1e-9, rtol=1e-5, atol=1e-16)
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.005, 0.02])
+def test_covariance_stays_a_covariance(dt: float) -> None:
+    """Over 20,000 samples of signals that no rig makes, from a start that knows next to nothing."""
+    of = kalman(dt=dt, rate_start=100.0, torque_start=100.0)
+    y1, y2, u = rough_signals(20_000, seed=2)
+    state = of.init(Measurement(float(y1[0]), float(y2[0])))
+    for k in range(1, len(y1)):
+        state, _ = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        if k % 100 == 0 or k < 100:
+            P = matrix(state.P)
+            scale = np.sqrt(np.diag(P))
+            assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > 1e-6, k
+
+
+def simulated(rig: Kalman, of: Kalman, runs: int, ticks: int, seed: int) -> tuple[np.ndarray, np.ndarray, list[State]]:
+    """The reduced model with just the noise that one filter expects, and another filter on it; many runs side by side.
+
+    Returns:
+        Errors (ticks, 4, runs), innovations normalised and squared (ticks, runs), and the states.
+    """
+    rng = np.random.default_rng(seed)
+    m, parts = rig.model, 10
+    h = rig.dt / parts
+    v1, v2 = rig.noise.tilt, math.sqrt(measured_noise(of)[1, 1])
+    x1, x3 = np.full(runs, 0.01), np.full(runs, 0.05)
+    x2, torque = rig.rate_start * rng.standard_normal(runs), rig.torque_start * rng.standard_normal(runs)
+    u = np.zeros(runs)
+    state = of.init(Measurement(x1 + v1 * rng.standard_normal(runs), x3 + v2 * rng.standard_normal(runs)))
+    errors, squares, states = [], [], []
+    for _ in range(ticks):
+        for _ in range(parts):
+            white, turned, walk = rng.standard_normal((3, runs)) * math.sqrt(h)
+            D = m.J1 + m.J2 * np.sin(x3) ** 2
+            rate = u * h + rig.gimbal_white * turned
+            gyroscopic = (m.J_d * m.omega_d * np.cos(x3) - m.J2 * x2 * np.sin(2.0 * x3)) * rate
+            pushed = (torque * h + rig.torque_white * white) / m.gimbals
+            x1 = x1 + h * x2
+            x2 = x2 + (gyroscopic + h * m.gravity_torque * np.sin(x1) + pushed) / D
+            x3, torque = x3 + rate, torque + rig.torque_walk * walk
+        y = Measurement(x1 + v1 * rng.standard_normal(runs), x3 + v2 * rng.standard_normal(runs))
+        x, P = of._predicted(state, u)
+        (r1, _), (_, r2) = measured_noise(of)
+        S = np.array([[P.p11 + r1, P.p13], [P.p13, P.p33 + r2]])
+        off = np.array([y.y1 - x[0], y.y2 - x[2]])
+        squares.append(np.einsum("ir,rij,jr->r", off, np.linalg.inv(np.moveaxis(S, -1, 0)), off))
+        state, estimate = of.step(state, y, u)
+        errors.append(np.array([x1, x2, x3, torque]) - np.array(estimate))
+        states.append(state)
+        u = np.clip(-35.0 * x1 - 4.0 * x2 + x3, -4.7, 4.7)  # a law that holds it; it sees the truth
+    return np.array(errors), np.array(squares), states
+
+
+def normalised(of: Kalman) -> list[tuple[str, float, float, float]]:
+    """On a rig with the default's noise: mean of the squares, and between what they should be, 1 time in 10,000 not."""
+    runs, ticks, ends = 300, 300, [5e-5, 1.0 - 5e-5]
+    errors, squares, states = simulated(kalman(), of, runs, ticks, seed=3)
+    low, high = chi2.ppf(ends, 4 * runs) / runs
+    found = []
+    for k in (0, 1, 5, 20, 100, ticks - 1):
+        P = np.moveaxis(np.array([[states[k].P[place] for place in row] for row in COLUMNS]), -1, 0)
+        e = errors[k]
+        found.append((f"errors at {k}", low, np.einsum("ir,rij,jr->r", e, np.linalg.inv(P), e).mean(), high))
+    # Innovations of a filter that is right are independent from sample to sample.
+    low, high = chi2.ppf(ends, 2 * runs * ticks) / (runs * ticks)
+    return [*found, ("innovations", low, squares.mean(), high)]
+
+
+def test_errors_are_as_large_as_the_covariance_says() -> None:
+    for what, low, mean, high in normalised(kalman()):
+        assert low < mean < high, what
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+@pytest.mark.parametrize("name", ["torque_white", "gimbal_white", "torque_start"])
+def test_a_filter_that_expects_another_noise_is_found_out(name: str, factor: float) -> None:
+    default = kalman()
+    wrong = kalman(**{name: factor * getattr(default, name)})
+    assert not all(low < mean < high for _, low, mean, high in normalised(wrong))
+
+
+def test_a_bias_is_found_as_a_torque() -> None:
+    """At rest at y1 = -e gravity pulls as if upright: the torque that e makes is n M sin e."""
+    of = kalman()
+    e = math.radians(1.0)
+    still = np.zeros(3000)
+    estimates, _ = walked(of, still - e, still, still)
+    expected = (0.0 - e, 0.0, 0.0, PAIR.gimbals * PAIR.gravity_torque * math.sin(e))
+    np.testing.assert_allclose(estimates[-1], expected, atol=1e-4)
+    assert "bias_rad" not in of.extra_signals
+
+
+def test_an_encoder_without_counts_is_refused() -> None:
+    with pytest.raises(InputError, match=r"encoder_counts = 0: must be at least 1"):
+        kalman(encoder_counts=0)
