@@ -18,6 +18,7 @@ STANDING = {
     "linear": (),
     "linear_high_gain": (),
     "adaptive": (),
+    "kalman": (),
     "high_gain": (),
     "homogeneous_adaptive": (),
     "luenberger": ("plant.equilibrium_bias_deg=0.1",),
