@@ -176,7 +176,7 @@ def test_the_loop_meets_the_older_instant(
 def test_noise_after_the_low_pass(bandwidth_hz: float) -> None:
     """The closed form against the sum of the squared impulse response, and against what is delivered."""
     b, a = np.array(butter(2, bandwidth_hz, fs=1000.0))
-    impulse = lfilter(b, a, np.eye(1, 5000)[0])
+    impulse = np.asarray(lfilter(b, a, np.eye(1, 5000)[0]))
     assert noise_gain(bandwidth_hz, 1000.0) == pytest.approx(float(np.sum(impulse**2)), rel=1e-9)
 
     sensor = Accelerometer(bandwidth_hz=bandwidth_hz, rate_hz=100.0, counts_per_g=0.0)

@@ -137,7 +137,7 @@ def figures(offset_mg: float, kind: str = "gyro_free", **parameters: float) -> f
 
 def test_the_trap_of_the_offset() -> None:
     """Without an offset, leaving the bias out looks best; with 5 mg on one accelerometer only time-varying gains do."""
-    without = {"bias_start": 1e-6, "bias_walk": 0.0}
+    without: Any = {"bias_start": 1e-6, "bias_walk": 0.0}
     steady = f"{__name__}:SteadyGains"
     # Best without an offset: no state for it.
     assert figures(0.0, **without) < figures(0.0) < 1.25 * figures(0.0, **without)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,13 @@ from tests.observers.reference import DT, HEAVY, PAPER, observer, rough_signals
 C = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 PAIR = dataclasses.replace(PAPER, gimbals=2)
 
-DEFAULTS = {"torque_walk": 0.03, "torque_white": 0.082, "gimbal_white": 0.017, "rate_start": 0.1, "torque_start": 0.2}
+DEFAULTS: Any = {
+    "torque_walk": 0.03,
+    "torque_white": 0.082,
+    "gimbal_white": 0.017,
+    "rate_start": 0.1,
+    "torque_start": 0.2,
+}
 COUNTS = 4096
 
 
