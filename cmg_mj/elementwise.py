@@ -26,6 +26,16 @@ Scalar = Any
 SMALLEST = 1e-200  # below this a number counts as zero where it is divided by
 
 
+class Symbolic:
+    """What stands for a number while a formula is traced, as `export` does.
+
+    NumPy's functions hand over to what brings an `__array_ufunc__`, so that a symbol takes the arrays' branches. It is
+    asked for only where those are not the plain function.
+    """
+
+    __slots__ = ()
+
+
 def sin(x: Scalar) -> Scalar:
     """Sine, elementwise."""
     return math.sin(x) if type(x) is float else np.sin(x)
@@ -45,6 +55,8 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     """Angle of the point (x, y) [rad], elementwise."""
     if type(y) is float:
         return math.atan2(y, x)
+    if isinstance(y, Symbolic) or isinstance(x, Symbolic):
+        return np.arctan2(y, x)
     # `np.arctan2` may take a vector instruction that rounds differently from the C library; the complex
     # logarithm takes its angle from the library.
     with np.errstate(divide="ignore"):  # the logarithm of 0, whose angle is 0
@@ -53,9 +65,11 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
 
 def exp(x: Scalar) -> Scalar:
     """Exponential, elementwise, for x up to 700."""
+    if type(x) is float:
+        return math.exp(x)
     # `np.exp` may take a vector instruction that rounds differently from the C library; for complex numbers it
     # takes the library's.
-    return math.exp(x) if type(x) is float else np.exp(x + 0j).real
+    return np.exp(x) if isinstance(x, Symbolic) else np.exp(x + 0j).real
 
 
 def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

@@ -25,7 +25,7 @@ ABOVE, BELOW = (
 """The rooms from top to bottom, as docs/architecture.md lists them."""
 ORDER = [*ABOVE, *BELOW]
 
-HEAVY = {"rerun": "recording", "matplotlib": "plots"}
+HEAVY = {"rerun": "recording", "matplotlib": "plots", "casadi": "export"}
 """Imported by one room each, because it costs time."""
 
 
