@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, NamedTuple, NoReturn
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar
+from cmg_mj.elementwise import Scalar, dot
 from cmg_mj.errors import InputError, RunStopped, raised
 from cmg_mj.ideal import Ideal
 from cmg_mj.law import Law
@@ -86,6 +88,34 @@ def _extra_signals(observer: Observer) -> tuple[str, ...]:
         raise InputError(f"observer {type(observer).__name__}: {error}") from error
 
 
+@dataclass(frozen=True)
+class GimbalAngle:
+    """y2 from the encoders: of a scissored pair half their difference.
+
+    Attributes:
+        directions: For each gimbal +1 or -1: the sign of u that it is given.
+        zeros: For each gimbal the angle at which y2 = 0 [rad].
+    """
+
+    directions: tuple[float, ...]
+    zeros: tuple[float, ...]
+
+    @cached_property
+    def _shares(self) -> list[float]:
+        return [direction / len(self.directions) for direction in self.directions]
+
+    @cached_property
+    def _at_zero(self) -> float:
+        return dot(self._shares, self.zeros)
+
+    def __call__(self, encoders: Sequence[Scalar]) -> Scalar:
+        """y2 [rad] from the gimbals' angles, one a gimbal [rad]."""
+        y2 = -self._at_zero
+        for share, angle in zip(self._shares, encoders, strict=True):
+            y2 = y2 + share * angle
+        return y2
+
+
 class _Lost:
     """A companion that raised: nothing is known any more."""
 
@@ -122,6 +152,9 @@ class Controller:
 
     Attributes:
         extra_signals: Names of what the observer, then each companion, estimates beyond x.
+        trimmed_until: The physics step from which on the integrator goes free.
+        trim_part: Which part of the estimate is the bias that it is trimmed with.
+        trim_gain: The gain on it [s].
 
     Raises:
         InputError: A rate does not fit the physics step, or there is no bias estimate to trim with.
@@ -161,24 +194,22 @@ class Controller:
         self._observers: list[Observer] = []
         self.extra_signals = [_extra_signals(o) for o in (observer, *self.companions.values())]
         self._widths = [3 + len(names) for names in self.extra_signals]
-        self._trim_part, self._trim_gain = trim_of(trim_s, law, self.extra_signals[0])
-        self._trimmed_until = steps_until(trim_s, timestep)
-        # y2 = sum of share * encoder - offset: half the difference of the encoders of a scissored pair.
-        self._shares = [direction / len(self.directions) for direction in self.directions]
-        self._offset = sum(share * zero for share, zero in zip(self._shares, self.gimbal_zero, strict=True))
+        self.trim_s = trim_s
+        self.trim_part, self.trim_gain = trim_of(trim_s, law, self.extra_signals[0])
+        self.trimmed_until = steps_until(trim_s, timestep)
+        self.gimbal_angle = GimbalAngle(self.directions, self.gimbal_zero)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
         self._observers = [self.observer, *self.companions.values()]
-        sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds)
-        self._accelerometer, self._encoder, self._fog = self._sampled = sampled
+        self._sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds)
         self._states: list[Any] | None = None
         self._x_e: Scalar = 0.0
         self.tick: Tick | None = None
         self.step: int | None = None
         """The physics step of the last update."""
-        self.beat = math.gcd(self.period, *(sensor.beat for sensor in sampled))
+        self.beat = math.gcd(self.period, *(sensor.beat for sensor in self._sampled))
         """Physics steps between the moments at which anything may be due."""
 
     def update(self, step: int, ideal: Ideal) -> bool:
@@ -200,14 +231,30 @@ class Controller:
                 sensor.sample(step, ideal)
         if step % self.period:
             return False
-        forces = self._accelerometer.read(step)
-        y1 = self.tilt(*forces)
+        forces, encoders, fog = (sensor.read(step) for sensor in self._sampled)
+        self.decide(step, forces, encoders, fog, ideal.rate)
+        return True
+
+    def decide(
+        self, step: int, forces: Sequence[Scalar], encoders: Sequence[Scalar], fog: Scalar, rate: Scalar
+    ) -> Tick:
+        """What a control tick makes of the samples that have been delivered.
+
+        Args:
+            step: Number of the physics step.
+            forces: Specific force: inner x, inner z, outer x, outer z [m/s^2].
+            encoders: Gimbal angles, one a gimbal [rad].
+            fog: The gyro's rate [rad/s].
+            rate: The true one, where that is fed back [rad/s].
+
+        Returns:
+            The tick, which counts as the last one from now on.
+
+        Raises:
+            RunStopped: An observer returned a number that is not finite.
+        """
+        y1, y2 = self.tilt(*forces), self.gimbal_angle(encoders)
         acceleration = self.tilt.acceleration(forces[0], forces[2])
-        encoders = self._encoder.read(step)
-        fog = self._fog.read(step)
-        y2 = -self._offset
-        for share, angle in zip(self._shares, encoders, strict=True):
-            y2 = y2 + share * angle
         y = Measurement(y1, y2, acceleration)
         if not self._single:
             read_only(*y, y.acceleration)  # observers share them
@@ -223,15 +270,15 @@ class Controller:
         if self.angles == "measured":
             x1, x3 = y1, y2
         if self.feedback != "observer":
-            x2 = fog if self.feedback == "fog" else ideal.rate
+            x2 = fog if self.feedback == "fog" else rate
         x_e = self._x_e
-        if step < self._trimmed_until:
-            x_e = self._trim_gain * estimates[0][self._trim_part]
+        if step < self.trimmed_until:
+            x_e = self.trim_gain * estimates[0][self.trim_part]
         u, self._x_e = self.law(x1, x2, x3, x_e)
         if not self._single:
             read_only(u)  # observers get it at the next tick, the trajectory later
         self.tick = Tick(y1, y2, acceleration, fog, u, x_e, estimates)
-        return True
+        return self.tick
 
     def _start(self, observer: Observer, y: Measurement, step: int) -> Any:
         """An observer's first state."""

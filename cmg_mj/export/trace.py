@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi
 
-from cmg_mj.controller import Controller
+from cmg_mj.controller import Controller, GimbalAngle
 from cmg_mj.errors import InputError, raised
 from cmg_mj.export.place import Refused, raised_at
 from cmg_mj.export.symbol import Symbol, expression
@@ -17,6 +17,10 @@ from cmg_mj.export.tree import form, identifiers, leaves, rebuilt
 from cmg_mj.law import Law
 from cmg_mj.observers.protocol import Measurement, Observer
 from cmg_mj.tilt import RadialTilt
+
+
+MEASURED = ("y1", "y2", "acceleration")
+"""What an observer is given at a sample."""
 
 
 @dataclass(frozen=True)
@@ -84,14 +88,14 @@ def _function(name: str, inputs: Sequence[Symbol], outputs: Sequence[Any]) -> ca
 
 def _observer(observer: Observer) -> tuple[tuple[str, ...], casadi.Function, casadi.Function]:
     """Names of the state's numbers, init and step."""
-    measured = _symbols(Measurement._fields)
+    measured = _symbols(MEASURED)
     state = _called("init(y)", lambda: observer.init(Measurement(*measured)))
     numbers = [leaf for leaf in leaves(state) if leaf.number]
     names = identifiers([leaf.path for leaf in numbers])
     init = _function("init", measured, [leaf.value for leaf in numbers])
 
     held, (u,) = _symbols(names), _symbols(["u"])
-    before, measured = rebuilt(state, iter(held)), _symbols(Measurement._fields)
+    before, measured = rebuilt(state, iter(held)), _symbols(MEASURED)
     after, estimate = _called("step(state, y, u)", lambda: observer.step(before, Measurement(*measured), u))
     if form(after) != form(state):
         raise Refused("step returns a state that is made otherwise than that of init")
@@ -114,15 +118,8 @@ def _measure(constants: Any) -> casadi.Function:
     named = _symbols(constants.measure)
     inner, outer, *rest = named
     directions, zeros = rest[: constants.encoders], rest[constants.encoders :]
-    tilt = RadialTilt(inner, outer)  # type: ignore[arg-type]
-    shares = [direction / constants.encoders for direction in directions]
-    offset = sum(share * zero for share, zero in zip(shares, zeros, strict=True))
-    y2: Any = -offset
-    for share, angle in zip(shares, encoders, strict=True):
-        y2 = y2 + share * angle
-    y: list[Any] = [tilt(*accelerations), y2]
-    if hasattr(tilt, "acceleration"):
-        y.append(tilt.acceleration(*accelerations))
+    tilt, gimbal_angle = RadialTilt(inner, outer), GimbalAngle(tuple(directions), tuple(zeros))  # type: ignore[arg-type]
+    y = [tilt(*accelerations), gimbal_angle(encoders), tilt.acceleration(accelerations[0], accelerations[2])]
     return _function("measure", [*accelerations, *encoders, *named], y)
 
 

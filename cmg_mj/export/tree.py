@@ -12,8 +12,12 @@ import numpy as np
 from cmg_mj.elementwise import Symbolic
 
 KEYWORDS = frozenset(
-    ["auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while"]
+    """
+    auto break case char const continue default do double else enum extern float for goto if inline int long register
+    restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
+    """.split()  # noqa: SIM905
 )
+"""Words that name nothing in C."""
 
 
 class Leaf(NamedTuple):
@@ -65,8 +69,8 @@ def rebuilt(tree: Any, numbers: Iterator[Any]) -> Any:
 
 def _parts(tree: Any) -> list[tuple[str, Any]] | None:
     """Names and values of what a part of a state is made of; None for a leaf."""
-    if isinstance(tree, tuple) and hasattr(tree, "_fields"):
-        return [(name, getattr(tree, name)) for name in tree._fields]  # type: ignore[attr-defined]
+    if isinstance(tree, tuple) and hasattr(tree, "_fields"):  # a Measurement has more than these
+        return [*zip(tree._fields, tree, strict=True), *getattr(tree, "__dict__", {}).items()]  # type: ignore[attr-defined]
     if isinstance(tree, (tuple, list)):
         return [(str(i), part) for i, part in enumerate(tree)]
     if isinstance(tree, dict):
