@@ -35,6 +35,8 @@ class Symbolic:
 
     __slots__ = ()
 
+    __array_ufunc__: Any
+
 
 def sin(x: Scalar) -> Scalar:
     """Sine, elementwise."""

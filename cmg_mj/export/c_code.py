@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import casadi
 import numpy as np
@@ -19,8 +18,8 @@ from cmg_mj.errors import InputError
 
 Precision = Literal["double", "single"]
 
-WIDEST = 100
-"""Characters: what is longer gets a name of its own."""
+WIDEST = 90
+"""Characters: an expression that is longer is named, and the name goes on."""
 
 ATOM, UNARY, TIMES, PLUS, COMPARED, EQUAL, AND, OR, CHOICE = range(9)
 """How tightly an expression's outermost operator binds in C, the tightest first."""
@@ -65,33 +64,44 @@ CALLS = {
 }
 """Functions of math.h."""
 
-TWICE_NAMED = {casadi.OP_FMAX: "<", casadi.OP_FMIN: ">", casadi.OP_SIGN: "", casadi.OP_SQ: "*", casadi.OP_TWICE: "+"}
-"""Operations whose C names an argument twice, which therefore has a name."""
+SELECT = -1
+"""Not CasADi's, which adds up (c ? a : 0) and (!c ? b : 0): c ? a : b."""
+
+# C names an argument of these twice: it must be a name. Not fmax: that makes a limit of what is NaN, which would then
+# go on as a number.
+TEMPLATES = {
+    casadi.OP_FMAX: ("{0} < {1} ? {1} : {0}", CHOICE),
+    casadi.OP_FMIN: ("{0} > {1} ? {1} : {0}", CHOICE),
+    casadi.OP_SIGN: ("{0} > {zero} ? {one} : {0} < {zero} ? -{one} : {0}", CHOICE),
+    casadi.OP_SQ: ("{0} * {0}", TIMES),
+    casadi.OP_TWICE: ("{0} + {0}", PLUS),
+    casadi.OP_INV: ("{one} / {0}", TIMES),
+    casadi.OP_NEG: ("-{0}", UNARY),
+    casadi.OP_NOT: ("!{0}", UNARY),
+    casadi.OP_IF_ELSE_ZERO: ("{0} ? {1} : {zero}", CHOICE),
+    SELECT: ("{0} ? {1} : {2}", CHOICE),
+}
+NAMED_TWICE = {casadi.OP_FMAX, casadi.OP_FMIN, casadi.OP_SIGN, casadi.OP_SQ, casadi.OP_TWICE}
 
 TRUTHS = {casadi.OP_LT, casadi.OP_LE, casadi.OP_EQ, casadi.OP_NE, casadi.OP_AND, casadi.OP_OR, casadi.OP_NOT}
 """Operations that are an int in C."""
 
 
-def literal(value: float, precision: Precision) -> str:
-    """A constant in C that is read as exactly this number, or in single precision as the float nearest to it.
+class Node(NamedTuple):
+    """An operation of the algorithm.
 
-    A number that is not zero stays one: what stands for "nearly zero" in double precision and would underflow becomes
-    the smallest normal number, and likewise at the other end.
+    Attributes:
+        operation: CasADi's number of it, or `SELECT`.
+        arguments: Numbers of the nodes it takes; of an input its place.
+        value: Of a constant.
     """
-    if math.isnan(value):
-        return "NAN"
-    if math.isinf(value):
-        return "INFINITY" if value > 0.0 else "-INFINITY"
-    if precision == "double":
-        return repr(float(value))
-    kinds = np.finfo(np.float32)
-    if value and not float(kinds.tiny) <= abs(value) <= float(kinds.max):
-        value = math.copysign(float(kinds.tiny if abs(value) < 1.0 else kinds.max), value)
-    return f"{np.float32(value)!s}f"
+
+    operation: int
+    arguments: tuple[int, ...]
+    value: float = 0.0
 
 
-@dataclass(frozen=True)
-class Text:
+class Text(NamedTuple):
     """A part of an expression in C.
 
     Attributes:
@@ -107,13 +117,26 @@ class Text:
         return self.text if self.binds <= loosest else f"({self.text})"
 
 
+def literal(value: float, precision: Precision) -> str:
+    """A constant in C that is read as exactly this number, or in single precision as the float nearest to it.
+
+    A number that is not zero stays one: what stands for "nearly zero" in double precision and would underflow becomes
+    the smallest normal number, and what would overflow the largest.
+    """
+    if math.isnan(value):
+        return "NAN"
+    if math.isinf(value):
+        return "INFINITY" if value > 0.0 else "-INFINITY"
+    if precision == "double":
+        return repr(float(value))
+    kinds = np.finfo(np.float32)
+    if value and not float(kinds.tiny) <= abs(value) <= float(kinds.max):
+        value = math.copysign(float(kinds.tiny if abs(value) < 1.0 else kinds.max), value)
+    return f"{np.float32(value)!s}f"
+
+
 def body(
-    function: casadi.Function,
-    inputs: Sequence[str],
-    outputs: Sequence[str],
-    *,
-    real: str,
-    precision: Precision,
+    function: casadi.Function, inputs: Sequence[str], outputs: Sequence[str], real: str, precision: Precision
 ) -> list[str]:
     """The lines of a function in C.
 
@@ -127,83 +150,105 @@ def body(
     Returns:
         Lines, not indented.
     """
-    count = function.n_instructions()
-    steps = [
-        (function.instruction_id(k), function.instruction_input(k), function.instruction_output(k))
-        for k in range(count)
-    ]
-    uses = _uses(steps)
-    suffix = "" if precision == "double" else "f"
-    work: dict[int, Text] = {}
+    nodes, results = _algorithm(function)
+    uses = _uses(nodes, results)
+    texts: dict[int, Text] = {}
     lines: list[str] = []
-    results: dict[int, Text] = {}
-    for k, (operation, given, place) in enumerate(steps):
+    for i, node in enumerate(nodes):
+        if not uses[i]:
+            continue
+        text = _text(node, [texts[j] for j in node.arguments] if _is_operation(node) else [], inputs, precision)
+        named = _is_operation(node) and (
+            len(uses[i]) > 1 or any(user in NAMED_TWICE for user in uses[i]) or len(text.text) > WIDEST
+        )
+        if named:
+            name = f"t{len(lines) + 1}"
+            lines.append(f"const {'int' if node.operation in TRUTHS else real} {name} = {text.text};")
+            text = Text(name)
+        texts[i] = text
+    reads = re.compile("|".join(re.escape(name) for name in inputs) or r"(?!)")
+    last = [texts[i].text for i in results]
+    for i, text in enumerate(last):
+        if reads.search(text) and len(last) > 1:  # nothing is written before all is read
+            last[i] = f"n{i}"
+            lines.append(f"const {real} n{i} = {text};")
+    return lines + [f"{place} = {text};" for place, text in zip(outputs, last, strict=True)]
+
+
+def operations(function: casadi.Function) -> int:
+    """How many operations a function takes."""
+    nodes, results = _algorithm(function)
+    uses = _uses(nodes, results)
+    return sum(_is_operation(node) and bool(used) for node, used in zip(nodes, uses, strict=True))
+
+
+def _algorithm(function: casadi.Function) -> tuple[list[Node], list[int]]:
+    """Every operation, in order, and which nodes are the results."""
+    nodes: list[Node] = []
+    results: dict[int, int] = {}
+    at: dict[int, int] = {}  # place in CasADi's work vector -> node
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        given, place = function.instruction_input(k), function.instruction_output(k)
         if operation == casadi.OP_OUTPUT:
-            results[place[0]] = work[given[0]]
+            results[place[0]] = at[given[0]]
             continue
         if operation == casadi.OP_INPUT:
-            text = Text(inputs[given[0]])
+            node = Node(operation, (given[0],))
         elif operation == casadi.OP_CONST:
-            number = literal(function.instruction_constant(k), precision)
-            text = Text(number, UNARY if number.startswith("-") else ATOM)
+            node = Node(operation, (), function.instruction_constant(k))
         else:
-            text = _operation(operation, [work[i] for i in given], suffix)
-        if (text.binds != ATOM and operation != casadi.OP_CONST) or operation in CALLS:
-            twice = any(steps[j][0] in TWICE_NAMED for j in uses[k])
-            if len(uses[k]) > 1 or twice or len(text.text) > WIDEST:
-                name = f"t{len(lines) + 1}"
-                lines.append(f"const {'int' if operation in TRUTHS else real} {name} = {text.text};")
-                text = Text(name)
-        work[place[0]] = text
-    inputs_read = re.compile("|".join(rf"{re.escape(name)}\b" for name in inputs) or r"(?!)")
-    for i, text in results.items():  # nothing is written before all is read
-        if inputs_read.search(text.text) and len(results) > 1:
-            lines.append(f"const {real} n{i} = {text.text};")
-            results[i] = Text(f"n{i}")
-    return lines + [f"{outputs[i]} = {results[i].text};" for i in sorted(results)]
+            node = _selected(nodes, Node(operation, tuple(at[i] for i in given)))
+        at[place[0]] = len(nodes)
+        nodes.append(node)
+    return nodes, [results[i] for i in sorted(results)]
 
 
-def _uses(steps: list) -> list[list[int]]:
-    """For every instruction those that use its result."""
-    maker: dict[int, int] = {}
-    uses: list[list[int]] = [[] for _ in steps]
-    for k, (operation, given, place) in enumerate(steps):
-        if operation not in (casadi.OP_INPUT, casadi.OP_CONST):
-            for i in given:
-                uses[maker[i]].append(k)
-        if operation != casadi.OP_OUTPUT and place:
-            maker[place[0]] = k
+def _selected(nodes: list[Node], node: Node) -> Node:
+    """(c ? a : 0) + (!c ? b : 0) as c ? a : b, which is the same number."""
+    if node.operation == casadi.OP_ADD:
+        first, second = (nodes[i] for i in node.arguments)
+        if first.operation == second.operation == casadi.OP_IF_ELSE_ZERO:
+            condition, inverse = first.arguments[0], nodes[second.arguments[0]]
+            if inverse.operation == casadi.OP_NOT and inverse.arguments == (condition,):
+                return Node(SELECT, (condition, first.arguments[1], second.arguments[1]))
+    return node
+
+
+def _is_operation(node: Node) -> bool:
+    return node.operation not in (casadi.OP_INPUT, casadi.OP_CONST)
+
+
+def _uses(nodes: list[Node], results: list[int]) -> list[list[int]]:
+    """For every node the operations that use it, as far as anything depends on them."""
+    uses: list[list[int]] = [[] for _ in nodes]
+    for i in results:
+        uses[i].append(casadi.OP_OUTPUT)
+    for i in range(len(nodes) - 1, -1, -1):
+        if uses[i] and _is_operation(nodes[i]):
+            for j in nodes[i].arguments:
+                uses[j].append(nodes[i].operation)
     return uses
 
 
-def _operation(operation: int, given: list[Text], suffix: str) -> Text:
+def _text(node: Node, given: list[Text], inputs: Sequence[str], precision: Precision) -> Text:
     """One operation on what is there."""
+    operation, suffix = node.operation, "" if precision == "double" else "f"
+    if operation == casadi.OP_INPUT:
+        return Text(inputs[node.arguments[0]])
+    if operation == casadi.OP_CONST:
+        number = literal(node.value, precision)
+        return Text(number, UNARY if number.startswith("-") else ATOM)
     if operation in INFIX:
         sign, binds = INFIX[operation]
         left, right = given
-        # Two comparisons in a row, and what stands right, are put in brackets: C reads from the left.
-        strict = binds if binds in (PLUS, TIMES) else UNARY
-        return Text(f"{left.inside(strict)} {sign} {right.inside(min(strict, binds) - 1)}", binds)
+        tight = binds if binds in (PLUS, TIMES) else UNARY  # the rest is read more easily in brackets
+        return Text(f"{left.inside(tight)} {sign} {right.inside(min(tight, binds - 1))}", binds)
     if operation in CALLS:
         return Text(f"{CALLS[operation]}{suffix}({', '.join(x.text for x in given)})")
-    first = given[0]
-    zero = f"0.0{suffix}"
-    if operation == casadi.OP_IF_ELSE_ZERO:
-        return Text(f"{first.inside(UNARY)} ? {given[1].inside(PLUS)} : {zero}", CHOICE)
-    if operation in (casadi.OP_FMAX, casadi.OP_FMIN):
-        # Not fmax: it makes a limit of what is NaN, which would go on as a number.
-        a, b = first.inside(UNARY), given[1].inside(UNARY)
-        return Text(f"{a} {TWICE_NAMED[operation]} {b} ? {b} : {a}", CHOICE)
-    if operation == casadi.OP_SIGN:
-        a = first.inside(UNARY)
-        return Text(f"{a} > {zero} ? 1.0{suffix} : {a} < {zero} ? -1.0{suffix} : {a}", CHOICE)
-    if operation == casadi.OP_NEG:
-        return Text(f"-{first.inside(ATOM)}", UNARY)
-    if operation == casadi.OP_NOT:
-        return Text(f"!{first.inside(ATOM)}", UNARY)
-    if operation in (casadi.OP_SQ, casadi.OP_TWICE):
-        a = first.inside(UNARY)
-        return Text(f"{a} {TWICE_NAMED[operation]} {a}", PLUS if operation == casadi.OP_TWICE else TIMES)
-    if operation == casadi.OP_INV:
-        return Text(f"1.0{suffix} / {first.inside(UNARY)}", TIMES)
+    if operation in TEMPLATES:
+        template, binds = TEMPLATES[operation]
+        tight = ATOM if binds == UNARY else UNARY if operation != SELECT else PLUS
+        parts = [x.inside(tight) for x in given]
+        return Text(template.format(*parts, zero=f"0.0{suffix}", one=f"1.0{suffix}"), binds)
     raise InputError(f"CasADi's operation {operation} is none that can be exported")

@@ -1,4 +1,4 @@
-"""The numbers of a controller beside its observer, with names, units and words: what a user may change in the C."""
+"""The numbers of a controller beside its observer: with names, units and words, and open to change in the C."""
 
 from __future__ import annotations
 
@@ -12,46 +12,56 @@ class Constant(NamedTuple):
 
     name: str
     value: float
-    unit: str
     meaning: str
 
 
 class Constants(NamedTuple):
-    """The numbers that the measurement and the law take."""
+    """The numbers that the measurement, the law and the trim take.
+
+    Attributes:
+        of_measure: Radii, then the gimbals' directions, then their zeros.
+        of_law: The period, the gains, the limit.
+        trimmed: For how many updates the integrator is trimmed.
+        trim_gain: See `controller.trim_of`.
+        trim_part: Which part of the estimate it is trimmed with.
+        gimbals: How many there are.
+    """
 
     of_measure: list[Constant]
     of_law: list[Constant]
-    encoders: int
+    trimmed: int
+    trim_gain: Constant
+    trim_part: int
+    gimbals: int
 
     @property
-    def measure(self) -> list[str]:
-        """Names of those that the measurement takes."""
-        return [constant.name for constant in self.of_measure]
-
-    @property
-    def law(self) -> list[str]:
-        """Names of those that the law takes."""
-        return [constant.name for constant in self.of_law]
+    def all(self) -> list[Constant]:
+        """All that stand in the C."""
+        return [*self.of_measure, *self.of_law, *([self.trim_gain] if self.trimmed else [])]
 
 
 def constants_of(controller: Controller) -> Constants:
     """The numbers of a controller."""
     tilt, law = controller.tilt, controller.law
-    measure = [
-        Constant("r_inner", tilt.r_inner, "m", "distance of the inner accelerometer from the tilt axis"),
-        Constant("r_outer", tilt.r_outer, "m", "distance of the outer accelerometer from the tilt axis"),
-    ]
-    for i, direction in enumerate(controller.directions, 1):
-        measure.append(Constant(f"direction_{i}", direction, "1", f"sign of u that gimbal {i} is given"))
-    for i, zero in enumerate(controller.gimbal_zero, 1):
-        measure.append(Constant(f"zero_{i}", zero, "rad", f"angle of encoder {i} at which its spin axis is upright"))
     k1, k2, k3, k4 = law.gains
-    of_law = [
-        Constant("period", law.dt, "s", "from one update to the next"),
-        Constant("gain_x1", k1, "1/s", "K_e on the tilt"),
-        Constant("gain_x2", k2, "1", "K_e on the tilt rate"),
-        Constant("gain_x3", k3, "1/s", "K_e on the gimbal angle"),
-        Constant("gain_x_e", k4, "1/s^2", "K_e on the integrator"),
-        Constant("rate_limit", law.rate_limit, "rad/s", "largest gimbal rate"),
-    ]
-    return Constants(measure, of_law, len(controller.directions))
+    numbered = list(enumerate(zip(controller.directions, controller.gimbal_zero, strict=True), 1))
+    return Constants(
+        of_measure=[
+            Constant("r_inner", tilt.r_inner, "inner accelerometer from the tilt axis [m]"),
+            Constant("r_outer", tilt.r_outer, "outer accelerometer from the tilt axis [m]"),
+            *(Constant(f"direction_{i}", sign, f"sign of u that gimbal {i} is given") for i, (sign, _) in numbered),
+            *(Constant(f"zero_{i}", zero, f"encoder {i} at a gimbal angle of 0 [rad]") for i, (_, zero) in numbered),
+        ],
+        of_law=[
+            Constant("period", law.dt, "from one update to the next [s]"),
+            Constant("gain_x1", k1, "on the tilt [1/s]"),
+            Constant("gain_x2", k2, "on the tilt rate"),
+            Constant("gain_x3", k3, "on the gimbal angle [1/s]"),
+            Constant("gain_x_e", k4, "on the integrator [1/s^2]"),
+            Constant("rate_limit", law.rate_limit, "largest gimbal rate [rad/s]"),
+        ],
+        trimmed=-(-controller.trimmed_until // controller.period),
+        trim_gain=Constant("trim_gain", controller.trim_gain, "from the bias to the integrator [s]"),
+        trim_part=controller.trim_part,
+        gimbals=len(controller.directions),
+    )

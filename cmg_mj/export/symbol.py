@@ -172,4 +172,7 @@ def _apply(ufunc: np.ufunc, *inputs: Any) -> Symbol:
 def _where(condition: Any, a: Any, b: Any) -> Any:
     if any(isinstance(x, np.ndarray) and x.ndim for x in (condition, a, b)):
         return np.frompyfunc(_where, 3, 1)(*map(_boxed, (condition, a, b)))
-    return Symbol(casadi.if_else(*map(expression, (condition, a, b))))
+    condition, a, b = map(expression, (condition, a, b))
+    first = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, condition, a)
+    second = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, casadi.SX.unary(casadi.OP_NOT, condition), b)
+    return Symbol(casadi.SX.binary(casadi.OP_ADD, first, second))

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi
 
-from cmg_mj.controller import Controller, GimbalAngle
-from cmg_mj.errors import InputError, raised
+from cmg_mj.controller import GimbalAngle
+from cmg_mj.errors import raised
+from cmg_mj.export.constants import Constants
 from cmg_mj.export.place import Refused, raised_at
 from cmg_mj.export.symbol import Symbol, expression
-from cmg_mj.export.tree import form, identifiers, leaves, rebuilt
+from cmg_mj.export.tree import form, identifiers, numbers, rebuilt
 from cmg_mj.law import Law
 from cmg_mj.observers.protocol import Measurement, Observer
 from cmg_mj.tilt import RadialTilt
-
 
 MEASURED = ("y1", "y2", "acceleration")
 """What an observer is given at a sample."""
 
 
-@dataclass(frozen=True)
-class Traced:
+class Traced(NamedTuple):
     """A controller's formulas.
 
     Attributes:
-        state: What the numbers of the observer's state are called.
+        state: Names of the numbers in the observer's state that anything depends on.
         measure: (raw accelerations, encoders, constants) -> y1, y2, acceleration.
         init: (y1, y2, acceleration) -> state.
         step: (state, y1, y2, acceleration, u) -> state, estimate.
@@ -42,22 +40,21 @@ class Traced:
     law: casadi.Function
 
 
-def trace(controller: Controller, constants: Any) -> Traced:
+def trace(observer: Observer, constants: Constants) -> Traced:
     """Write a controller's formulas down.
 
     Args:
-        controller: The controller. Its observer is used up: it may keep what it is given.
-        constants: What the constants of the controller are called in C, see `constants.Constants`.
+        observer: The observer. It is used up: one that remembers what it is given remembers symbols now.
+        constants: The numbers of the rest, which keep their names.
 
     Returns:
         The formulas.
 
     Raises:
-        InputError: The observer does what has no place in a formula.
+        Refused: The observer does what has no place in a formula.
     """
     with _as_written():
-        state, init, step = _observer(controller.observer)
-        return Traced(state, _measure(constants), init, step, _law(constants))
+        return Traced(*_observed(observer, _measure(constants)), _law(constants))
 
 
 @contextmanager
@@ -71,36 +68,55 @@ def _as_written() -> Iterator[None]:
         casadi.GlobalOptions.setSimplificationOnTheFly(before)
 
 
+def _observed(
+    observer: Observer, measure: casadi.Function
+) -> tuple[tuple[str, ...], casadi.Function, casadi.Function, casadi.Function]:
+    """The first four parts of `Traced`."""
+    first = _symbols(MEASURED)
+    state = _called("init(y)", lambda: observer.init(Measurement(*first)))
+    leaves = list(numbers(state))
+    held = _symbols([f"state {i}" for i in range(len(leaves))])
+    before, y, (u,) = rebuilt(state, iter(held)), _symbols(MEASURED), _symbols(["u"])
+    after, estimate = _called("step(state, y, u)", lambda: observer.step(before, Measurement(*y), u))
+    moved = [expression(leaf.value) for leaf in numbers(after)]
+    if form(after) != form(state):
+        raise Refused("its step returns a state that is made otherwise than the one of init")
+    shown = [expression(part) for part in estimate]
+
+    needed = _needed(held, moved, shown)
+    names = identifiers([leaves[i].path for i in needed])
+    init = _function("init", first, [expression(leaves[i].value) for i in needed])
+    step = _function("step", [*(held[i] for i in needed), *y, u], [*(moved[i] for i in needed), *shown])
+    return tuple(names), measure, init, step
+
+
+def _needed(held: Sequence[Symbol], moved: Sequence[casadi.SX], shown: Sequence[casadi.SX]) -> list[int]:
+    """Which numbers of a state an estimate depends on, now or later. A measurement is kept whole but used in part."""
+    place = {symbol.sx.name(): i for i, symbol in enumerate(held)}
+    needed: set[int] = set()
+    waiting = list(shown)
+    while waiting:
+        for symbol in casadi.symvar(waiting.pop()):
+            i = place.get(symbol.name())
+            if i is not None and i not in needed:
+                needed.add(i)
+                waiting.append(moved[i])
+    return sorted(needed)
+
+
 def _symbols(names: Sequence[str]) -> list[Symbol]:
     return [Symbol(casadi.SX.sym(name)) for name in names]
 
 
-def _function(name: str, inputs: Sequence[Symbol], outputs: Sequence[Any]) -> casadi.Function:
+def _function(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX]) -> casadi.Function:
     given = [symbol.sx for symbol in inputs]
-    made = casadi.Function(name, given, [expression(x) for x in outputs], {"allow_free": True})
+    made = casadi.Function(name, given, casadi.cse(list(outputs)) if outputs else [], {"allow_free": True})
     if made.has_free():
         raise Refused(
-            "the observer remembers something outside of its state (in self, or elsewhere), which C would not have: "
-            "return it from step as a part of the state"
+            "it remembers something outside of its state, in self or elsewhere, which C would not have: make it a part "
+            "of the state that step returns"
         )
     return made
-
-
-def _observer(observer: Observer) -> tuple[tuple[str, ...], casadi.Function, casadi.Function]:
-    """Names of the state's numbers, init and step."""
-    measured = _symbols(MEASURED)
-    state = _called("init(y)", lambda: observer.init(Measurement(*measured)))
-    numbers = [leaf for leaf in leaves(state) if leaf.number]
-    names = identifiers([leaf.path for leaf in numbers])
-    init = _function("init", measured, [leaf.value for leaf in numbers])
-
-    held, (u,) = _symbols(names), _symbols(["u"])
-    before, measured = rebuilt(state, iter(held)), _symbols(MEASURED)
-    after, estimate = _called("step(state, y, u)", lambda: observer.step(before, Measurement(*measured), u))
-    if form(after) != form(state):
-        raise Refused("step returns a state that is made otherwise than that of init")
-    moved = [leaf.value for leaf in leaves(after) if leaf.number]
-    return tuple(names), init, _function("step", [*held, *measured, u], [*moved, *estimate])
 
 
 def _called(what: str, call: Callable[[], Any]) -> Any:
@@ -110,22 +126,25 @@ def _called(what: str, call: Callable[[], Any]) -> Any:
     except Refused:
         raise
     except (Exception, SystemExit) as error:
-        raise InputError(f"{what} raised {raised(error)} {raised_at(error.__traceback__)}") from error
+        raise Refused(f"{what} raised {raised(error)} {raised_at(error.__traceback__)}") from error
 
 
-def _measure(constants: Any) -> casadi.Function:
-    accelerations, encoders = _symbols(["ix", "iz", "ox", "oz"]), _symbols([f"e{i}" for i in range(constants.encoders)])
-    named = _symbols(constants.measure)
+def _measure(constants: Constants) -> casadi.Function:
+    """The measurement; the controller's own formulas on symbols."""
+    forces = _symbols(["inner_x", "inner_z", "outer_x", "outer_z"])
+    encoders = _symbols([f"encoder {i}" for i in range(constants.gimbals)])
+    named = _symbols([constant.name for constant in constants.of_measure])
     inner, outer, *rest = named
-    directions, zeros = rest[: constants.encoders], rest[constants.encoders :]
-    tilt, gimbal_angle = RadialTilt(inner, outer), GimbalAngle(tuple(directions), tuple(zeros))  # type: ignore[arg-type]
-    y = [tilt(*accelerations), gimbal_angle(encoders), tilt.acceleration(accelerations[0], accelerations[2])]
-    return _function("measure", [*accelerations, *encoders, *named], y)
+    directions, zeros = tuple(rest[: constants.gimbals]), tuple(rest[constants.gimbals :])
+    tilt, gimbal_angle = RadialTilt(inner, outer), GimbalAngle(directions, zeros)  # type: ignore[arg-type]
+    y = (tilt(*forces), gimbal_angle(encoders), tilt.acceleration(forces[0], forces[2]))
+    return _function("measure", [*forces, *encoders, *named], [expression(part) for part in y])
 
 
-def _law(constants: Any) -> casadi.Function:
-    named = _symbols(constants.law)
+def _law(constants: Constants) -> casadi.Function:
+    """The law; the controller's own formula on symbols."""
+    named = _symbols([constant.name for constant in constants.of_law])
     dt, k1, k2, k3, k4, limit = named
-    law = Law(dt, (k1, k2, k3, k4), limit)  # type: ignore[arg-type]
     given = _symbols(["x1", "x2", "x3", "x_e"])
-    return _function("law", [*given, *named], law(*given))
+    law = Law(dt, (k1, k2, k3, k4), limit)  # type: ignore[arg-type]
+    return _function("law", [*given, *named], [expression(part) for part in law(*given)])

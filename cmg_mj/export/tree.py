@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cmg_mj.elementwise import Symbolic
+from cmg_mj.export.place import Refused
+
+NUMBERS = (Symbolic, bool, int, float, np.bool_, np.integer, np.floating)
+STAY = (type(None), str, type)
+"""What a state may hold besides numbers, if it stays the same."""
 
 KEYWORDS = frozenset(
     """
@@ -21,76 +27,85 @@ KEYWORDS = frozenset(
 
 
 class Leaf(NamedTuple):
-    """A part of a state that is not made of parts: a number, or something that stays as it is."""
+    """A number in a state, and the names that lead to it."""
 
     path: tuple[str, ...]
     value: Any
 
-    @property
-    def number(self) -> bool:
-        """Whether it is a number; what is none must never change."""
-        return isinstance(self.value, (Symbolic, bool, int, float, np.bool_, np.integer, np.floating))
 
+def numbers(tree: Any, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
+    """All numbers of a state, in order.
 
-def leaves(tree: Any, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
-    """All leaves of a state, in order."""
+    Raises:
+        Refused: It holds something else.
+    """
     parts = _parts(tree)
-    if parts is None:
+    if parts is not None:
+        for name, part in parts:
+            yield from numbers(part, (*path, name))
+    elif isinstance(tree, NUMBERS):
         yield Leaf(path, tree)
-        return
-    for name, part in parts:
-        yield from leaves(part, (*path, name))
+    elif not isinstance(tree, STAY):
+        where = f" ({'.'.join(path)})" if path else ""
+        raise Refused(
+            f"its state holds a {type(tree).__name__}{where}, for which C has no "
+            "place; use numbers, in tuples, lists, dicts, dataclasses or arrays"
+        )
 
 
 def form(tree: Any) -> Any:
-    """What must stay the same from step to step: how the state is made, and what in it is no number."""
+    """What must be the same after a step: how the state is made, and what in it is no number."""
     parts = _parts(tree)
     if parts is None:
-        return "number" if Leaf((), tree).number else tree
+        return "number" if isinstance(tree, NUMBERS) else tree
     return type(tree), [(name, form(part)) for name, part in parts]
 
 
-def rebuilt(tree: Any, numbers: Iterator[Any]) -> Any:
+def rebuilt(tree: Any, given: Iterator[Any]) -> Any:
     """The same state with other numbers."""
     parts = _parts(tree)
     if parts is None:
-        return next(numbers) if Leaf((), tree).number else tree
-    made = {name: rebuilt(part, numbers) for name, part in parts}
+        return next(given) if isinstance(tree, NUMBERS) else tree
+    made = [rebuilt(part, given) for _, part in parts]
+    names = [name for name, _ in parts]
     if isinstance(tree, np.ndarray):
         array = np.empty(tree.size, dtype=object)
-        array[:] = list(made.values())
-        return array.reshape(tree.shape)
+        array[:] = made
+        return array.reshape(tree.shape) if tree.ndim else made[0]
     if isinstance(tree, dict):
-        return dict(zip(tree, made.values(), strict=True))
-    if isinstance(tree, (tuple, list)) and not hasattr(tree, "_fields"):
-        return type(tree)(made.values())
-    return type(tree)(**made)
+        return dict(zip(tree, made, strict=True))
+    if dataclasses.is_dataclass(tree):
+        other = copy.copy(tree)
+        for name, part in zip(names, made, strict=True):
+            object.__setattr__(other, name, part)
+        return other
+    if hasattr(tree, "_fields"):
+        return type(tree)(**dict(zip(names, made, strict=True)))
+    return type(tree)(made)
 
 
 def _parts(tree: Any) -> list[tuple[str, Any]] | None:
-    """Names and values of what a part of a state is made of; None for a leaf."""
-    if isinstance(tree, tuple) and hasattr(tree, "_fields"):  # a Measurement has more than these
+    """Names and values of what a part of a state is made of; None for a part that is not made of others."""
+    if isinstance(tree, tuple) and hasattr(tree, "_fields"):  # a Measurement has more than its fields
         return [*zip(tree._fields, tree, strict=True), *getattr(tree, "__dict__", {}).items()]  # type: ignore[attr-defined]
     if isinstance(tree, (tuple, list)):
         return [(str(i), part) for i, part in enumerate(tree)]
     if isinstance(tree, dict):
         return [(str(name), part) for name, part in tree.items()]
-    if isinstance(tree, np.ndarray) and tree.ndim:
-        return [("_".join(map(str, place)), tree[place]) for place in np.ndindex(*tree.shape)]
     if isinstance(tree, np.ndarray):
-        return None if not tree.shape and Leaf((), tree[()]).number else []
+        return [("_".join(map(str, place)), tree[place]) for place in np.ndindex(*tree.shape)]
     if dataclasses.is_dataclass(tree) and not isinstance(tree, type):
         return [(field.name, getattr(tree, field.name)) for field in dataclasses.fields(tree)]
     return None
 
 
-def identifiers(paths: list[tuple[str, ...]]) -> list[str]:
-    """Names in C, one a path, each once."""
+def identifiers(paths: Sequence[tuple[str, ...]], taken: Collection[str] = ()) -> list[str]:
+    """Names in C, one a path, each once and none that is taken."""
     names: list[str] = []
     for path in paths:
-        name = re.sub(r"[^A-Za-z0-9_]", "_", "_".join(path)) or "value"
-        name = f"s{name}" if not name[0].isalpha() else name
-        while name in KEYWORDS or name in names:
+        name = re.sub(r"[^A-Za-z0-9_]", "_", "_".join(part for part in path if part)) or "value"
+        name = name if name[0].isalpha() else f"s{name}"
+        while name in KEYWORDS or name in names or name in taken:
             name += "_"
         names.append(name)
     return names

@@ -1,89 +1,93 @@
-"""An export: traced, printed, compared, written."""
+"""An export: traced, compared, printed, compared, written."""
 
 from __future__ import annotations
 
 import copy
-import re
+import shlex
+import tempfile
 from pathlib import Path
-
-import numpy as np
+from typing import Any, NamedTuple
 
 from cmg_mj.controller import Controller
-from cmg_mj.export.c_code import Precision
+from cmg_mj.errors import InputError, raised
+from cmg_mj.export import check
+from cmg_mj.export.c_code import Precision, operations
 from cmg_mj.export.constants import constants_of
+from cmg_mj.export.names import files_of
 from cmg_mj.export.texts import Texts
 from cmg_mj.export.trace import trace
-from cmg_mj.observers.registry import OBSERVERS
-from cmg_mj.run_folder import RunFolder
-from cmg_mj.run_folder.folder import claimed, write_text
-from cmg_mj.sensors import Accelerometer, Encoder, Ideal, Sensors
+from cmg_mj.rehearsal import rehearse
+from cmg_mj.run_folder.folder import write_text
 
 
-def name_of(observer: object) -> str:
-    cls = type(observer)
-    path = f"{cls.__module__}:{cls.__qualname__}"
-    for name, known in OBSERVERS.items():
-        if path == known:
-            return name
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+class Code(NamedTuple):
+    """A controller as C, compared with Python.
+
+    Attributes:
+        files: Name -> text.
+        figures: What it is and how it was compared, as JSON can hold it.
+    """
+
+    files: dict[str, str]
+    figures: dict[str, Any]
 
 
-def signals(controller: Controller, ticks: int, seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    n = len(controller.directions)
-    dt = controller.law.dt
-    t = dt * np.arange(ticks)
-    tilt = 0.1 * np.sin(9.0 * t) + rng.normal(0.0, 2e-3, ticks)
-    alpha = -8.1 * np.sin(9.0 * t)
-    tangential, radial = -9.81 * np.sin(tilt), 9.81 * np.cos(tilt)
-    columns = []
-    for r in (controller.tilt.r_inner, controller.tilt.r_outer):
-        columns += [tangential + r * alpha + rng.normal(0, 0.04, ticks), radial + rng.normal(0, 0.04, ticks)]
-    gimbal = 0.3 * np.sin(3.0 * t)
-    for i in range(n):
-        columns.append(controller.gimbal_zero[i] + controller.directions[i] * gimbal + rng.normal(0, 1e-3, ticks))
-    return np.array(columns).T
+def code(controller: Controller, precision: Precision) -> Code:
+    """Make a controller's C, and compare it with Python.
+
+    Args:
+        controller: The controller.
+        precision: Of every number in C.
+
+    Returns:
+        The code.
+
+    Raises:
+        InputError: It cannot be exported, or C is not what Python runs.
+    """
+    cls = type(controller.observer)
+    try:
+        return _code(controller, precision)
+    except InputError as error:
+        raise InputError(f"{cls.__module__}:{cls.__qualname__} cannot be exported: {error}") from error
 
 
-def in_python(controller: Controller, inputs: np.ndarray) -> np.ndarray:
-    rate = 1.0 / controller.law.dt
-    sensors = Sensors(Accelerometer(rate, 0.0, range_g=1e9, counts_per_g=0.0), Encoder(rate, counts_per_revolution=0.0))
-    fresh = Controller(
-        controller.observer,
-        controller.law,
-        controller.tilt,
-        sensors,
-        directions=controller.directions,
-        gimbal_zero=controller.gimbal_zero,
-        timestep=controller.timestep,
-        angles=controller.angles,
-    )
-    rows = []
-    for k, row in enumerate(inputs.tolist()):
-        fresh.update(k * fresh.period, Ideal(tuple(row[:4]), row[4:], 0.0, 0.0))
-        assert fresh.tick is not None
-        rows.append([*fresh.tick.estimates[0], fresh.tick.u])
-    return np.array(rows)
-
-
-def export(controller: Controller, out: Path | RunFolder, precision: Precision) -> list[Path]:
+def _code(controller: Controller, precision: Precision) -> Code:
+    if controller.feedback != "observer":
+        raise InputError(
+            f"controller.feedback = {controller.feedback!r}: what is exported has the observer's rate alone; set "
+            "controller.feedback=observer"
+        )
+    try:
+        tried, traced_one = copy.deepcopy(controller.observer), copy.deepcopy(controller.observer)
+    except Exception as error:  # a user's observer may hold anything
+        raise InputError(f"it cannot be copied: {raised(error)}") from error
+    rehearse(tried, None)
     constants = constants_of(controller)
-    observer = copy.deepcopy(controller.observer)
-    spare = copy.copy(controller)
-    spare.observer = observer
-    traced = trace(spare, constants)
-    name = name_of(controller.observer)
-    texts = Texts(name, controller, traced, constants, precision)
-    inputs = signals(controller, 400, 0)
-    if precision == "single":
-        inputs = inputs.astype(np.float32).astype(float)
-    expected = in_python(controller, inputs)
-    files = {
-        f"{name}.h": texts.header(),
-        f"{name}.c": texts.source(),
-        f"{name}_example.c": texts.example(),
-        f"{name}_test_vector.h": texts.vector(inputs.tolist(), expected.tolist()),
+    traced = trace(traced_one, constants)
+    off = check.check_trace(controller, traced, constants, seeds=(1, 2, 3))
+
+    texts = Texts(controller, traced, constants, precision)
+    samples = check.signals(controller, 0, precision)
+    expected = check.in_python(controller, samples)
+    allowed = check.allowed(controller, samples, expected, precision)
+    vector = texts.vector(samples.tolist(), expected.tolist(), allowed.tolist())
+    made = (texts.header(), texts.source(), texts.example(), vector)
+    files = dict(zip(files_of(texts.name), made, strict=True))
+    compile_with = check.compiler()
+    figures = {
+        "observer": texts.name,
+        "precision": precision,
+        "files": list(files),
+        "numbers_in_state": len(traced.state),
+        "operations": {part: operations(getattr(traced, part)) for part in ("measure", "step", "law")},
+        "trace_off_by": off,
+        "compiler": None if compile_with is None else shlex.join(compile_with),
+        "c_off_by": None,
     }
-    with claimed(out) as folder:
-        place = folder.write({file: lambda path, text=text: write_text(path, text) for file, text in files.items()})
-    return [place / file for file in files]
+    if compile_with is not None:
+        with tempfile.TemporaryDirectory() as folder:
+            for file, text in files.items():
+                write_text(Path(folder, file), text)
+            figures["c_off_by"] = check.check_c(Path(folder), texts.name, compile_with)
+    return Code(files, figures)
