@@ -35,7 +35,9 @@ class Symbolic:
 
     __slots__ = ()
 
-    __array_ufunc__: Any
+
+def _traced(x: Any) -> bool:
+    return isinstance(x, Symbolic)
 
 
 def sin(x: Scalar) -> Scalar:
@@ -57,7 +59,7 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     """Angle of the point (x, y) [rad], elementwise."""
     if type(y) is float:
         return math.atan2(y, x)
-    if isinstance(y, Symbolic) or isinstance(x, Symbolic):
+    if _traced(y):
         return np.arctan2(y, x)
     # `np.arctan2` may take a vector instruction that rounds differently from the C library; the complex
     # logarithm takes its angle from the library.
@@ -71,7 +73,7 @@ def exp(x: Scalar) -> Scalar:
         return math.exp(x)
     # `np.exp` may take a vector instruction that rounds differently from the C library; for complex numbers it
     # takes the library's.
-    return np.exp(x) if isinstance(x, Symbolic) else np.exp(x + 0j).real
+    return np.exp(x) if _traced(x) else np.exp(x + 0j).real
 
 
 def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

@@ -142,7 +142,7 @@ def check_trace(controller: Controller, traced: Traced, constants: Constants, se
             name = [*("x1_rad", "x2_rad_s", "x3_rad"), *controller.extra_signals[0], "u_rad_s"][part]
             raise InputError(
                 f"traced, it is not what Python runs: on random signals {name} is off by {off[tick, part]:.3g} at "
-                f"sample {tick}. Does its code look at the type of a number, or remember something outside of its state?"
+                f"sample {tick}. Does it look at the type of a number, or remember something outside of its state?"
             )
         largest = max(largest, float(off.max()))
     return largest

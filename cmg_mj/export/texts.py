@@ -254,7 +254,7 @@ int main(void)
         model = getattr(given, "model", None)
         own = [name for name in inspect.signature(cls).parameters if name not in GIVEN]
         lines = [
-            f"{self.name}: observer and control law in {self.precision} precision, written by cmg_mj {version('cmg_mj')}.",
+            f"{self.name}: observer and control law, {self.precision} precision; by cmg_mj {version('cmg_mj')}.",
             "",
             f"{cls.__module__}:{cls.__qualname__}",
             *textwrap.wrap(first, WIDTH),

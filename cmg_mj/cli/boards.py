@@ -1,0 +1,75 @@
+"""The commands that leave the bench: an observer as C for a board."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from cmg_mj.cli.arguments import Chosen, check_observer, claim, named
+from cmg_mj.cli.terminal import say, say_hints, say_written, show, users_code
+
+
+@click.command(short_help="Write an observer and the control law around it as C.")
+@click.argument("observer")
+@click.option("--out", metavar="FOLDER", help="Folder to write to; by default one in runs/.")
+@click.option(
+    "--precision",
+    type=click.Choice(["double", "single"]),
+    default="double",
+    show_default=True,
+    help="Of every number in the C.",
+)
+@click.option(
+    "--scenario",
+    default="push_recovery",
+    show_default=True,
+    metavar="NAME",
+    help="Where the rig, the gains and the rates come from.",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="FIELD=VALUE",
+    help="Replace a field of the scenario, such as observer.k1=25 or controller.rate_hz=400; may be given again.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the figures alone, as JSON, on standard output.")
+@users_code()
+def export(
+    observer: str,
+    out: str | None,
+    precision: Literal["double", "single"],
+    scenario: str,
+    settings: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Write OBSERVER, a name or your own as package.module:Class, and the control law around it as C.
+
+    Files without malloc, NAME.h and NAME.c: init and step are the observer, update is the whole controller, from raw
+    accelerations and encoders to the gimbal rate. NAME_example.c compiles, runs, and compares the C with the
+    test vector in NAME_test_vector.h. What is written has been compared with Python on random signals.
+    """
+    from cmg_mj.experiment import prepare
+    from cmg_mj.export import check_installed, code, save
+    from cmg_mj.export.names import files_of, name_of
+    from cmg_mj.export.table import export_table
+
+    check_observer("OBSERVER", observer)
+    check_installed()
+    experiment = prepare(Chosen(scenario, settings, None, out, as_json).scenario(observer))
+    say_hints(experiment.hints)
+    controller = experiment.controller()
+    name = name_of(controller.observer)
+    place = Path("runs") / f"export-{name}-{precision}" if out is None else named(out)
+    with claim(place, files_of(name)) as folder:
+        made = code(controller, precision)
+        files = save(folder, made)
+    show(made.figures, export_table(made.figures), as_json)
+    if made.figures["compiler"] is None:
+        say(
+            "no C compiler was found (CC, cc, gcc, clang): the traced formulas were compared with Python, the C was not"
+        )
+    at = files[0].parent
+    say_written(folder, at, f"Try it: cc -std=c99 {at / name}.c {at / name}_example.c -lm && ./a.out", as_json)
