@@ -71,5 +71,8 @@ def export(
         say(
             "no C compiler was found (CC, cc, gcc, clang): the traced formulas were compared with Python, the C was not"
         )
+    for part in made.figures["beyond_rounding"]:
+        off = made.figures["c_off_by"][part]
+        say(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer makes so much of a last digit")
     at = files[0].parent
     say_written(folder, at, f"Try it: cc -std=c99 {at / name}.c {at / name}_example.c -lm && ./a.out", as_json)

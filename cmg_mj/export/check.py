@@ -107,16 +107,26 @@ def in_casadi(controller: Controller, traced: Traced, constants: Constants, samp
     return np.array(rows)
 
 
-def allowed(controller: Controller, samples: np.ndarray, expected: np.ndarray, precision: Precision) -> np.ndarray:
-    """How far each column may be off, (4 + extra signals,).
+def columns(controller: Controller) -> list[str]:
+    """What is compared: the parts of an estimate, and u."""
+    return ["x1_rad", "x2_rad_s", "x3_rad", *controller.extra_signals[0], "u_rad_s"]
 
-    An observer that switches may make much of little: what a last digit of its inputs moves, rounding may move as well.
+
+def rounded(expected: np.ndarray, precision: Precision) -> np.ndarray:
+    """How far each column may be off by rounding, (4 + extra signals,)."""
+    return SHARE[precision] * np.abs(expected).max(axis=0)
+
+
+def allowed(controller: Controller, samples: np.ndarray, expected: np.ndarray, precision: Precision) -> np.ndarray:
+    """How far each column may be off: by rounding, and by what the observer makes of it, (4 + extra signals,).
+
+    One that switches may make much of little: what a last digit of its inputs moves, rounding may move as well.
     """
     kind = np.float32 if precision == "single" else np.float64
     near = samples.astype(kind)
     ends = np.where(np.random.default_rng(0).random(samples.shape) < 0.5, -np.inf, np.inf).astype(kind)
     moved = np.abs(in_python(controller, np.nextafter(near, ends).astype(float)) - expected)
-    return SHARE[precision] * np.abs(expected).max(axis=0) + ROUNDINGS * moved.max(axis=0)
+    return rounded(expected, precision) + ROUNDINGS * moved.max(axis=0)
 
 
 def check_trace(controller: Controller, traced: Traced, constants: Constants, seeds: Sequence[int]) -> float:
@@ -135,11 +145,13 @@ def check_trace(controller: Controller, traced: Traced, constants: Constants, se
             expected = in_python(controller, samples)
         except RunStopped as error:
             raise InputError(f"it cannot be compared on random signals: {error}") from error
+        if not np.array_equal(in_python(controller, samples), expected):
+            raise InputError("in Python it is not twice the same on the same signals, so that nothing can be compared")
         off = np.abs(in_casadi(controller, traced, constants, samples) - expected)
         share = off / np.maximum(allowed(controller, samples, expected, "double"), np.finfo(float).tiny)
         if not np.all(share <= 1.0):
             tick, part = np.argwhere(~(share <= 1.0))[0]
-            name = [*("x1_rad", "x2_rad_s", "x3_rad"), *controller.extra_signals[0], "u_rad_s"][part]
+            name = columns(controller)[part]
             raise InputError(
                 f"traced, it is not what Python runs: on random signals {name} is off by {off[tick, part]:.3g} at "
                 f"sample {tick}. Does it look at the type of a number, or remember something outside of its state?"

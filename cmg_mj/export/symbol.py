@@ -103,13 +103,13 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
             "(where, clip, sign), or numpy.where"
         )
 
-    def _number(self) -> NoReturn:
+    def _number(self, *_: Any) -> NoReturn:
         raise Refused(
-            f"a plain number is asked for {here()}, as by float(), int() or a function of math; use "
+            f"a plain number is asked for {here()}, as by float(), int(), round() or a function of math; use "
             "cmg_mj.elementwise, or numpy's functions"
         )
 
-    __float__ = __int__ = __index__ = __complex__ = _number
+    __float__ = __int__ = __index__ = __complex__ = __round__ = _number
 
     # What NumPy calls on every element of an array of objects.
     def sin(self) -> Symbol:

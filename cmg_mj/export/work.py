@@ -84,10 +84,13 @@ def _code(controller: Controller, precision: Precision) -> Code:
         "trace_off_by": off,
         "compiler": None if compile_with is None else shlex.join(compile_with),
         "c_off_by": None,
+        "beyond_rounding": [],
     }
     if compile_with is not None:
         with tempfile.TemporaryDirectory() as folder:
             for file, text in files.items():
                 write_text(Path(folder, file), text)
-            figures["c_off_by"] = check.check_c(Path(folder), texts.name, compile_with)
+            off_by = figures["c_off_by"] = check.check_c(Path(folder), texts.name, compile_with)
+        bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
+        figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
     return Code(files, figures)
