@@ -175,7 +175,7 @@ def test_the_loop_meets_the_older_instant(
 @pytest.mark.parametrize("bandwidth_hz", [5.0, 44.0, 94.0, 184.0, 400.0])
 def test_noise_after_the_low_pass(bandwidth_hz: float) -> None:
     """The closed form against the sum of the squared impulse response, and against what is delivered."""
-    b, a = np.array(butter(2, bandwidth_hz, fs=1000.0))
+    b, a = np.array(butter(2, bandwidth_hz, fs=1000.0)).tolist()
     impulse = np.asarray(lfilter(b, a, np.eye(1, 5000)[0]))
     assert noise_gain(bandwidth_hz, 1000.0) == pytest.approx(float(np.sum(impulse**2)), rel=1e-9)
 
