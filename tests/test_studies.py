@@ -6,7 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-STEPS = Path(__file__).resolve().parents[1] / "docs/studies/steps.py"
+STUDIES = Path(__file__).resolve().parents[1] / "docs/studies"
+STEPS = STUDIES / "steps.py"
 
 
 def test_the_table_of_steps() -> None:
@@ -15,3 +16,13 @@ def test_the_table_of_steps() -> None:
     rows = [line for line in done.stdout.splitlines() if line.startswith("| RK4")]
     assert len(rows) == 2
     assert "0.00 %" in rows[0]
+
+
+def test_the_tables_of_the_accelerometers_errors() -> None:
+    arguments = "alone --only outer --worlds 2 --observers linear --jobs 1 --set duration_s=0.2 --set push=[]"
+    command = [sys.executable, STUDIES / "sensor_errors.py", *arguments.split()]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    rows = [line.split("|")[1:-1] for line in done.stdout.splitlines() if line.startswith("| offset 5 mg, outer")]
+    assert [len(row) for row in rows] == [10, 5]
+    assert float(rows[0][1]) == 0.14  # atan(0.5 * 5e-3)
+    assert "- to the MEMS gyro: in " in done.stdout

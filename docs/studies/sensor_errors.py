@@ -1,6 +1,7 @@
 """What the accelerometers' imperfections do to every observer, in its own loop: each alone, and all together.
 
-    python docs/studies/sensor_errors.py [--worlds 20] [--parts 4] [--observers all] [--jobs 2] [--only skew]
+    python docs/studies/sensor_errors.py alone [--worlds 20] [--observers all] [--jobs 2] [--only skew]
+    python docs/studies/sensor_errors.py together [--worlds 10] [--parts 4] [--observers gyro_free,kalman,adaptive]
 
 The scenario push_recovery. Values are those of the MPU-6050's class: as the datasheet has them (cross-axis 2 %, the
 low-pass), as a calibration leaves them (offset 5 mg, scale 1 %), as parts are glued (0.2 and 1 degree). Alone, each has
@@ -9,7 +10,7 @@ the sign that adds to e = 0.5 degree. All together, signs are drawn at random, f
 rest does.
 
 Printed: gyro_free against the best of the others, world by world; then every observer; then where gyro_free loses.
-Twenty worlds take about half an hour on two quiet cores.
+On a quiet core the first takes a minute an observer with 20 worlds, the second two with 4 pairs of parts of 10 worlds.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from scipy.optimize import brentq
 
 from cmg_mj import OBSERVERS, Accelerometer, load_plant, load_scenario, prepare
 from cmg_mj.intervals import known_interval, ratio_interval
+from cmg_mj.law import TABLE_2_GAINS
 from cmg_mj.markdown import table
 
 SEED = 90_000
@@ -35,6 +37,7 @@ ERROR, PUSH = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
 WHEEL_KG, WHEEL_RAD_S = 0.61, 314.0
 G_6_3_KG_M = WHEEL_KG * 6.3e-3 / WHEEL_RAD_S
 """ISO 21940-11: the grade is the speed of the wheel's centre of mass, 6.3 mm/s for flywheels."""
+UNBALANCED = (f"plant.flywheel_imbalance_kg_m={G_6_3_KG_M!r}",)
 INSTABILITY_UG = 36.0
 """The datasheet has none; so much the IMU of Microsoft's AirSim takes for the MPU-6000 (ImuSimpleParams.hpp)."""
 PERIOD_S = 0.005
@@ -63,6 +66,19 @@ def levelled(fields: dict[str, Any]) -> dict[str, Any]:
     return fields | {"bias_mg": (inner + found, outer)}
 
 
+def skew_gain() -> tuple[float, float]:
+    """What an outer sample that is a period old does.
+
+    Returns:
+        What y1 changes by if the angular acceleration changes from one sample to the next, r_i r_o/((r_o - r_i) g)
+        [s^2]; the gain of the loop that this closes: y1 -> u by K_e, u -> acceleration.
+    """
+    plant = load_plant()
+    tilt, reduced = plant.radial_tilt, plant.reduced
+    added = tilt.r_inner * tilt.r_outer / ((tilt.r_outer - tilt.r_inner) * plant.gravity)
+    return added, TABLE_2_GAINS[0] * added * reduced.J_d * reduced.omega_d / reduced.J1
+
+
 def drawn(parts: int, misalignment_deg: float, **fields: Any) -> list[dict[str, Any]]:
     """Pairs of parts with everything at once, signs at random."""
     rng = np.random.default_rng(SEED)
@@ -74,9 +90,8 @@ def drawn(parts: int, misalignment_deg: float, **fields: Any) -> list[dict[str, 
     ]
 
 
-def cases(parts: int) -> Iterator[Case]:
-    """The lines of the tables."""
-    unbalanced = (f"plant.flywheel_imbalance_kg_m={G_6_3_KG_M!r}",)
+def alone() -> Iterator[Case]:
+    """Each imperfection by itself."""
     yield Case("none", [{}])
     yield Case("offset 5 mg, inner", [{"bias_mg": (5.0, 0.0)}])
     yield Case("offset 5 mg, outer", [{"bias_mg": (0.0, -5.0)}])
@@ -98,14 +113,20 @@ def cases(parts: int) -> Iterator[Case]:
     yield Case(f"bias instability {INSTABILITY_UG:g} ug", [{"bias_instability_ug": INSTABILITY_UG}])
     yield Case("low-pass 94 Hz", [{"bandwidth_hz": 94.0}])
     yield Case("low-pass 44 Hz", [{"bandwidth_hz": 44.0}])
-    yield Case("wheels balanced to G 6.3", [{}], unbalanced)
+    yield Case("wheels balanced to G 6.3", [{}], UNBALANCED)
+
+
+def together(parts: int) -> Iterator[Case]:
+    """All of them."""
     small = drawn(parts, 0.2, skew_s=PERIOD_S / 2.0)
     large = drawn(parts, 1.0, skew_s=PERIOD_S)
-    yield Case("all, 0.2 deg, half a period", small, unbalanced)
-    yield Case("all, 0.2 deg, half a period, levelled", [levelled(fields) for fields in small], unbalanced)
-    yield Case("all, 1 deg, one period, levelled", [levelled(fields) for fields in large], unbalanced)
+    yield Case("0.2 deg, half a period", small, UNBALANCED)
+    yield Case("0.2 deg, half a period, levelled", [levelled(fields) for fields in small], UNBALANCED)
+    yield Case("1 deg, one period, levelled", [levelled(fields) for fields in large], UNBALANCED)
+    estimated = (*UNBALANCED, "controller.angles=estimated")
+    yield Case("the same, estimated angles", [levelled(fields) for fields in large], estimated)
     late = {"skew_s": 0.0, "latency_s": PERIOD_S}
-    yield Case("the same, inner held back", [levelled(fields) | late for fields in large], unbalanced)
+    yield Case("the same, inner held back", [levelled(fields) | late for fields in large], UNBALANCED)
 
 
 def measured(case: Case, observer: str, worlds: int) -> dict[str, np.ndarray]:
@@ -176,15 +197,20 @@ def ratio(ours: np.ndarray, theirs: np.ndarray) -> tuple[str, float, float]:
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("lines", choices=["alone", "together"])
     parser.add_argument("--worlds", type=int, default=20)
     parser.add_argument("--parts", type=int, default=4)
     parser.add_argument("--observers", default="all")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument(
+        "--set", action="append", default=[], help="a setting of the scenario, as `cmg-mj run` takes it"
+    )
     parser.add_argument("--only", default="", help="cases whose names contain this")
     options = parser.parse_args()
     names = list(OBSERVERS) if options.observers == "all" else options.observers.split(",")
     names = [*dict.fromkeys([OURS, *names]), "true rate"]
-    chosen = [case for case in cases(options.parts) if options.only in case.name]
+    lines = alone() if options.lines == "alone" else together(options.parts)
+    chosen = [case._replace(settings=(*case.settings, *options.set)) for case in lines if options.only in case.name]
     with ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) as pool:
         waiting = {
             (case.name, name): pool.submit(measured, case, name, options.worlds) for case in chosen for name in names
@@ -221,7 +247,10 @@ def main() -> None:
     print("\n".join(losses))
     known = [(name, gyro) for name, gyro, low in times if low > 1.0]
     print(f"- to the MEMS gyro: in {len(known)} of {len(times)} lines; its error is as many times the gyro's:")
-    print("; ".join(f"{name} {gyro}" for name, gyro in known))
+    print("; ".join(f"{name} {gyro}" for name, gyro in known), "\n")
+    added, gain = skew_gain()
+    print(f"Where the outer's sample is a period old, an acceleration that changes by 1 rad/s^2 adds {added:.4f}")
+    print(f"rad to y1, which the law feeds back: a loop of gain {gain:.2f} closes from sample to sample.")
 
 
 if __name__ == "__main__":
