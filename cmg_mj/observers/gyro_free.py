@@ -51,9 +51,10 @@ class GyroFree:
         dt: Sample period [s].
         model: The reduced model (not used).
         noise: Of tilt and angular acceleration, by the sensors' datasheet.
-        rate_start: Standard deviation of the rate at the start, about zero [rad/s].
-        bias_start: The same of b [rad/s^2]. On the bundled rig 5 mg on each accelerometer make 0.5: what its zero moves
-            over ten degrees of temperature (InvenSense PS-MPU-6000A, 6.2: 35 mg over 70).
+        rate_start: Standard deviation of the rate at the start, about zero [rad/s]. The default is about what remains
+            of it later.
+        bias_start: The same of b [rad/s^2]. On the bundled rig 1.0 is 10 mg on each accelerometer, or the inner one
+            misaligned by 0.8 degrees. Less gains two hundredths without any of these, and loses more with them.
         bias_walk: How fast b may change: standard deviation after a second [rad/s^2].
         jerk: How far alpha is off the straight line between samples: standard deviation of its mean [rad/s^2].
     """
@@ -63,8 +64,8 @@ class GyroFree:
     dt: Positive
     model: ReducedModel
     noise: TiltNoise
-    rate_start: Positive = 0.05
-    bias_start: Positive = 0.5
+    rate_start: Positive = 0.02
+    bias_start: Positive = 1.0
     bias_walk: NonNegative = 0.01
     jerk: NonNegative = 0.1
 
