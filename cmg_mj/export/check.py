@@ -162,7 +162,10 @@ def check_trace(controller: Controller, traced: Traced, constants: Constants, se
 
 def compiler() -> list[str] | None:
     """The C compiler that is there: CC, or else cc, gcc or clang."""
-    named = shlex.split(os.environ.get("CC", ""))
+    try:
+        named = shlex.split(os.environ.get("CC", ""))
+    except ValueError as error:
+        raise InputError(f"CC = {os.environ['CC']!r}: {error}") from error
     if named:
         return named
     return next(([found] for found in map(shutil.which, ("cc", "gcc", "clang")) if found), None)
@@ -186,7 +189,8 @@ def check_c(folder: Path, name: str, compile_with: Sequence[str]) -> dict[str, f
     sources = [str(folder / f"{name}.c"), str(folder / f"{name}_example.c")]
     said = _run([*compile_with, *FLAGS, *sources, "-o", str(program), "-lm"], "the C compiler")
     if said.returncode:
-        raise InputError(f"the C does not compile with {shlex.join(compile_with)}: {_first_line(said.stderr)}")
+        hint = " (CC must name a compiler for this machine)" if os.environ.get("CC") else ""
+        raise InputError(f"the C does not compile with {shlex.join(compile_with)}{hint}: {_first_line(said.stderr)}")
     said = _run([str(program)], "the compiled example")
     program.unlink()
     if said.returncode:
