@@ -49,7 +49,7 @@ class Part:
 
 
 class Elaborate(Plain):
-    """Every function of elementwise, nested state, integers, truths, extra signals, a docstring with */ and /* in it."""
+    """Functions of elementwise, nested state, integers, truths, extra signals, a docstring with */ and /* in it."""
 
     extra_signals = ("estimates", "bias_rad", "h")
 

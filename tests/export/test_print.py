@@ -51,7 +51,7 @@ def test_what_is_nearly_zero_or_very_large_stays_so() -> None:
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_every_operation_does_what_numpy_does(precision: Any, tmp_path: Path) -> None:
     with _as_written():
-        a, b = (Symbol(casadi.SX.sym(name)) for name in "ab")
+        a, b = symbols()
         binary = [f for f in OPERATIONS if f.nin == 2]
         unary = [f for f in OPERATIONS if f.nin == 1]
         results = (
@@ -71,7 +71,7 @@ def test_every_operation_does_what_numpy_does(precision: Any, tmp_path: Path) ->
     pairs = [*rng.uniform(-1.5, 1.5, (50, 2)), (0.0, 0.0), (0.7, 0.7), (1.0, 0.0), (0.0, -1.0), (1.0, 1.0)]
     with np.errstate(all="ignore"):
         for pair in pairs:
-            a, b = map(kind, pair)  # type: ignore[assignment]
+            a, b = map(kind, pair)
             logical = {np.bitwise_and: np.logical_and, np.bitwise_or: np.logical_or, np.invert: np.logical_not}
             wanted = [logical.get(f, f)(a, b) for f in binary] + [logical.get(f, f)(a) for f in unary]
             wanted += [np.where(a < b, a, 2 * b), np.clip(a, kind(-0.5), kind(0.5))]
@@ -85,7 +85,7 @@ def test_every_operation_does_what_numpy_does(precision: Any, tmp_path: Path) ->
 def test_what_is_nan_does_not_become_a_limit(tmp_path: Path) -> None:
     """As fmax would have it: a board would go on with the largest rate."""
     with _as_written():
-        a, b = (Symbol(casadi.SX.sym(name)) for name in "ab")
+        a, b = symbols()
         clipped = np.clip(a, -4.7, 4.7), np.maximum(0.0, a), np.minimum(a, 1.0)
         function = casadi.Function("f", [a.sx, b.sx], [x.sx for x in clipped])
     assert np.isnan(compiled(function, "double", tmp_path)(math.nan, 0.0)).all()
@@ -102,6 +102,10 @@ def test_an_output_may_take_the_place_of_an_input(tmp_path: Path) -> None:
     x = np.array([1.0, 2.0])
     ctypes.CDLL(str(tmp_path / "swap.so")).f(x.ctypes.data_as(ctypes.c_void_p))
     assert x.tolist() == [2.0, 1.0]
+
+
+def symbols() -> list[Any]:
+    return [Symbol(casadi.SX.sym(name)) for name in "ab"]
 
 
 def compiled(function: casadi.Function, precision: Any, folder: Path) -> Any:
