@@ -1,13 +1,15 @@
-"""An observer replayed open loop on what a run recorded."""
+"""An observer replayed open loop on what a run, or a log, recorded."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from cmg_mj.observers import Estimate, Measurement, Observer
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.observers.protocol import extra_signals
+from cmg_mj.trajectory import ESTIMATES, Trajectory
 
 
 def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
@@ -24,17 +26,25 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
         Estimates of x1 [rad], x2 [rad/s] and x3 [rad], each of the recorded columns' shape, (n_ticks,) or
         (n_ticks, n_worlds); NaN after a world's end.
     """
+    found = replay_all(observer, trajectory)
+    return Estimate(*(found[name] for name in ESTIMATES))
+
+
+def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarray]:
+    """The same, and what the observer estimates beyond x, by name; at the first row that is zero."""
+    names = (*ESTIMATES, *extra_signals(observer))
     y1, y2, u = (_rows(trajectory[name]) for name in ("y1_rad", "y2_rad", "u_rad_s"))
     measured = trajectory.columns.get("acceleration_rad_s2")
     acceleration = _rows(np.full_like(trajectory["y1_rad"], np.nan) if measured is None else measured)
+    zero = 0.0 * y1[0]
     state = observer.init(Measurement(y1[0], y2[0], acceleration[0]))
-    rows = [Estimate(y1[0], 0.0 * y1[0], y2[0])]
+    rows: list[Sequence[Any]] = [(y1[0], zero, y2[0], *[zero] * (len(names) - len(ESTIMATES)))]
     for k in range(1, len(y1)):
         state, estimate = observer.step(state, Measurement(y1[k], y2[k], acceleration[k]), u[k - 1])
         rows.append(estimate)
     shape = trajectory["y1_rad"].shape
-    columns = zip(*(row[:3] for row in rows), strict=True)
-    return Estimate(*(np.array(column, dtype=float).reshape(shape) for column in columns))
+    columns = zip(*(row[: len(names)] for row in rows), strict=True)
+    return {name: np.array(column, dtype=float).reshape(shape) for name, column in zip(names, columns, strict=True)}
 
 
 def _rows(values: np.ndarray) -> Any:

@@ -1,0 +1,143 @@
+"""How good an estimate of the rate is on a log: against a reference, or without one by what it makes of the tilt."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cmg_mj.alignment import lag
+from cmg_mj.logs import Log
+from cmg_mj.logs.log import REFERENCE
+from cmg_mj.push import inside
+
+RECONSTRUCTED_S = 1.0
+"""The estimated rate is integrated over so long at a time [s]."""
+
+
+def scores(log: Log, rate: np.ndarray, scored: np.ndarray) -> dict[str, float | None]:
+    """The figures of one estimate.
+
+    Args:
+        log: The log.
+        rate: The estimate, (n,) [rad/s].
+        scored: Which samples count, (n,).
+
+    Returns:
+        By the names that `--json` prints; None where there is no such number.
+    """
+    if "reference" in log.has:
+        return _against(log, rate, scored)
+    return {
+        "reconstruction_rms_deg": reconstruction(log, rate, scored),
+        "roughness_rad_s": roughness(log, rate, scored),
+    }
+
+
+def _against(log: Log, rate: np.ndarray, scored: np.ndarray) -> dict[str, float | None]:
+    true = log[REFERENCE]
+    counted = scored & np.isfinite(true)
+    error, motion = _rms((rate - true)[counted]), _rms(true[counted])
+    figures = {
+        "velocity_rms_error_rad_s": error,
+        "velocity_rms_rad_s": motion,
+        "velocity_fit": _fit(error, motion),
+        "lag_s": _lag(log, rate, scored),
+    }
+    if log.windows:
+        counted &= inside(log["time_s"], log.windows)
+        error, motion = _rms((rate - true)[counted]), _rms(true[counted])
+        figures |= {"velocity_rms_error_push_rad_s": error, "velocity_fit_push": _fit(error, motion)}
+    return figures
+
+
+def _lag(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
+    """How long the estimate comes after the reference [s]."""
+    true = np.where(scored, log[REFERENCE], np.nan)
+    rate = np.where(scored & np.isfinite(rate), rate, np.nan)
+    pieces = _pieces(log, scored)
+    return lag([rate[piece] for piece in pieces], [true[piece] for piece in pieces], log.dt)
+
+
+def reconstruction(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
+    """RMS of the tilt integrated from an estimated rate less the measured tilt.
+
+    By the trapezoidal rule, `RECONSTRUCTED_S` at a time, each with the constant that fits it best: what the rate misses
+    over a second, not what a small offset of it becomes in an hour.
+
+    Args:
+        log: The log.
+        rate: The estimate, (n,) [rad/s].
+        scored: Which samples count, (n,).
+
+    Returns:
+        The error [deg]; None if no stretch is as long.
+    """
+    span = max(2, round(RECONSTRUCTED_S / log.dt) + 1)
+    errors = []
+    for piece in _pieces(log, scored):
+        y, r = log["y1_rad"][piece], rate[piece]
+        for start in range(0, len(y) - span + 1, span - 1):
+            part = slice(start, start + span)
+            travelled = np.concatenate([[0.0], np.cumsum(r[part][1:] + r[part][:-1])]) * (log.dt / 2.0)
+            error = travelled - y[part]
+            errors.append(error - error.mean())
+    return _number(math.degrees(_rms(np.concatenate(errors)) or 0.0)) if errors else None
+
+
+def roughness(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
+    """The size of the white noise whose second differences are as large as an estimate's.
+
+    Args:
+        log: The log.
+        rate: The estimate, (n,) [rad/s].
+        scored: Which samples count, (n,).
+
+    Returns:
+        RMS of the second differences by sqrt(6) [rad/s].
+    """
+    second = [np.diff(rate[piece], 2) for piece in _pieces(log, scored)]
+    rms = _rms(np.concatenate(second)) if second else None
+    return None if rms is None else rms / math.sqrt(6.0)
+
+
+def noise_gain(response: np.ndarray, size: float, scored: np.ndarray) -> float | None:
+    """By how much white noise of the tilt comes out of an estimate.
+
+    Args:
+        response: What the noise has changed in the estimate, (n,) [rad/s].
+        size: Standard deviation of one sample of the noise [rad].
+        scored: Which samples count, (n,).
+
+    Returns:
+        RMS of the response by that [1/s].
+    """
+    rms = _rms(response[scored])
+    return None if rms is None or not size > 0.0 else rms / size
+
+
+def _pieces(log: Log, scored: np.ndarray) -> list[slice]:
+    """What is scored of each part."""
+    pieces = []
+    for part in log.parts:
+        counted = np.flatnonzero(scored[part])
+        if len(counted):
+            pieces.append(slice(part.start + int(counted[0]), part.start + int(counted[-1]) + 1))
+    return pieces
+
+
+def _rms(values: np.ndarray) -> float | None:
+    """None of none, or if one is not finite."""
+    if not len(values):
+        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _number(math.sqrt(float(np.mean(values**2))))
+
+
+def _fit(error: float | None, motion: float | None) -> float | None:
+    """1 - error/motion: 1 is the reference, 0 an estimate of zero."""
+    return _number(1.0 - error / motion) if motion and error is not None else None
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None

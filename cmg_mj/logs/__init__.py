@@ -1,0 +1,5 @@
+"""A user's own log, CSV or Parquet -> evenly sampled signals in SI and radians, with a word on all that was done."""
+
+from cmg_mj.logs.log import Log, read_log
+
+__all__ = ["Log", "read_log"]

@@ -1,0 +1,328 @@
+"""Rows at whatever times -> parts sampled evenly. Whatever is done is said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from cmg_mj.errors import InputError
+from cmg_mj.logs.table import MOST_ROWS
+
+EVEN = 0.02
+"""Stamps this much of a period off an even grid count as on it."""
+A_GAP = 1.5
+"""More than so many periods between two rows is a gap."""
+BRIDGED = 5
+"""By default, so many missing rows in a gap are bridged."""
+FEWEST = 20
+"""A part with fewer rows is left out."""
+FEW_REPEATED = 0.05
+"""More rows than this share with the stamp of the row before are a mistake, fewer are left out."""
+SLOWEST_HZ, FASTEST_HZ = 0.1, 1e6
+
+
+@dataclass(frozen=True)
+class Part:
+    """Rows without a gap, evenly sampled.
+
+    Attributes:
+        time: (n,) [s].
+        values: Name -> (n,).
+        stamps: The rows' own times, (m,) [s].
+        placed: Where those rows are in `time`; elsewhere than their stamps say if these are rounded, (m,) [s].
+    """
+
+    time: np.ndarray
+    values: Mapping[str, np.ndarray]
+    stamps: np.ndarray
+    placed: np.ndarray
+
+    def when(self, stamps: np.ndarray) -> np.ndarray:
+        """Times in this part of what other rows' stamps say, beyond its ends too, (k,) [s]."""
+        before, after = self.stamps[0] - self.placed[0], self.stamps[-1] - self.placed[-1]
+        inside = np.interp(stamps, self.stamps, self.placed)
+        return np.where(
+            stamps < self.stamps[0], stamps - before, np.where(stamps > self.stamps[-1], stamps - after, inside)
+        )
+
+
+@dataclass
+class Sampler:
+    """From rows to parts.
+
+    Attributes:
+        where: The file, for messages.
+        rate_hz: The rate of the rows, if they have no times; else that to resample to, or None for the rows' own.
+        max_gap_s: Longer gaps part the log; None for `BRIDGED` periods.
+        notes: What was done.
+    """
+
+    where: str
+    rate_hz: float | None
+    max_gap_s: float | None
+    notes: list[str]
+
+    def parts(
+        self, time: np.ndarray | None, measured: Mapping[str, np.ndarray], held: Sequence[str] = ()
+    ) -> tuple[float, list[Part]]:
+        """Cut out what is missing, and resample the rest if it is uneven.
+
+        Args:
+            time: Stamps, (n_rows,) [s]; None for rows that are even.
+            measured: Name -> values, (n_rows,), all of which a row must have.
+            held: Names of those that are held until the next row, such as a command.
+
+        Returns:
+            The sample period [s], and the parts.
+
+        Raises:
+            InputError: Times that run backward or stand still, nothing to work on, or an impossible rate.
+        """
+        n = len(next(iter(measured.values())))
+        if time is None:
+            if self.rate_hz is None:
+                raise InputError(f"{self.where}: no time: name its column, --columns time=..., or give --rate HZ")
+            time = np.arange(n) / self.rate_hz
+        present = np.isfinite(time) & np.logical_and.reduce([np.isfinite(values) for values in measured.values()])
+        if not present.any():
+            empty = [name for name, values in measured.items() if not np.isfinite(values).any()]
+            what = f"{', '.join(empty)} has no number at all" if empty else "no row has all of " + ", ".join(measured)
+            raise InputError(f"{self.where}: {what}")
+        if not present.all():
+            self.notes.append(_missing(present, time, measured))
+        time, kept = time[present], {name: values[present] for name, values in measured.items()}
+        time, kept = self._forward(time, kept)
+        if len(time) < FEWEST:
+            raise InputError(f"{self.where}: {len(time)} rows with all that is needed; at least {FEWEST}")
+        return self._on_a_grid(time, kept, held)
+
+    def _forward(self, time: np.ndarray, values: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Times that only grow."""
+        steps = np.diff(time)
+        if len(steps) and (steps <= 0.0).all() and (steps < 0.0).any():
+            self.notes.append("the time runs backward from the first row to the last: read from its end")
+            time, values = time[::-1], {name: column[::-1] for name, column in values.items()}
+            steps = np.diff(time)
+        if (steps < 0.0).any():
+            at = int(np.argmax(steps < 0.0))
+            raise InputError(
+                f"{self.where}: time goes back from {time[at]:.9g} s to {time[at + 1]:.9g} s, "
+                f"{'there alone' if (steps < 0.0).sum() == 1 else f'the first of {(steps < 0.0).sum()} times'}: "
+                "cut the log there, or leave time out and give --rate"
+            )
+        again = steps == 0.0
+        if again.mean() > FEW_REPEATED if len(again) else False:
+            raise InputError(
+                f"{self.where}: {again.sum():,} of {len(time):,} rows have the same time as the row before: the stamps "
+                "are too coarse; leave time out and give --rate"
+            )
+        if again.any():
+            first = time[1:][again][0]
+            self.notes.append(f"{_rows(again.sum())} with the time of the row before left out, first at {first:.6g} s")
+            kept = np.concatenate([[True], ~again])
+            time, values = time[kept], {name: column[kept] for name, column in values.items()}
+        return time, values
+
+    def _on_a_grid(
+        self, time: np.ndarray, values: Mapping[str, np.ndarray], held: Sequence[str]
+    ) -> tuple[float, list[Part]]:
+        steps = np.diff(time)
+        usual = float(np.median(steps))
+        period = float(steps[steps <= A_GAP * usual].mean())
+        if not 1.0 / FASTEST_HZ <= period <= 1.0 / SLOWEST_HZ:
+            raise InputError(
+                f"{self.where}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz; a log has "
+                f"{SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz: is the time's unit right? (--units time=ms)"
+            )
+        period = _round(period)
+        longest = BRIDGED * period if self.max_gap_s is None else self.max_gap_s
+        ends = np.flatnonzero(steps > max(A_GAP * period, longest + period))
+        bounds = [0, *(ends + 1), len(time)]
+        stretches = [slice(a, b) for a, b in pairwise(bounds)]
+        resolution = _resolution(time)
+        even = all(_is_even(time[s], period, resolution) for s in stretches)
+        dt = period if self.rate_hz is None else 1.0 / self.rate_hz
+        resampled = not even or abs(dt - period) > 1e-6 * dt
+        self._say_how(time, steps[steps <= A_GAP * period], period, dt, even, resampled, resolution)
+        bridged = (steps > A_GAP * period) & (steps <= max(A_GAP * period, longest + period))
+        if bridged.any():
+            self.notes.append(_gaps("bridged by straight lines", time, steps, bridged, period))
+        if len(ends):
+            parted = np.zeros(len(steps), dtype=bool)
+            parted[ends] = True
+            self.notes.append(_gaps("not bridged: observers start anew after each", time, steps, parted, period))
+        total = sum((time[s][-1] - time[s][0]) / dt for s in stretches)
+        if total > MOST_ROWS:
+            raise InputError(f"{self.where}: {total:,.0f} samples at {1.0 / dt:g} Hz; at most {MOST_ROWS:,}")
+        parts = [
+            self._part(time[s], {name: column[s] for name, column in values.items()}, period, dt, resampled, held)
+            for s in stretches
+            if (time[s][-1] - time[s][0]) / dt >= FEWEST - 1.5
+        ]
+        if len(parts) < len(stretches):
+            self.notes.append(f"{len(stretches) - len(parts)} parts with fewer than {FEWEST} samples left out")
+        if not parts:
+            raise InputError(f"{self.where}: no part of {FEWEST} samples without a gap longer than {longest:.3g} s")
+        return dt, parts
+
+    def _say_how(
+        self,
+        time: np.ndarray,
+        steps: np.ndarray,
+        period: float,
+        dt: float,
+        even: bool,
+        resampled: bool,
+        resolution: float,
+    ) -> None:
+        span = f"{steps.min() * 1e3:.4g} to {steps.max() * 1e3:.4g} ms"
+        if resampled and even:
+            self.notes.append(f"{1.0 / period:.6g} Hz resampled to {1.0 / dt:.6g} Hz by cubic splines")
+        elif resampled:
+            off = float(np.std(steps)) * 1e3
+            self.notes.append(
+                f"uneven sampling: steps of {span}, {off:.2g} ms about their mean; resampled to {1.0 / dt:.6g} Hz by "
+                "cubic splines"
+            )
+        elif np.ptp(steps) > EVEN * period:
+            self.notes.append(
+                f"steps of {span}: to the stamps' {resolution * 1e3:.3g} ms that is even sampling at "
+                f"{1.0 / period:.6g} Hz, and taken as such"
+            )
+
+    def _part(
+        self,
+        time: np.ndarray,
+        values: Mapping[str, np.ndarray],
+        period: float,
+        dt: float,
+        resampled: bool,
+        held: Sequence[str],
+    ) -> Part:
+        if not resampled and len(time) == round((time[-1] - time[0]) / dt) + 1:
+            grid = time[0] + dt * np.arange(len(time))
+            return Part(grid, values, time, grid)
+        if not resampled:  # rows stay where they are, and those that are missing come between them
+            places = np.rint((time - time[0]) / dt).astype(int)
+            places = np.maximum.accumulate(places)
+            kept = np.concatenate([[True], np.diff(places) > 0])
+            time, places = time[kept], places[kept]
+            values = {name: column[kept] for name, column in values.items()}
+            own, grid = places * dt, dt * np.arange(places[-1] + 1)
+            filled = {name: _bridge(grid, own, column, name in held) for name, column in values.items()}
+            return Part(time[0] + grid, filled, time, time[0] + own)
+        grid = dt * np.arange(int((time[-1] - time[0]) / dt + 1e-6) + 1)
+        own = time - time[0]
+        sampled = {name: resample(grid, own, column, A_GAP * period, name in held) for name, column in values.items()}
+        return Part(time[0] + grid, sampled, time, time)
+
+
+def resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float, held: bool = False) -> np.ndarray:
+    """Values at other times: by a cubic spline, in gaps by straight lines; held ones by the last before.
+
+    Args:
+        grid: Wanted times, (n,), within those there are [s].
+        time: Times there are, growing, (m,) [s].
+        values: (m,).
+        gap: More between two of them is a gap [s].
+        held: Whether a value counts until the next.
+
+    Returns:
+        (n,).
+    """
+    from scipy.interpolate import CubicSpline
+
+    if held:
+        return values[np.clip(np.searchsorted(time, grid + 1e-9, side="right") - 1, 0, len(values) - 1)]
+    after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
+    in_gap = time[after] - time[after - 1] > gap
+    spline = CubicSpline(time, values)(grid)
+    return np.where(in_gap, np.interp(grid, time, values), spline)
+
+
+def sampled_where_known(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """A reference at the samples' times; NaN before, after and in its gaps.
+
+    Args:
+        grid: The samples' times, (n,) [s].
+        time: Its own times, growing, (m,) [s].
+        values: (m,), NaN where it is missing.
+
+    Returns:
+        (n,).
+    """
+    known = np.isfinite(values)
+    time, values = time[known], values[known]
+    if len(time) < FEWEST:
+        return np.full(len(grid), np.nan)
+    gap = A_GAP * float(np.median(np.diff(time)))
+    slack = 1e-6 * gap
+    inside = (grid >= time[0] - slack) & (grid <= time[-1] + slack)
+    after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
+    near = np.minimum(np.abs(grid - time[after - 1]), np.abs(time[after] - grid)) <= slack
+    sampled = resample(np.clip(grid, time[0], time[-1]), time, values, gap)
+    return np.where(inside & ((time[after] - time[after - 1] <= gap) | near), sampled, np.nan)
+
+
+def _bridge(grid: np.ndarray, time: np.ndarray, values: np.ndarray, held: bool) -> np.ndarray:
+    return resample(grid, time, values, 0.0, held) if held else np.interp(grid, time, values)
+
+
+def _round(period: float) -> float:
+    """The period of a rate that is a round number, if this is one to the stamps' accuracy."""
+    rate = float(f"{1.0 / period:.6g}")
+    return 1.0 / rate if abs(period * rate - 1.0) < 1e-9 else period
+
+
+def _resolution(time: np.ndarray) -> float:
+    """The largest of 1, 0.1, 0.01 ... s that all stamps are multiples of, from the first [s]; 0 if none is."""
+    for power in range(0, 8):
+        counts = (time - time[0]) * 10.0**power
+        if np.abs(counts - np.rint(counts)).max() < 1e-3:
+            return 10.0**-power
+    return 0.0
+
+
+def _is_even(time: np.ndarray, period: float, resolution: float) -> bool:
+    """Whether the rows are on an even grid, as far as stamps of this resolution tell."""
+    if len(time) < 3:
+        return True
+    places = np.rint((time - time[0]) / period)
+    slack = max(EVEN * period, 0.75 * resolution if resolution < period else 0.0)
+    if np.ptp(np.diff(time)) < EVEN * period:
+        return True
+    order = np.arange(len(time)) if np.diff(time).max() < A_GAP * period else places
+    fit = np.polynomial.polynomial.polyfit(order, time - time[0], 1)
+    off = time - time[0] - (fit[0] + fit[1] * order)
+    return bool(np.abs(off).max() <= slack and abs(fit[1] / period - 1.0) < 1e-3)
+
+
+def _missing(present: np.ndarray, time: np.ndarray, measured: Mapping[str, np.ndarray]) -> str:
+    """Rows that lack something, in words."""
+    lacks = {name: int((~np.isfinite(values)).sum()) for name, values in measured.items()}
+    lacks["time"] = int((~np.isfinite(time)).sum())
+    named = ", ".join(f"{name} in {count:,}" for name, count in lacks.items() if count)
+    missing = np.flatnonzero(~present)
+    edges = np.flatnonzero(np.diff(missing) > 1)
+    runs = np.diff(np.concatenate([[0], edges + 1, [len(missing)]]))
+    return (
+        f"{_rows(len(missing))} of {len(present):,} without a number ({named}) left out: the first is row "
+        f"{missing[0] + 1}, the longest run {_rows(int(runs.max()))}"
+    )
+
+
+def _gaps(what: str, time: np.ndarray, steps: np.ndarray, which: np.ndarray, period: float) -> str:
+    """Gaps in words."""
+    longest = int(np.argmax(np.where(which, steps, 0.0)))
+    count = int(which.sum())
+    return (
+        f"{count:,} gap{'' if count == 1 else 's'} {what}; the longest is {steps[longest] * 1e3:.4g} ms "
+        f"at {time[longest]:.6g} s"
+    )
+
+
+def _rows(count: int) -> str:
+    return f"{count:,} row{'' if count == 1 else 's'}"

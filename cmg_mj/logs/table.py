@@ -1,0 +1,247 @@
+"""A CSV or Parquet file -> some of its columns as numbers. What cannot be read is said in one line."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cmg_mj.errors import InputError, nearest, shown
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+MOST_ROWS = 5_000_000
+"""More take hours and gigabytes."""
+DELIMITERS = (",", ";", "\t", "|")
+HEAD = 1 << 16
+"""So much of a CSV is looked at for its heading, which must end in it [bytes]."""
+MISSING = [
+    "",
+    "nan",
+    "NaN",
+    "NAN",
+    "-nan",
+    "NA",
+    "N/A",
+    "#N/A",
+    "null",
+    "NULL",
+    "None",
+    "none",
+    "inf",
+    "-inf",
+    "Inf",
+    "-Inf",
+]
+"""What stands for no number."""
+COMMENTS = ("#", "%", "//")
+
+
+def read_table(path: Path, wanted: Sequence[str], time: str | None) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Read columns of a log.
+
+    Args:
+        path: A CSV (with a heading) or a Parquet file.
+        wanted: Headings of the columns.
+        time: The heading among them that may also hold dates, which become seconds from the first.
+
+    Returns:
+        Heading -> numbers, (n_rows,), NaN where there is none; and what was done that nobody has asked for.
+
+    Raises:
+        InputError: It cannot be read, lacks a column, or has text among the numbers.
+    """
+    try:
+        if not path.is_file():
+            what = "no file" if path.exists() else "no such file"
+            raise InputError(f"{path}: {what}; name a CSV or Parquet file, or the folder of a run")
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:  # such as a name with a zero byte
+        raise InputError(f"{str(path)!r}: cannot be read: {error}") from error
+    if not head.strip():
+        raise InputError(f"{path}: empty")
+    notes: list[str] = []
+    columns = _of_parquet(path, wanted, time) if head[:4] == b"PAR1" else _of_csv(path, head, wanted, time, notes)
+    if not len(next(iter(columns.values()))):
+        raise InputError(f"{path}: has a heading and no row")
+    return columns, notes
+
+
+def _of_parquet(path: Path, wanted: Sequence[str], time: str | None) -> dict[str, np.ndarray]:
+    import pyarrow.parquet as pq
+
+    with _arrows_complaints(path), path.open("rb") as source:
+        file = pq.ParquetFile(source)
+        _check_columns(path, wanted, file.schema_arrow.names)
+        if file.metadata.num_rows > MOST_ROWS:
+            raise _too_long(path, file.metadata.num_rows)
+        table = file.read(columns=list(dict.fromkeys(wanted)))
+    return {name: _numbers(path, name, table[name], dates=name == time) for name in wanted}
+
+
+def _of_csv(
+    path: Path, head: bytes, wanted: Sequence[str], time: str | None, notes: list[str]
+) -> dict[str, np.ndarray]:
+    import pyarrow as pa
+    import pyarrow.csv as pacsv
+
+    encoding, skipped, line = _heading(path, head)
+    delimiter = max(DELIMITERS, key=line.count)
+    comma = delimiter == ";" and "," in line + head.decode(encoding, "replace")
+    read = pacsv.ReadOptions(skip_rows=skipped, encoding=encoding, use_threads=False)
+    torn: list[str] = []
+
+    def leave_out(row: Any) -> str:
+        torn.append(f"{row.actual_columns} cells instead of {row.expected_columns}: {shown(row.text)}")
+        return "skip"
+
+    parse = pacsv.ParseOptions(delimiter=delimiter, invalid_row_handler=leave_out)
+
+    def convert(kind: Any) -> pacsv.ConvertOptions:
+        return pacsv.ConvertOptions(
+            include_columns=list(dict.fromkeys(wanted)),
+            column_types=dict.fromkeys(wanted, kind),
+            null_values=MISSING,
+            strings_can_be_null=True,
+            decimal_point="," if comma else ".",
+        )
+
+    with _arrows_complaints(path):
+        with path.open("rb") as file:
+            names = pacsv.open_csv(file, read, parse).schema.names
+        _check_columns(path, wanted, [name.strip() for name in names])
+        spelled = {name.strip(): name for name in names}
+        wanted = [spelled[name.strip()] for name in wanted]
+        time = spelled.get(time.strip()) if time else None
+        try:
+            torn.clear()
+            table = _batches(path, pacsv, read, parse, convert(pa.float64()))
+        except pa.ArrowInvalid as error:
+            if "onversion error" not in str(error):
+                raise
+            torn.clear()
+            table = _batches(path, pacsv, read, parse, convert(pa.string()))
+    if torn:
+        lines = "line has" if len(torn) == 1 else "lines have"
+        notes.append(f"{len(torn)} {lines} another number of cells and were left out; the first, {torn[0]}")
+    return {name.strip(): _numbers(path, name, table[name], dates=name == time, comma=comma) for name in wanted}
+
+
+def _batches(path: Path, pacsv: Any, read: Any, parse: Any, convert: Any) -> pa.Table:
+    """All batches of a CSV, as long as it is not too long."""
+    import pyarrow as pa
+
+    rows, batches = 0, []
+    with path.open("rb") as file, pacsv.open_csv(file, read, parse, convert) as reader:
+        for batch in reader:
+            rows += len(batch)
+            if rows > MOST_ROWS:
+                raise _too_long(path, None)
+            batches.append(batch)
+        return pa.Table.from_batches(batches, reader.schema)
+
+
+def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
+    """The encoding, how many lines stand above the heading (comments, empty ones), and the heading."""
+    encoding = "utf-8"
+    for mark, name in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
+        if head.startswith(mark):
+            encoding = name
+    if encoding == "utf-8":
+        if b"\0" in head:
+            raise InputError(f"{path}: neither CSV nor Parquet")
+        try:
+            head[: head.rfind(b"\n") + 1].decode("utf-8")
+        except UnicodeDecodeError:
+            encoding = "latin-1"
+    lines = head.decode(encoding, "ignore").lstrip("\ufeff").splitlines()
+    for i, line in enumerate(lines):
+        if line.strip() and not line.lstrip().startswith(COMMENTS):
+            return encoding, i, line
+    raise InputError(f"{path}: no heading in its first {HEAD // 1024} kB")
+
+
+def _check_columns(path: Path, wanted: Sequence[str], names: Sequence[str]) -> None:
+    for name in wanted:
+        if name.strip() not in [known.strip() for known in names]:
+            few = [shown(known) for known in names]
+            raise InputError(f"{path}: has no column {name!r}; {nearest(name, few, 'it has')}"[:600])
+        if list(names).count(name) > 1:
+            raise InputError(f"{path}: has the column {name!r} {list(names).count(name)} times: rename all but one")
+
+
+def _numbers(path: Path, name: str, column: Any, *, dates: bool, comma: bool = False) -> np.ndarray:
+    """A column as floats."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    kind = column.type
+    if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
+        if not dates:
+            raise InputError(f"{path}: column {name!r} holds times, not numbers")
+        return _seconds(column)
+    if (
+        pa.types.is_boolean(kind)
+        or pa.types.is_integer(kind)
+        or pa.types.is_floating(kind)
+        or pa.types.is_decimal(kind)
+    ):
+        values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False).astype(float)
+        return np.where(np.isfinite(values), values, np.nan)
+    if pa.types.is_null(kind):
+        raise InputError(f"{path}: column {name!r} has no number at all")
+    if not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
+        raise InputError(f"{path}: column {name!r} holds {kind}, not numbers")
+    text = pc.call_function("utf8_trim_whitespace", [column])
+    if dates:
+        try:
+            return _seconds(text.cast(pa.timestamp("ns")))
+        except pa.ArrowInvalid:
+            pass  # numbers, or neither
+    values = np.empty(len(text))
+    for i, cell in enumerate(text.to_pylist()):
+        try:
+            values[i] = np.nan if cell is None or cell in MISSING else float(cell.replace(",", ".") if comma else cell)
+        except ValueError:
+            wanted = "a number or a date" if dates else "a number"
+            raise InputError(f"{path}: row {i + 1}, column {name!r}: {shown(cell)} is not {wanted}") from None
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _seconds(column: Any) -> np.ndarray:
+    """Dates, or spans of time, as seconds from the first; whole nanoseconds are subtracted before they are floats."""
+    import pyarrow as pa
+
+    kind = pa.duration("ns") if pa.types.is_duration(column.type) else pa.timestamp("ns")
+    if pa.types.is_timestamp(column.type) and column.type.tz:
+        column = column.cast(pa.timestamp(column.type.unit))
+    column = column.cast(kind).combine_chunks()
+    known = np.asarray(column.is_valid())
+    counts = column.cast(pa.int64()).fill_null(0).to_numpy(zero_copy_only=False)
+    start = counts[known][0] if known.any() else 0
+    return np.where(known, (counts - start) * 1e-9, np.nan)
+
+
+def _too_long(path: Path, rows: int | None) -> InputError:
+    has = "more" if rows is None else f"{rows:,} rows, more"
+    return InputError(f"{path}: {has} than {MOST_ROWS:,} rows: cut out a part of it")
+
+
+@contextmanager
+def _arrows_complaints(path: Path) -> Iterator[None]:
+    """What Arrow finds wrong with a file, in one line."""
+    import pyarrow as pa
+
+    try:
+        yield
+    except (pa.ArrowException, OSError, UnicodeError, OverflowError) as error:
+        text = " ".join(str(getattr(error, "strerror", None) or error).split())
+        raise InputError(f"{os.fspath(path)}: cannot be read: {text[:200]}") from error
