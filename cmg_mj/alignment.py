@@ -11,7 +11,7 @@ import numpy as np
 LONGEST_LAG_S = 0.5
 """Lags are looked for up to this, and no farther than a quarter of what there is [s]."""
 AS_GOOD = 0.995
-"""Of a periodic motion every period fits: of the peaks this close to the highest, the one nearest to no lag is it."""
+"""A periodic motion fits itself every period: of peaks this close to the highest, the one nearest to no lag counts."""
 SPAN_S = 0.2
 """A reference's size is taken from how far it says the tilt has come in so long [s]."""
 
@@ -21,8 +21,8 @@ def lag(
 ) -> float | None:
     """How long one signal comes after another: the peak of their correlation coefficient, between the samples too.
 
-    For every whole number of samples the coefficient is that of all pairs there are; a quintic spline through these has its peak
-    where a pure delay is, whatever the signals' sizes.
+    For every whole number of samples the coefficient is that of all pairs there are; a quintic spline through these has
+    its peak where a pure delay is, whatever the signals' sizes.
 
     Args:
         behind: Its pieces, each (n,); NaN where it is not known.

@@ -14,6 +14,7 @@ from rich.text import Text
 from cmg_mj import markdown
 from cmg_mj.alignment import Alignment
 from cmg_mj.intervals import known_interval
+from cmg_mj.legible import best
 from cmg_mj.log_replay import Replayed, described
 from cmg_mj.log_scores import RECONSTRUCTED_S
 from cmg_mj.references import ZERO
@@ -35,6 +36,11 @@ OFF = 0.05
 """A reference whose size differs by more from what the tilt shows is worth a word."""
 LATE = 0.1
 """So is one that is late by more than this much of a sample."""
+
+
+def shown_first(replayed: Replayed) -> list[str]:
+    """The few observers that can be followed over each other: with a reference the best, else the first."""
+    return best({name: replayed.summaries[name] for name in replayed.estimates})
 
 
 def figures_of(replays: Sequence[Replayed]) -> dict[str, Any]:
@@ -204,11 +210,11 @@ def note(replays: Sequence[Replayed]) -> str:
         lines.append("Fit: 1 - RMS error / RMS of the reference; 1 is the reference, 0 an estimate of zero.")
         lines.append("Lag: how long an estimate comes after the reference, by the peak of their correlation.")
     if "reconstruction_rms_deg" in keys:
-        lines.append(
-            "No reference: reconstruction error is that of the tilt integrated from the rate, "
-            f"{RECONSTRUCTED_S:g} s at a time, against\nthe measured one; roughness the white noise whose second differences are as large. "
-            "Neither is an error of the rate."
-        )
+        lines += [
+            f"No reference. Reconstruction error: the tilt integrated from the rate, {RECONSTRUCTED_S:g} s at a time,",
+            "against the measured one. Roughness: the white noise whose second differences are as large. Neither",
+            "is an error of the rate.",
+        ]
     size = f"{math.degrees(first.noise.tilt):.3g} deg"
     more = " and the acceleration's beside it" if "acceleration" in first.log.has else ""
     lines.append(f"Noise gain: what white noise of {size} in the tilt{more} makes of the rate, by that size.")

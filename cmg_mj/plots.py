@@ -162,7 +162,7 @@ def _draw_tilt(axes: Any, trajectory: Trajectory, band: float) -> None:
     axes.plot(t, true, color=INK, linewidth=1.3, label="true $x_1$ (from equilibrium)")
     _draw_bounds(axes, band, "settle band")
     axes.set_ylabel("tilt [deg]")
-    _fit(axes, [true], [measured, np.array([band, -band])])
+    fit(axes, [true], [measured, np.array([band, -band])])
 
 
 def _draw_estimates(
@@ -191,8 +191,8 @@ def _draw_estimates(
         )
     rates.set_ylabel("tilt rate\n[rad/s]")
     errors.set_ylabel("error $\\hat x_2 - x_2$\n[rad/s]")
-    _fit(errors, [true], [estimate - true for estimate in estimates.values()])
-    return _fit(rates, [true], [*estimates.values()])
+    fit(errors, [true], [estimate - true for estimate in estimates.values()])
+    return fit(rates, [true], [*estimates.values()])
 
 
 def _draw_small(
@@ -214,7 +214,7 @@ def _draw_actuators(gimbal: Any, command: Any, trajectory: Trajectory, limit: fl
     command.step(t, u, where="post", color=INK, linewidth=0.6, label="command $u$")
     _draw_bounds(command, limit, "rate limit")
     command.set_ylabel("gimbal rate\n[rad/s]")
-    _fit(command, [u], [np.array([limit, -limit])])
+    fit(command, [u], [np.array([limit, -limit])])
 
 
 def _draw_bounds(axes: Any, bound: float, label: str) -> None:
@@ -222,7 +222,7 @@ def _draw_bounds(axes: Any, bound: float, label: str) -> None:
         axes.axhline(value, color="0.5", linewidth=0.8, linestyle="--", label=named)
 
 
-def _fit(axes: Any, sure: Sequence[np.ndarray], rather: Sequence[np.ndarray]) -> tuple[float, float] | None:
+def fit(axes: Any, sure: Sequence[np.ndarray], rather: Sequence[np.ndarray]) -> tuple[float, float] | None:
     """Give an axis the range in which these can be read."""
     found = axis_range(sure, rather)
     if found is not None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from cmg_mj.cli import boards, scenarios, studies
+from cmg_mj.cli import boards, logs, scenarios, studies
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, say
 from cmg_mj.errors import InputError, RunStopped
 
@@ -74,6 +74,7 @@ for command in (
     studies.bench,
     studies.reproduce,
     studies.tune,
+    logs.replay,
     boards.export,
 ):
     cli.add_command(command)

@@ -26,9 +26,9 @@ ROLES: dict[str, Quantity] = {
 }
 """What a column can be.
 
-`tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them, `acceleration`
-the angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright position (or `gimbal1`
-and `gimbal2`, whose half difference it is), `command` their rate, `rate` the reference.
+`tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them,
+`acceleration` the angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright
+place (or `gimbal1` and `gimbal2`, whose half difference it is), `command` their rate, `rate` the reference.
 """
 
 ACCELEROMETERS = ("inner_x", "inner_z", "outer_x", "outer_z")

@@ -20,6 +20,7 @@ from cmg_mj.trajectory import Trajectory
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
+SAY_COLUMNS = "say which columns are what, --columns tilt=HEADING,rate=HEADING,..."
 A_TURN = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is an angle that starts again, not a motion [rad]."""
 
@@ -75,6 +76,12 @@ class Log:
             counted[part.start + math.ceil(skip_s / self.dt - 1e-9) : part.stop] = True
         return counted
 
+    def broken(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Times and values with a NaN between two parts, so that no line is drawn across a gap."""
+        time = [np.append(self["time_s"][part], self["time_s"][part][-1] + self.dt) for part in self.parts]
+        drawn = [np.append(values[part], np.nan) for part in self.parts]
+        return np.concatenate(time)[:-1], np.concatenate(drawn)[:-1]
+
     def cut(self, rows: slice) -> Log:
         """A piece of it."""
         start, stop, _ = rows.indices(len(self))
@@ -101,7 +108,7 @@ def read_log(
 
     Args:
         path: A CSV with a heading, a Parquet file, or a run's folder or `trajectory.parquet`, whose columns are known.
-        columns: Role -> heading, such as `{"tilt": "pitch_deg", "rate": "gyro_dps"}`; `logs.columns.ROLES` are the roles.
+        columns: Role -> heading, such as `{"tilt": "pitch_deg", "rate": "gyro_dps"}`; the roles: `ROLES`.
         units: Role -> unit, for headings that do not end in theirs.
         scale: Role -> factor.
         offset: Role -> what is added after that, in the column's unit.
@@ -283,21 +290,22 @@ def _of_trajectory(path: Path) -> Log:
     if not path.is_file() or _begins(path) != b"PAR1":
         if not path.exists():
             raise InputError(f"{path}: no such file; name a CSV or Parquet file, or the folder of a run")
-        raise InputError(f"{path}: say which columns are what, --columns tilt=HEADING,rate=HEADING,...")
+        raise InputError(f"{path}: {SAY_COLUMNS}")
     try:
         trajectory = Trajectory.load(path)
     except InputError as error:
         if "not a trajectory written by" in str(error):
-            raise InputError(f"{path}: say which columns are what, --columns tilt=HEADING,rate=HEADING,...") from error
+            raise InputError(f"{path}: {SAY_COLUMNS}") from error
         raise
     scenario = trajectory.metadata.get("scenario")
+    if scenario is None:  # signals.parquet of a replay
+        raise InputError(f"{path}: {SAY_COLUMNS}")
     try:
-        assert scenario is not None
         rate = float(scenario["controller"]["rate_hz"])
         pushes = [Push(**push) for push in scenario.get("push", ())]
         columns = {name: trajectory[name] for name in ("time_s", "y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2")}
         columns[REFERENCE] = trajectory["x2_rad_s"]
-    except (AssertionError, LookupError, TypeError, ValueError) as error:
+    except (LookupError, TypeError, ValueError) as error:
         raise InputError(
             f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario again"
         ) from error

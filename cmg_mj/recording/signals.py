@@ -60,22 +60,33 @@ class Series:
     observer: str = ""
 
 
-@dataclass(frozen=True)
-class Branch:
-    """A run and its place in the recording.
+@dataclass(frozen=True, kw_only=True)
+class Lines:
+    """Time series and their place in the recording.
 
     Attributes:
-        path: Where everything of the run is found.
-        label: The run's name, shortened.
-        run: The run.
-        series: Its time series by their path below the branch.
-        rig: Where the rig is.
+        path: Where everything of them is found.
+        label: Of what they are, shortened.
+        series: By their path below the branch.
+        timeline: What their time is called.
     """
 
     path: str
     label: str
-    run: Run
     series: dict[str, Series]
+    timeline: str = TIMELINE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Branch(Lines):
+    """A run and its place in the recording.
+
+    Attributes:
+        run: The run.
+        rig: Where the rig is.
+    """
+
+    run: Run
     rig: Ball
 
 
@@ -149,12 +160,12 @@ def _estimates(run: Run, part: str, name: str, label: str, color: Colour) -> lis
     return rows
 
 
-def log_series(rec: rr.RecordingStream, branch: Branch) -> None:
-    """Record the time series of a run, a column each.
+def log_series(rec: rr.RecordingStream, branch: Lines) -> None:
+    """Record time series, a column each.
 
     Args:
         rec: The recording.
-        branch: The run.
+        branch: What they are of.
     """
     for row in branch.series.values():
         path = f"{branch.path}/{row.path}"
@@ -162,7 +173,7 @@ def log_series(rec: rr.RecordingStream, branch: Branch) -> None:
         style = rr.SeriesLines(colors=[row.color] * n, widths=[row.width] * n, names=[row.name] * n)
         rec.log(path, style, static=True)
         if len(row.time):
-            rec.send_columns(path, [column(row.time)], rr.Scalars.columns(scalars=row.values))
+            rec.send_columns(path, [column(row.time, branch.timeline)], rr.Scalars.columns(scalars=row.values))
 
 
 def log_phases(

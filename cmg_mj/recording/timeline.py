@@ -1,4 +1,4 @@
-"""The recording's only timeline."""
+"""A recording's only timeline."""
 
 from __future__ import annotations
 
@@ -14,6 +14,6 @@ def instant(seconds: float) -> np.timedelta64:
     return np.timedelta64(round(seconds * 1e9), "ns")
 
 
-def column(seconds: np.ndarray) -> rr.TimeColumn:
+def column(seconds: np.ndarray, timeline: str = TIMELINE) -> rr.TimeColumn:
     """Moments, (n,) [s], as a column."""
-    return rr.TimeColumn(TIMELINE, duration=np.rint(seconds * 1e9).astype("timedelta64[ns]"))
+    return rr.TimeColumn(timeline, duration=np.rint(seconds * 1e9).astype("timedelta64[ns]"))

@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from cmg_mj.colours import colours
 from cmg_mj.legible import axis_range, free_corner
 from cmg_mj.recording.run import ENDINGS
-from cmg_mj.recording.signals import Branch, Series
+from cmg_mj.recording.signals import Branch, Lines, Series
 
 RATE, RATE_ERROR = "rate/true", "rate_error/"
 """An error is drawn to the scale of the rate: it must not look small because its axis is large."""
@@ -63,12 +63,12 @@ EYE = (1.48, -1.65, 0.63)
 BACKGROUND = (58, 63, 71)
 
 
-def plot(what: Plot, branch: Branch, observers: Choice) -> rrb.View:
-    """A plot of one run.
+def plot(what: Plot, branch: Lines, observers: Choice) -> rrb.View:
+    """A plot of one run, or one log.
 
     Args:
         what: The plot.
-        branch: The run.
+        branch: The run or log.
         observers: The others are there, but switched off.
 
     Returns:

@@ -178,7 +178,9 @@ def write_text(path: Path, text: str) -> None:
     path.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
 
 
-def unused_folder(parent: Path, name: str, names: Iterable[str], scenario_toml: str) -> RunFolder:
+def unused_folder(
+    parent: Path, name: str, names: Iterable[str], asked_toml: str, asked: str = "scenario.toml"
+) -> RunFolder:
     """Claim a folder that no other run has written: the name itself, or with a number behind it.
 
     The same run again goes to the same folder.
@@ -187,7 +189,8 @@ def unused_folder(parent: Path, name: str, names: Iterable[str], scenario_toml: 
         parent: Where the folders are.
         name: The name wanted.
         names: What will be written.
-        scenario_toml: The scenario.toml that will be.
+        asked_toml: What is asked for, as the folder will say it.
+        asked: The file that says it.
 
     Returns:
         The folder.
@@ -197,7 +200,7 @@ def unused_folder(parent: Path, name: str, names: Iterable[str], scenario_toml: 
     """
     for number in itertools.count(1):
         folder = parent / (name if number == 1 else f"{name}-{number}")
-        if not os.path.lexists(folder) or _is_unused(folder) or _is_of(folder, scenario_toml):
+        if not os.path.lexists(folder) or _is_unused(folder) or _is_of(folder / asked, asked_toml):
             with suppress(Taken):
                 return RunFolder(folder, names)
     raise AssertionError("count() does not end")
@@ -208,10 +211,9 @@ def _is_unused(folder: Path) -> bool:
     return folder.is_dir() and all(path.name == HIDDEN for path in folder.iterdir())
 
 
-def _is_of(folder: Path, scenario_toml: str) -> bool:
-    """Whether cmg_mj has written the result of this scenario there."""
-    path = folder / "scenario.toml"
+def _is_of(path: Path, asked_toml: str) -> bool:
+    """Whether cmg_mj has written the result of what this file asks for there."""
     try:
-        return Manifest.read(folder).has(path) and path.read_text(encoding="utf-8") == scenario_toml
+        return Manifest.read(path.parent).has(path) and path.read_text(encoding="utf-8") == asked_toml
     except (OSError, ValueError):
         return False

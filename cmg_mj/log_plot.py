@@ -1,0 +1,132 @@
+"""A replay drawn: the tilt, what the observers say of its rate, how far off that is, its liveliest seconds close by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.colours import colours, hexadecimal
+from cmg_mj.legible import shortened
+from cmg_mj.log_replay import Replayed, described
+from cmg_mj.log_report import shown_first, written
+from cmg_mj.logs.log import REFERENCE
+from cmg_mj.plots import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_COLUMNS, SMALL_HEIGHT, fit, pyplot
+from cmg_mj.trajectory import whole_file
+
+CLOSE_S = 2.0
+"""So much is drawn close by [s]."""
+
+
+def close_by(replayed: Replayed) -> tuple[float, float]:
+    """Where the tilt accelerates most: so many seconds around the middle of that [s]."""
+    log = replayed.log
+    length = max(2, round(CLOSE_S / log.dt))
+    liveliest, where = -1.0, (log["time_s"][0], log["time_s"][-1])
+    for part in log.parts:
+        time, tilt = log["time_s"][part], log["y1_rad"][part]
+        rise = max(1, length // 20)
+        bend = np.zeros(len(tilt))
+        bend[rise:-rise] = (tilt[2 * rise :] - 2.0 * tilt[rise:-rise] + tilt[: -2 * rise]) ** 2
+        sums = np.concatenate([[0.0], np.cumsum(bend)])
+        n = min(length, len(tilt))
+        lively = sums[n:] - sums[:-n]
+        at = int(np.argmax(lively))
+        if lively[at] > liveliest:
+            liveliest = float(lively[at])
+            middle = np.average(np.arange(n), weights=bend[at : at + n] + 1e-300)
+            at = int(np.clip(at + middle - n / 2.0, 0, len(time) - n))
+            where = float(time[at]), float(time[at + n - 1])
+    return where
+
+
+def plot_replay(path: Path, replayed: Replayed) -> None:
+    """Draw one log on a page.
+
+    Args:
+        path: The PNG to write.
+        replayed: What the observers made of it.
+    """
+    plt = pyplot()
+    log, names = replayed.log, list(replayed.estimates)
+    few, referred = shown_first(replayed), "reference" in log.has
+    others = [name for name in names if name not in few]
+    palette = {name: hexadecimal(rgb) for name, rgb in colours(names).items()}
+    labels = shortened(names)
+    small = [others[i : i + SMALL_COLUMNS] for i in range(0, len(others), SMALL_COLUMNS)]
+    tall = 4 if referred else 3
+    heights = [PANEL_HEIGHT] * tall + [SMALL_HEIGHT] * len(small)
+    figure = plt.figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
+    grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
+    panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
+    start, end = close_by(replayed)
+    _line(panels[0], replayed, np.degrees(log["y1_rad"]), color=MEASURED, linewidth=0.8, label="measured")
+    panels[0].set_ylabel("tilt [deg]")
+    rates = None
+    for axes in (panels[1], panels[-1]):
+        if referred:
+            _line(axes, replayed, log[REFERENCE], color=INK, linewidth=1.6, label="reference")
+        for name in few:
+            rate = replayed.estimates[name]["x2_rad_s"]
+            _line(axes, replayed, rate, color=palette[name], linewidth=0.8, label=labels[name].lstrip("_"))
+        axes.set_ylabel("tilt rate\n[rad/s]")
+        estimates = [replayed.estimates[name]["x2_rad_s"] for name in few]
+        rates = fit(axes, [log[REFERENCE]] if referred else [], estimates)
+    if referred:
+        panels[2].plot([], [], " ", label="RMS:")
+        for name in few:
+            text = f"{labels[name].lstrip('_')} {_rms(replayed.summaries[name])}"
+            error = replayed.estimates[name]["x2_rad_s"] - log[REFERENCE]
+            _line(panels[2], replayed, error, color=palette[name], linewidth=0.6, label=text)
+        panels[2].set_ylabel("estimate less\nreference [rad/s]")
+        fit(panels[2], [log[REFERENCE]], [replayed.estimates[n]["x2_rad_s"] - log[REFERENCE] for n in few])
+    panels[-1].set_xlim(start, end)
+    for axes in panels[:-1]:
+        axes.axvspan(start, end, color="0.5", alpha=0.15, linewidth=0, zorder=0)
+        axes.set_xlim(log["time_s"][0], log["time_s"][-1])
+    for i, row in enumerate(small, tall):
+        for j, name in enumerate(row):
+            axes = figure.add_subplot(grid[i, j])
+            _draw_small(axes, replayed, name, labels[name], palette[name], rates, (start, end))
+            axes.tick_params(labelleft=j == 0, labelsize="small")
+    for axes in panels:
+        axes.grid(alpha=0.3)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
+    panels[-1].set_xlabel(f"time [s], {CLOSE_S:g} s close by" if end - start < log.duration_s else "time [s]")
+    figure.align_ylabels(panels)
+    figure.suptitle(described(log), x=0.01, ha="left", parse_math=False)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=110, format="png")
+    plt.close(figure)
+
+
+def _line(axes: Any, replayed: Replayed, values: np.ndarray, **style: Any) -> None:
+    axes.plot(*replayed.log.broken(values), **style)
+
+
+def _draw_small(
+    axes: Any,
+    replayed: Replayed,
+    name: str,
+    label: str,
+    color: str,
+    rates: tuple[float, float] | None,
+    close: tuple[float, float],
+) -> None:
+    """Another observer, close by, on the axis of the few."""
+    _line(axes, replayed, replayed.estimates[name]["x2_rad_s"], color=color, linewidth=0.7)
+    if "reference" in replayed.log.has:
+        _line(axes, replayed, replayed.log[REFERENCE], color=INK, linewidth=0.8)
+    text = f"{label} {_rms(replayed.summaries[name])}".strip()
+    axes.set_title(text, loc="left", fontsize="small", parse_math=False, pad=2.0)
+    axes.set_xlim(*close)
+    axes.grid(alpha=0.3)
+    if rates is not None:
+        axes.set_ylim(*rates)
+
+
+def _rms(figures: Mapping[str, Any]) -> str:
+    key = "velocity_rms_error_rad_s"
+    return written(key, figures[key]) if figures.get(key) is not None else ""
