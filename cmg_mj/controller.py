@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, NoReturn
+from typing import Any, Literal, NamedTuple, NoReturn, Protocol
 
 import numpy as np
 
@@ -23,7 +23,7 @@ Feedback = Literal["observer", "fog", "truth"]
 Angles = Literal["measured", "estimated"]
 
 
-CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s"})
+CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s", "processor"})
 """Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
 
 
@@ -67,6 +67,39 @@ class Tick(NamedTuple):
     x_e: Scalar
     estimates: Sequence[Sequence[Scalar]]
     """The observer's estimate (x1, x2, x3, its extra signals), then those of the companions."""
+
+
+class Decision(NamedTuple):
+    """What a processor has decided."""
+
+    u: float
+    """Gimbal rate [rad/s]."""
+    x_e: float
+    """The integrator that went into it [rad s]."""
+    estimate: Sequence[float]
+    """The observer's: x1, x2, x3, its extra signals."""
+
+
+class Processor(Protocol):
+    """What takes the control decision in the controller's place, such as a board that runs all of it in C."""
+
+    def start(self) -> None:
+        """The next update is the first."""
+
+    def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
+        """One control period, from what the sensors show.
+
+        Args:
+            accelerations: Inner x, z, outer x, z [m/s^2].
+            encoders: The gimbals' angles [rad].
+
+        Returns:
+            The decision.
+
+        Raises:
+            RunStopped: There is none.
+        """
+        ...
 
 
 def read_only(*arrays: np.ndarray) -> None:
@@ -129,6 +162,19 @@ class _Lost:
         return None, _estimate((math.nan + 0.0 * y[0],) * self.width)
 
 
+class _Elsewhere:
+    """The observer that a processor runs: what it estimates has just been decided."""
+
+    def __init__(self) -> None:
+        self.estimate: Sequence[float] = ()
+
+    def init(self, y: Measurement) -> None:
+        return None
+
+    def step(self, state: None, y: Measurement, u: Scalar) -> tuple[None, Any]:
+        return None, _estimate(self.estimate)
+
+
 class Controller:
     """Runs the sensors, the observer and the law, tick after tick.
 
@@ -149,6 +195,8 @@ class Controller:
         companions: Observers that ride along open loop, by name.
         trim_s: For so long from the start, the integrator is held at the value that the observer's bias estimate asks
             for, k_e1/k_e4 e, instead of finding it by integration [s].
+        processor: What runs observer and law in their place, if anything does (one world only). It gets what the
+            sensors show; `observer` and `law` say here what it runs.
 
     Attributes:
         extra_signals: Names of what the observer, then each companion, estimates beyond x.
@@ -176,6 +224,7 @@ class Controller:
         angles: Angles = "measured",
         companions: Mapping[str, Observer] | None = None,
         trim_s: float = 0.0,
+        processor: Processor | None = None,
     ) -> None:
         self.observer = observer
         self.law = law
@@ -189,7 +238,10 @@ class Controller:
         self.feedback: Feedback = feedback
         self.angles: Angles = angles
         self.companions = dict(companions or {})
+        self.processor = processor
         self._single = isinstance(worlds, int)
+        if processor is not None and not (self._single and feedback == "observer"):
+            raise InputError("a processor runs one world, on the observer's rate: no batch, and feedback = 'observer'")
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         self._observers: list[Observer] = []
         self.extra_signals = [_extra_signals(o) for o in (observer, *self.companions.values())]
@@ -203,6 +255,10 @@ class Controller:
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
         self._observers = [self.observer, *self.companions.values()]
+        if self.processor is not None:
+            self._elsewhere = _Elsewhere()
+            self._observers[0] = self._elsewhere
+            self.processor.start()
         self._sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds)
         self._states: list[Any] | None = None
         self._x_e: Scalar = 0.0
@@ -258,11 +314,14 @@ class Controller:
         y = Measurement(y1, y2, acceleration)
         if not self._single:
             read_only(*y, y.acceleration)  # observers share them
+        decision = self._decided_elsewhere(forces, encoders, step)
         if self._states is None:
             self._states = [self._start(observer, y, step) for observer in self._observers]
             zero = 0.0 * y1
             estimates = [_estimate((y1, zero, y2, *[zero] * (width - 3))) for width in self._widths]
             self._x_e = 0.0 * y1
+            if decision:
+                estimates[0] = _estimate(decision.estimate)
         else:
             assert self.tick is not None
             estimates = self._observe(y, self.tick.u, step)
@@ -274,11 +333,26 @@ class Controller:
         x_e = self._x_e
         if step < self.trimmed_until:
             x_e = self.trim_gain * estimates[0][self.trim_part]
-        u, self._x_e = self.law(x1, x2, x3, x_e)
+        u: Scalar
+        if decision:
+            u, x_e, _ = decision
+        else:
+            u, self._x_e = self.law(x1, x2, x3, x_e)
         if not self._single:
             read_only(u)  # observers get it at the next tick, the trajectory later
         self.tick = Tick(y1, y2, acceleration, fog, u, x_e, estimates)
         return self.tick
+
+    def _decided_elsewhere(self, forces: Sequence[float], encoders: Sequence[float], step: int) -> Decision | None:
+        """What the processor makes of what the sensors show; nothing if there is none."""
+        if self.processor is None:
+            return None
+        try:
+            decision = self.processor.update(forces, encoders)
+        except RunStopped as error:
+            raise RunStopped(f"{error}, at t = {step * self.timestep:g} s") from error
+        self._elsewhere.estimate = decision.estimate
+        return decision
 
     def _start(self, observer: Observer, y: Measurement, step: int) -> Any:
         """An observer's first state."""

@@ -1,0 +1,1 @@
+"""The processor in the loop: an exported controller on an emulated Cortex-M7."""

@@ -1,0 +1,45 @@
+"""The programs that build for the board and emulate it, which are Debian's packages and not pip's."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+
+from cmg_mj.errors import InputError
+
+COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
+PACKAGES = {
+    COMPILER: "gcc-arm-none-eabi",
+    SIZE: "binutils-arm-none-eabi",
+    "nano.specs": "libnewlib-arm-none-eabi",
+    EMULATOR: "qemu-system-arm",
+}
+"""What is needed: which of Debian's packages has it."""
+
+
+def missing() -> list[str]:
+    """Debian's packages that are needed and not installed."""
+    return [package for thing, package in PACKAGES.items() if not _is_there(thing)]
+
+
+def require() -> None:
+    """See that all is there.
+
+    Raises:
+        InputError: It is not; the line says what to install.
+    """
+    packages = missing()
+    if packages:
+        raise InputError(
+            f"the emulated board needs {', '.join(packages)}: install with `apt install {' '.join(packages)}`, or what "
+            "your system calls it (a C compiler and newlib for ARM Cortex-M, QEMU for ARM)"
+        )
+
+
+def _is_there(thing: str) -> bool:
+    if not thing.endswith(".specs"):
+        return shutil.which(thing) is not None
+    if shutil.which(COMPILER) is None:
+        return True  # nobody can say; the compiler is missing first
+    told = subprocess.run([COMPILER, f"-print-file-name={thing}"], capture_output=True, text=True, check=False)
+    return told.stdout.strip() != thing  # the whole path where there is such a file
