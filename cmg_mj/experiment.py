@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from cmg_mj.controller import Controller
+from cmg_mj.board import on_a_board
+from cmg_mj.controller import Controller, Processor
 from cmg_mj.design import Design, design
 from cmg_mj.differences import differences
 from cmg_mj.errors import InputError, nearest
@@ -51,11 +52,12 @@ class Experiment:
         """The observer in the loop, then the companions."""
         return [self.scenario.observer.kind, *self.scenario.companion_names()]
 
-    def controller(self, worlds: int | Sequence[int] = 0) -> Controller:
+    def controller(self, worlds: int | Sequence[int] = 0, processor: Processor | None = None) -> Controller:
         """A fresh controller.
 
         Args:
             worlds: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
+            processor: What takes its decisions in its place.
 
         Returns:
             The controller.
@@ -71,11 +73,19 @@ class Experiment:
             angles=settings.angles,
             trim_s=settings.trim_s,
             companions=self.design.companions(),
+            processor=processor,
         )
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
         """Run one world. Options are those of `simulate`."""
+        if driver == "board":
+            with on_a_board(self.controller()) as board:
+                return self.run_on(board, world, **options)
         return self._simulate(self.plant, self.controller(int(world)), driver=driver, **options)
+
+    def run_on(self, processor: Processor, world: int = 0, **options: Any) -> Result:
+        """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
+        return self._simulate(self.plant, self.controller(int(world), processor), **options)
 
     def run_many(
         self,

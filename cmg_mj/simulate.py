@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 A_TURN = 2.0 * math.pi
 """No rig that stood at the last look lies a whole turn farther at the next one: its numbers have gone [rad]."""
 
-Driver = Literal["native", "callback"]
+Driver = Literal["native", "callback", "board"]
+"""Who calls the controller, or is it. `simulate` knows the first two: a board is the controller's processor."""
 
 
 @dataclass

@@ -61,7 +61,9 @@ def build(observer: str, folder: Path, controller: Path | None = None) -> Image:
     source = controller or folder / f"{observer}.c"
     path = folder / f"{observer}-{source.stem}.elf"
     own = [FIRMWARE / name for name in ("startup.c", "mps2.c", "board.c")]
-    command: list[str | Path] = [COMPILER, *FLAGS, f"-DOBSERVER={observer}", "-I", folder, "-I", FIRMWARE]
+    told = [f"-DOBSERVER={observer}"]
+    told += [f"-D{what}={observer.upper()}_{what}" for what in ("ESTIMATES", "ENCODERS")]
+    command: list[str | Path] = [COMPILER, *FLAGS, *told, "-I", folder, "-I", FIRMWARE]
     command += ["-T", FIRMWARE / "mps2.ld", *own, source, "-lm", "-o", path]
     _run(command, observer)
     text, data, *_ = _run([SIZE, path], observer).splitlines()[1].split()

@@ -29,10 +29,11 @@ from cmg_mj.errors import InputError, RunStopped
 @of_a_run
 @click.option(
     "--driver",
-    type=click.Choice(["native", "callback"]),
+    type=click.Choice(["native", "callback", "board"]),
     default="native",
     show_default=True,
-    help="Who calls the controller: the runner, or MuJoCo through its control callback.",
+    help="Who calls the controller: the runner, or MuJoCo through its control callback; or board: it runs as C on an "
+    "emulated Cortex-M7 (docs/board.md).",
 )
 @click.option("--plot", is_flag=True, help="Write plot.png as well.")
 @users_code()
@@ -52,7 +53,8 @@ def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
     say_hints(experiment.hints)
     if scenario.compare:
         say("[compare] is for cmg-mj compare; this is one run")
-    folder = chosen.folder(runs.file_name(scenario.observer.kind), runs.files_of_run(plot=plot), experiment)
+    what = runs.file_name(scenario.observer.kind) + ("-board" if driver == "board" else "")
+    folder = chosen.folder(what, runs.files_of_run(plot=plot), experiment)
     with CtrlC() as ctrl_c:
         with progress(scenario.title or chosen.name, scenario.duration_s, ctrl_c) as on_progress:
             result = experiment.run(driver=driver, on_progress=on_progress)  # type: ignore[arg-type]

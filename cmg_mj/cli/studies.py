@@ -23,13 +23,28 @@ from cmg_mj.errors import InputError, nearest
     metavar="N",
     help="Worlds of the batch.",
 )
+@click.option("--board", is_flag=True, help="Count what an update takes on an emulated Cortex-M7 instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
+@click.option("--markdown", is_flag=True, help="Print the table of --board as Markdown.")
 @users_code()
-def bench(observers: str, worlds: int, as_json: bool) -> None:
-    """Time the closed loop against bare MuJoCo doing the same physics, and an update of each observer."""
+def bench(observers: str, worlds: int, board: bool, as_json: bool, markdown: bool) -> None:
+    """Time the closed loop against bare MuJoCo doing the same physics, and an update of each observer.
+
+    With --board: instructions, stack, memory and flash of an update as C on the papers' processor.
+    """
+    names = names_of(observers)
+    if board:
+        from cmg_mj.board_cost import cost_markdown, cost_table
+        from cmg_mj.board_cost import measure as count
+
+        with progress("Bench on the board", 1.0) as on_progress:
+            figures = count(names, on_progress)
+        show(figures, cost_markdown(figures) if markdown else cost_table(figures), as_json)
+        return
+    if markdown:
+        raise InputError("--markdown: only the table of --board is printed so")
     from cmg_mj.bench import bench_table, measure
 
-    names = names_of(observers)
     with progress("Bench", 1.0) as on_progress:
         figures = measure(names, worlds, on_progress)
     show(figures, bench_table(figures), as_json)

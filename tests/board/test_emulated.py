@@ -32,7 +32,9 @@ def is_running(process: int) -> bool:
 def test_it_answers_what_the_controller_decides(tmp_path: Path) -> None:
     with Board(toy(tmp_path)) as board:
         assert board.sizes == (4, 4, 16, 4)
-        assert [board.update(SHOWN, (k, 0.5)).u for k in range(3)] == [105.0, 206.0, 307.0]
+        answers = [board.update(SHOWN, (k, 0.5)) for k in range(3)]
+        assert [answer.u for answer in answers] == [105.0, 206.0, 307.0]
+        assert [answer.x_e for answer in answers] == [0.0, 0.5, 1.0]
         board.start()
         answer = board.update(SHOWN, (0.0, 0.0))
     assert answer.u == 100.0

@@ -12,10 +12,11 @@ from cmg_mj.board.tools import missing
 needs_board = pytest.mark.skipif(bool(missing()), reason=f"not installed: {', '.join(missing())}")
 
 HEADER = """
-#define toy_ESTIMATES 4
+#define TOY_ESTIMATES 4
+#define TOY_ENCODERS 2
 typedef float toy_real;
 typedef struct { toy_real steps; } toy_state;
-typedef struct { toy_state observer; toy_real integrator; toy_real u; int started; } toy_controller;
+typedef struct { toy_state observer; toy_real x_e; toy_real u; int started; } toy_controller;
 void toy_init(toy_state *state, toy_real y1, toy_real y2, toy_real acceleration);
 void toy_step(toy_state *state, toy_real y1, toy_real y2, toy_real acceleration, toy_real u, toy_real estimate[4]);
 void toy_start(toy_controller *controller);
@@ -41,13 +42,14 @@ void toy_step(toy_state *s, toy_real y1, toy_real y2, toy_real acceleration, toy
 void toy_start(toy_controller *c)
 {
     toy_init(&c->observer, 0, 0, 0);
-    c->integrator = 0;
+    c->x_e = 0;
 }
 
 void toy_update(toy_controller *c, const toy_real a[4], const toy_real e[2], toy_real estimate[4], toy_real *u)
 {
     %(update)s
     toy_step(&c->observer, a[0], a[1], a[2], a[3], estimate);
+    c->x_e += e[1];
     *u = e[0] + 10 * e[1] + 100 * c->observer.steps;
 }
 """

@@ -9,7 +9,7 @@
  *   'i'   -                                                  sizes in bytes: a real, the observer, the controller;
  *                                                            parts of an estimate (4 uint32)
  *   's'   -                                                  - (the controller is at its start)
- *   'u'   inner x, z, outer x, z [m/s^2], 2 encoders [rad]   cost, u [rad/s], the integrator that went
+ *   'u'   inner x, z, outer x, z [m/s^2], encoders [rad]     cost, u [rad/s], the integrator that went
  *                                                            into it [rad s], the estimate
  *   'n'   y1, y2 [rad], acceleration [rad/s^2]               cost (the observer is at its start)
  *   'o'   the same and u [rad/s]                             cost, the estimate
@@ -32,7 +32,7 @@ static uint8_t message[LONGEST];
 static uint8_t answer[LONGEST];
 static uint32_t answered; /* bytes of it */
 
-enum { IT_FITS = 1 / (2 * sizeof(uint32_t) + (2 + ITS(_ESTIMATES)) * sizeof(real) <= LONGEST) };
+enum { IT_FITS = 1 / (2 * sizeof(uint32_t) + (2 + ESTIMATES) * sizeof(real) <= LONGEST) };
 
 /* ---- What a piece of work takes ---- */
 
@@ -101,13 +101,13 @@ EMPTY empty_step(ITS(_state) *s, real y1, real y2, real acceleration, real u, re
 
 static void update(void)
 {
-    const real integrator = controller.integrator;
-    real shown[6], estimate[ITS(_ESTIMATES)], u;
+    const real x_e = controller.x_e;
+    real shown[4 + ENCODERS], estimate[ESTIMATES], u;
 
     memcpy(shown, message, sizeof shown);
     COST(ITS(_update)(&controller, shown, shown + 4, estimate, &u));
     put(&u, sizeof u);
-    put(&integrator, sizeof integrator);
+    put(&x_e, sizeof x_e);
     put(estimate, sizeof estimate);
 }
 
@@ -121,7 +121,7 @@ static void init(void)
 
 static void step(void)
 {
-    real y[4], estimate[ITS(_ESTIMATES)];
+    real y[4], estimate[ESTIMATES];
 
     memcpy(y, message, sizeof y);
     COST(ITS(_step)(&observer, y[0], y[1], y[2], y[3], estimate));
@@ -130,7 +130,7 @@ static void step(void)
 
 static void empty(void)
 {
-    real y[6] = {0}, estimate[ITS(_ESTIMATES)], u;
+    real y[4 + ENCODERS] = {0}, estimate[ESTIMATES], u;
 
     COST(empty_update(&controller, y, y + 4, estimate, &u));
     COST(empty_init(&observer, y[0], y[1], y[2]));
@@ -146,7 +146,7 @@ static void calibrate(void)
 
 static void identify(void)
 {
-    const uint32_t sizes[4] = {sizeof(real), sizeof observer, sizeof controller, ITS(_ESTIMATES)};
+    const uint32_t sizes[4] = {sizeof(real), sizeof observer, sizeof controller, ESTIMATES};
 
     put(sizes, sizeof sizes);
 }
@@ -158,7 +158,7 @@ static int handled(uint8_t kind, uint32_t length)
         identify();
     else if (kind == 's' && length == 0)
         ITS(_start)(&controller);
-    else if (kind == 'u' && length == 6 * sizeof(real))
+    else if (kind == 'u' && length == (4 + ENCODERS) * sizeof(real))
         update();
     else if (kind == 'n' && length == 3 * sizeof(real))
         init();

@@ -6,7 +6,7 @@ void ITS(_init)(ITS(_state) *state, real y1, real y2, real acceleration)
     (void)state, (void)y1, (void)y2, (void)acceleration;
 }
 
-void ITS(_step)(ITS(_state) *state, real y1, real y2, real acceleration, real u, real estimate[ITS(_ESTIMATES)])
+void ITS(_step)(ITS(_state) *state, real y1, real y2, real acceleration, real u, real estimate[ESTIMATES])
 {
     (void)state, (void)y1, (void)y2, (void)acceleration, (void)u, (void)estimate;
 }
@@ -16,8 +16,8 @@ void ITS(_start)(ITS(_controller) *controller)
     (void)controller;
 }
 
-void ITS(_update)(ITS(_controller) *controller, const real accelerations[4], const real encoders[2],
-                  real estimate[ITS(_ESTIMATES)], real *u)
+void ITS(_update)(ITS(_controller) *controller, const real accelerations[4], const real encoders[ENCODERS],
+                  real estimate[ESTIMATES], real *u)
 {
     (void)controller, (void)accelerations, (void)encoders, (void)estimate, (void)u;
 }

@@ -1,5 +1,5 @@
 /* The exported controller under names that do not hang on the observer's: ITS(_update) is linear_update where the compiler
- * is told -DOBSERVER=linear. */
+ * is told -DOBSERVER=linear. It is also told the parts of an estimate, -DESTIMATES=LINEAR_ESTIMATES, and the encoders. */
 #ifndef ITS_H
 #define ITS_H
 
