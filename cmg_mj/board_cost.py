@@ -13,6 +13,7 @@ from cmg_mj.board import Board, Cost
 from cmg_mj.board.image import build, flash_of
 from cmg_mj.board.tools import require
 from cmg_mj.board.with_controller import exported
+from cmg_mj.controller import Controller
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.markdown import table
 from cmg_mj.scenario import load_scenario
@@ -52,14 +53,11 @@ def measure(observers: Sequence[str], on_progress: Callable[[float], None]) -> d
         InputError: What is needed is not installed, or an observer cannot be exported.
     """
     require()
-    experiments = []
-    for name in observers:
-        scenario = load_scenario("push_recovery", [f"duration_s={SECONDS}"], name)
-        experiments.append(prepare(scenario))
+    runs = [prepare(load_scenario("push_recovery", [f"duration_s={SECONDS}"], name)) for name in observers]
     rows = []
-    for i, experiment in enumerate(experiments):
-        rows.append(cost_of(experiment))
-        on_progress((i + 1.0) / len(experiments))
+    for i, run in enumerate(runs):
+        rows.append({"observer": run.scenario.observer.kind} | cost_of(run))
+        on_progress((i + 1.0) / len(runs))
     return {
         "processor": "Cortex-M7, single precision, emulated",
         "clock_mhz": CLOCK_MHZ,
@@ -68,16 +66,17 @@ def measure(observers: Sequence[str], on_progress: Callable[[float], None]) -> d
     }
 
 
-def cost_of(experiment: Experiment) -> dict[str, Any]:
-    """What the observer of a scenario costs on the board.
+def cost_of(experiment: Experiment, controller: Controller | None = None) -> dict[str, Any]:
+    """What a controller costs on the board.
 
     Args:
-        experiment: The scenario; all its ticks count.
+        experiment: The run on which it is counted, closed by the controller itself; all ticks count.
+        controller: The controller; by default that of the scenario. Another must estimate the same signals.
 
     Returns:
         Its figures.
     """
-    with exported(experiment.controller()) as files:
+    with exported(controller or experiment.controller()) as files:
         flash = flash_of(files.observer, files.folder)
         board = Board(build(files.observer, files.folder).path, counting=True)
     with board:
@@ -88,7 +87,6 @@ def cost_of(experiment: Experiment) -> dict[str, Any]:
     update, update_most = _instructions(updates)
     step, step_most = _instructions(steps)
     return {
-        "observer": experiment.scenario.observer.kind,
         "step_instructions": step,
         "step_instructions_most": step_most,
         "update_instructions": update,

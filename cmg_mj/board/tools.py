@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from importlib.util import find_spec
 
 from cmg_mj.errors import InputError
 
@@ -22,8 +23,13 @@ def missing() -> list[str]:
     return [package for thing, package in PACKAGES.items() if not _is_there(thing)]
 
 
+def available() -> bool:
+    """Whether a controller can be exported, built and emulated here."""
+    return not missing() and find_spec("casadi") is not None
+
+
 def require() -> None:
-    """See that all is there.
+    """See that all of Debian's is there.
 
     Raises:
         InputError: It is not; the line says what to install.

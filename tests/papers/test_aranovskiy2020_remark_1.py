@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
+from cmg_mj.board.tools import available
 from cmg_mj.observers import Estimate, Measurement, make_observer
-from cmg_mj.papers.aranovskiy2020 import by_euler, delicacy, forms_of_10, misprint, update_cost
+from cmg_mj.papers.aranovskiy2020 import by_euler, delicacy, forms_of_10, misprint, on_the_board, update_cost
 from cmg_mj.papers.aranovskiy2020.delicacy import transient
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, printed_model, riccati_slope, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
@@ -156,6 +158,29 @@ def test_what_an_update_costs() -> None:
     times = update_cost.update_times(None, turns=1, updates=20)
     assert times["ltv, plain Runge-Kutta 4"] > times["ltv, plain Euler"]
     assert times["ltv"] > times["homogeneous"] > times["linear"] > 0.0
+
+
+def test_the_verdict_on_the_cost_follows_from_the_instructions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As they are recorded, (11) is the dearest; were its powers for nothing, (10) would be."""
+    recorded = json.loads(on_the_board.RECORDED.read_text())
+    for powers_cost, verdict in ((True, "not reproduced"), (False, "reproduced")):
+        board = recorded if powers_cost else recorded | {"homogeneous": 2.0 * recorded["linear"]}
+        monkeypatch.setattr(update_cost, "instructions", lambda board=board: on_the_board.Instructions(board, False))
+        claim = update_cost.cost()
+        assert claim.verdict == verdict
+        assert "; recorded" in claim.found
+
+
+@pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
+def test_the_recorded_instructions_are_those_counted() -> None:
+    """Of another compiler or C library some per cent more or less."""
+    recorded = json.loads(on_the_board.RECORDED.read_text())
+    assert on_the_board.count() == pytest.approx(recorded, rel=0.1)
+
+
+def test_without_the_tools_they_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(on_the_board, "available", lambda: False)
+    assert on_the_board.instructions() == (json.loads(on_the_board.RECORDED.read_text()), False)
 
 
 def test_settled_gains_solve_the_algebraic_riccati_equation() -> None:

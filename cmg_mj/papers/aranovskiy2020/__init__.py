@@ -37,7 +37,7 @@ SECTIONS: list[Section] = [
     Section("(9), lag and noise", 0.3, lag.claims),
     Section("(11), the vicinity", 2.0, vicinity.claims),
     Section("(11), finite time", 1.5, finite_time.claims),
-    Section("Remark 1, the cost of an update", 1.0, update_cost.claims),
+    Section("Remark 1, the cost of an update", 7.0, update_cost.claims),
     Section("Remark 1, the Riccati equation", 1.0, delicacy.claims),
     Section("the Riccati equation as printed", 1.0, misprint.claims),
     Section("Fig. 4", 3.0, figure_4.claims),

@@ -1,0 +1,63 @@
+"""What the observers of aranovskiy2020 cost on the processor of its rig, an STM32F746, as far as an emulator can say.
+
+`python -m cmg_mj.papers.aranovskiy2020.on_the_board` writes `on_the_board.json` anew, which stands in where the
+cross-compiler, the emulator or CasADi is missing.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from cmg_mj.board.tools import available
+from cmg_mj.board_cost import cost_of
+from cmg_mj.experiment import prepare
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain, euler, rk4
+from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
+from cmg_mj.scenario import parse_scenario
+from cmg_mj.trajectory import whole_file
+
+RECORDED = Path(__file__).with_suffix(".json")
+
+PLAIN = {"ltv, plain Euler": euler, "ltv, plain Runge-Kutta 4": rk4}
+"""(10) written out with 3x3 matrices, by the method for H."""
+
+
+class Instructions(NamedTuple):
+    """Instructions of an update of the observer alone, the median along a run.
+
+    Attributes:
+        of: By observer, those of the package and (10) written out.
+        counted_here: Whether they were counted now, or read from the file.
+    """
+
+    of: dict[str, float]
+    counted_here: bool
+
+
+def count() -> dict[str, float]:
+    """Count them, along half a second in which the rig comes back from one degree."""
+    runs = {
+        name: prepare(
+            parse_scenario({"duration_s": 0.5, "plant": {"initial_tilt_deg": 1.0}, "observer": {"kind": name}})
+        )
+        for name in OBSERVERS
+    }
+    counted = {name: cost_of(run)["step_instructions"] for name, run in runs.items()}
+    of_10 = runs["ltv"]
+    for name, method in PLAIN.items():
+        counted[name] = cost_of(of_10, of_10.plant.controller(Plain(method)))["step_instructions"]
+    return counted
+
+
+def instructions() -> Instructions:
+    """Counted where that can be done, recorded elsewhere."""
+    if available():
+        return Instructions(count(), True)
+    return Instructions(json.loads(RECORDED.read_text(encoding="utf-8")), False)
+
+
+if __name__ == "__main__":
+    with whole_file(RECORDED) as temporary:
+        temporary.write_text(json.dumps(count(), indent=2) + "\n", encoding="utf-8")
