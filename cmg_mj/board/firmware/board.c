@@ -80,7 +80,7 @@ static void put(const void *from, uint32_t bytes)
         put(cost, sizeof cost);             \
     } while (0)
 
-#define EMPTY __attribute__((noinline)) static void
+#define EMPTY __attribute__((noipa)) static void
 
 EMPTY empty_update(ITS(_controller) *c, const real *a, const real *e, real *estimate, real *u)
 {

@@ -1,0 +1,154 @@
+"""Exported controllers on the emulated board: in lockstep with the host, and closing the loop."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj.board import on_a_board
+from cmg_mj.board.image import FLAGS, build
+from cmg_mj.board.tools import available
+from cmg_mj.board.with_controller import exported
+from cmg_mj.controller import Decision
+from cmg_mj.errors import InputError
+from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.scenario import load_scenario
+from cmg_mj.sensors import Ideal
+from tests.board.toy import toy
+from tests.command import cmg_mj
+
+pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
+
+SHORT = ("duration_s=0.5", "plant.initial_tilt_deg=0.5", "push=[]")
+
+
+def sets(settings: tuple[str, ...]) -> list[str]:
+    return [word for setting in settings for word in ("--set", setting)]
+
+
+def short(observer: str, *settings: str) -> Experiment:
+    return prepare(load_scenario("push_recovery", [*SHORT, *settings], observer))
+
+
+class Recorded:
+    """A processor that does what the controller itself does, and keeps what it was given and decided."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.own = experiment.controller()
+        self.shown: list[tuple[list[float], list[float]]] = []
+        self.decided: list[Decision] = []
+
+    def start(self) -> None:
+        self.own.reset()
+
+    def update(self, accelerations: list[float], encoders: list[float]) -> Decision:
+        tick = self.own.decide(len(self.shown) * self.own.period, accelerations, encoders, math.nan, math.nan)
+        self.shown.append((list(accelerations), list(encoders)))
+        self.decided.append(Decision(tick.u, tick.x_e, tick.estimates[0]))
+        return self.decided[-1]
+
+
+def test_a_processor_that_is_the_controller_changes_nothing() -> None:
+    experiment = short("adaptive")
+    ours, elsewhere = experiment.run(), experiment.run_on(Recorded(experiment))
+    assert ours.summaries == elsewhere.summaries
+    assert ours.trajectory is not None
+    assert elsewhere.trajectory is not None
+    for name in ours.trajectory.columns:
+        np.testing.assert_array_equal(ours.trajectory[name], elsewhere.trajectory[name], err_msg=name)
+
+
+@pytest.mark.parametrize("observer", list(OBSERVERS))
+def test_lockstep_on_the_same_inputs(observer: str) -> None:
+    """What the board is shown is rounded to single precision, and so are its observer's numbers."""
+    experiment = short(observer)
+    host = Recorded(experiment)
+    experiment.run_on(host)
+    with on_a_board(experiment.controller()) as board:
+        board.start()
+        decided = [board.update(*shown) for shown in host.shown]
+    rate = np.array([[decision.estimate[1] for decision in those] for those in (host.decided, decided)])
+    assert np.sqrt(np.mean((rate[1] - rate[0]) ** 2)) < 1e-5
+    u = np.array([[decision.u for decision in those] for those in (host.decided, decided)])
+    assert np.sqrt(np.mean((u[1] - u[0]) ** 2)) < 1e-3
+
+
+@pytest.mark.parametrize("observer", ["linear", "gyro_free", "adaptive"])
+def test_it_closes_the_loop(observer: str) -> None:
+    """As long as single precision allows, tick by tick: an unstable plant doubles a difference every 0.1 s."""
+    experiment = short(observer)
+    host, board = experiment.run(), experiment.run(driver="board")
+    assert board.outcomes == host.outcomes
+    assert host.trajectory is not None
+    assert board.trajectory is not None
+    assert board.trajectory.columns.keys() == host.trajectory.columns.keys()
+    for name in ("x1_rad", "x2_rad_s", "u_rad_s", "x_e_rad_times_s", f"estimate/{observer}/x2_rad_s"):
+        np.testing.assert_allclose(board.trajectory[name], host.trajectory[name], atol=1e-3, err_msg=name)
+    assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
+
+
+def test_companions_ride_along_on_the_host() -> None:
+    experiment = short("linear", "companions=['ltv']")
+    host, board = experiment.run(), experiment.run(driver="board")
+    key = "velocity_rms_error_rad_s"
+    assert board.values(key, "ltv") == pytest.approx(host.values(key, "ltv"), rel=1e-3)
+    assert host.values(key, "ltv") != host.values(key)
+
+
+def test_what_the_board_cannot_do_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': a board has no such sensor"):
+        short("linear", "controller.feedback=truth").run(driver="board")
+
+
+DOUBLE = re.compile(r"__aeabi_\w*d\w*|__\w*df\w*|(pow|exp|log|sqrt|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|f(abs|max|min|mod)"
+                    r"|floor|ceil|copysign|hypot|expm1|log1p)")
+"""What computes in double precision on this processor: the compiler's helpers, and the C library's functions."""
+
+
+def in_double_precision(image: Path) -> list[str]:
+    told = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
+    names = [line.split()[-1] for line in told.splitlines()]
+    assert "main" in names
+    return [name for name in names if DOUBLE.fullmatch(name)]
+
+
+@pytest.mark.parametrize("observer", list(OBSERVERS))
+def test_nothing_in_double_precision_is_called(observer: str) -> None:
+    with exported(short(observer).controller()) as files:
+        assert in_double_precision(build(files.observer, files.folder).path) == []
+
+
+@pytest.mark.parametrize("update", ["*u = (float)((double)e[0] * 0.1);", "extern double pow(double, double); *u = pow(1, 2);"])
+def test_what_is_would_be_seen(tmp_path: Path, update: str) -> None:
+    assert in_double_precision(toy(tmp_path, update=update + " return;"))
+
+
+def test_the_command(tmp_path: Path) -> None:
+    out = tmp_path / "on_board"
+    said = cmg_mj(*f"run push_recovery --driver board --observer gyro_free --json --out {out}".split(), *sets(SHORT))
+    assert (said.status, said.err) == (0, "")
+    assert json.loads(said.out) == json.loads((out / "summary.json").read_text())
+    assert json.loads(said.out)["outcome"] == "done"
+
+
+def test_the_table_of_costs() -> None:
+    said = cmg_mj("bench", "--board", "--observers", "linear,homogeneous", "--json")
+    linear, homogeneous = json.loads(said.out)["figures"]
+    assert linear["step_instructions"] < 0.1 * homogeneous["step_instructions"]
+    for row in (linear, homogeneous):
+        assert row["step_instructions"] < row["update_instructions"] <= row["update_instructions_most"]
+        assert row["update_us_at_216_mhz"] == pytest.approx(row["update_instructions"] / 216.0)
+        assert 40 <= row["stack_bytes"] <= 1000
+        assert 100 <= row["flash_bytes"] <= 20_000
+    # Two numbers of the observer; integrator, last command, and whether it has started.
+    assert linear["state_bytes"] == 5 * 4
+    lines = cmg_mj("bench", "--board", "--observers", "linear", "--markdown").out.splitlines()
+    assert lines[0].startswith("| observer")
+    assert lines[2].startswith("| linear")
