@@ -19,8 +19,15 @@ from cmg_mj.board.tools import EMULATOR
 from cmg_mj.controller import Decision
 from cmg_mj.errors import RunStopped
 
-PATIENCE_S = 10.0
+PATIENCE_S = 30.0
 """An answer takes a fraction of a millisecond; a machine that is busy with other things may take its time."""
+
+STATUSES = {
+    0: "nobody has talked to it for three minutes, and it has switched itself off",
+    101: "its processor met a fault",
+    102: "its stack is full",
+}
+"""Why it halts, as firmware/machine.h numbers it."""
 
 NANOSECONDS_AN_INSTRUCTION = 1024
 """Where instructions are counted, the emulated clock takes so long for each: many ticks of the 25 MHz timer, so that
@@ -167,9 +174,7 @@ class Board:
             said = [line.strip() for line in lines if "warning:" not in line]
             if said:
                 return f"{EMULATOR} says {said[-1]!r}"
-            if status == 0:
-                return "nobody has talked to it for three minutes, and it has switched itself off"
-            return "its processor met a fault" if status == 1 else f"{EMULATOR} has ended with status {status}"
+            return STATUSES.get(status, f"{EMULATOR} has ended with status {status}")
         return "it has closed the line"
 
 

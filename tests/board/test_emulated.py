@@ -106,6 +106,10 @@ def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
         ("for (;;) {}", "the board has not answered for 0.5 s"),
         ("__builtin_trap();", "the board is gone: its processor met a fault"),
         ("*(volatile int *)0xf0000000 = 1;", "the board is gone: its processor met a fault"),
+        (
+            "volatile int room[1100]; for (int i = 1099; i >= 0; i--) room[i] = i; c->x_e = room[3];",
+            "the board is gone: its stack is full",
+        ),
     ],
 )
 def test_what_goes_wrong_on_it_is_said(tmp_path: Path, update: str, said: str) -> None:

@@ -55,6 +55,8 @@ __attribute__((always_inline)) static inline uint32_t depth(void)
     const uint32_t *here, *word = stack_bottom;
 
     STACK_POINTER(here);
+    if (*(const volatile uint32_t *)word != PAINT)
+        machine_halt(STACK_FULL);
     while (word < here && *(const volatile uint32_t *)word == PAINT)
         word++;
     return (uint32_t)(here - word) * 4u;

@@ -8,6 +8,8 @@ void machine_start(void);          /* once, before the rest */
 uint8_t machine_receive(void);     /* waits for a byte of the serial line */
 void machine_send(uint8_t byte);   /* may wait until the line takes it */
 uint32_t machine_time(void);       /* a counter that runs on, modulo 2^32 */
-void machine_halt(int status);     /* does not come back: 0 on request, 1 after a fault */
+void machine_halt(int status);     /* does not come back */
+
+enum { NOBODY_TALKS = 0, FAULT = 101, STACK_FULL = 102 }; /* why it halts */
 
 #endif

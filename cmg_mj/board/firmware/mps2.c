@@ -48,7 +48,7 @@ uint8_t machine_receive(void)
             return (uint8_t)UART_DATA;
         __asm volatile("wfi" ::: "memory");
         if (WATCH_STATUS & 1u)
-            machine_halt(0); /* nobody talks to us any more */
+            machine_halt(NOBODY_TALKS);
     }
 }
 

@@ -10,7 +10,7 @@ void reset(void);
 
 static void fault(void)
 {
-    machine_halt(1);
+    machine_halt(FAULT);
 }
 
 void reset(void)
@@ -25,7 +25,7 @@ void reset(void)
     for (to = bss_start; to < bss_end;)
         *to++ = 0;
     main();
-    machine_halt(0);
+    machine_halt(NOBODY_TALKS);
 }
 
 /* Where the stack begins, where to begin, then what to do in NMI, HardFault and the other faults. No interrupt is served. */

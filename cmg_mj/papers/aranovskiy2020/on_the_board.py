@@ -1,7 +1,7 @@
 """What the observers of aranovskiy2020 cost on the processor of its rig, an STM32F746, as far as an emulator can say.
 
-`python -m cmg_mj.papers.aranovskiy2020.on_the_board` writes `on_the_board.json` anew, which stands in where the
-cross-compiler, the emulator or CasADi is missing.
+`on_the_board.json` stands in where the cross-compiler, the emulator or CasADi is missing; `python -m
+cmg_mj.papers.aranovskiy2020.record_on_the_board` writes it anew.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from cmg_mj.experiment import prepare
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain, euler, rk4
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.scenario import parse_scenario
-from cmg_mj.trajectory import whole_file
 
 RECORDED = Path(__file__).with_suffix(".json")
 
@@ -56,8 +55,3 @@ def instructions() -> Instructions:
     if available():
         return Instructions(count(), True)
     return Instructions(json.loads(RECORDED.read_text(encoding="utf-8")), False)
-
-
-if __name__ == "__main__":
-    with whole_file(RECORDED) as temporary:
-        temporary.write_text(json.dumps(count(), indent=2) + "\n", encoding="utf-8")
