@@ -75,7 +75,7 @@ class Decision(NamedTuple):
     u: float
     """Gimbal rate [rad/s]."""
     x_e: float
-    """The integrator that went into it [rad s]."""
+    """The integrator before it [rad s], which went into it unless it is being trimmed."""
     estimate: Sequence[float]
     """The observer's: x1, x2, x3, its extra signals."""
 
@@ -330,12 +330,12 @@ class Controller:
             x1, x3 = y1, y2
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else rate
-        x_e = self._x_e
+        x_e = decision.x_e if decision else self._x_e
         if step < self.trimmed_until:
             x_e = self.trim_gain * estimates[0][self.trim_part]
         u: Scalar
         if decision:
-            u, x_e, _ = decision
+            u = decision.u
         else:
             u, self._x_e = self.law(x1, x2, x3, x_e)
         if not self._single:

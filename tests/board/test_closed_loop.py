@@ -6,6 +6,7 @@ import json
 import math
 import re
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,7 @@ class Recorded:
     def start(self) -> None:
         self.own.reset()
 
-    def update(self, accelerations: list[float], encoders: list[float]) -> Decision:
+    def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
         tick = self.own.decide(len(self.shown) * self.own.period, accelerations, encoders, math.nan, math.nan)
         self.shown.append((list(accelerations), list(encoders)))
         self.decided.append(Decision(tick.u, tick.x_e, tick.estimates[0]))
@@ -100,10 +101,13 @@ def test_lockstep_on_the_same_inputs(observer: str) -> None:
     assert np.sqrt(np.mean((its_u - u) ** 2)) < 1e-4
 
 
-@pytest.mark.parametrize("observer", ["gyro_free", "adaptive"])
-def test_it_closes_the_loop(observer: str) -> None:
+@pytest.mark.parametrize(
+    ("observer", "settings"),
+    [("gyro_free", ()), ("adaptive", ("controller.trim_s=0.2", "controller.angles=estimated"))],
+)
+def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
     """As long as single precision allows, tick by tick: an unstable plant doubles a difference every 0.1 s."""
-    experiment = short(observer)
+    experiment = short(observer, *settings)
     host, board = experiment.run(), experiment.run(driver="board")
     assert board.outcomes == host.outcomes
     assert host.trajectory is not None

@@ -9,8 +9,8 @@
  *   'i'   -                                                  sizes in bytes: a real, the observer, the controller;
  *                                                            parts of an estimate (4 uint32)
  *   's'   -                                                  - (the controller is at its start)
- *   'u'   inner x, z, outer x, z [m/s^2], encoders [rad]     cost, u [rad/s], the integrator that went
- *                                                            into it [rad s], the estimate
+ *   'u'   inner x, z, outer x, z [m/s^2], encoders [rad]     cost, u [rad/s], the integrator before that
+ *                                                            [rad s], the estimate
  *   'n'   y1, y2 [rad], acceleration [rad/s^2]               cost (the observer is at its start)
  *   'o'   the same and u [rad/s]                             cost, the estimate
  *   'e'   -                                                  costs of empty functions called as 'u', 'n', 'o' are

@@ -1,0 +1,101 @@
+"""Every observer with the whole controller on the emulated board, beside the same on the host.
+
+    python docs/studies/on_the_board.py [--observers NAMES] [--worlds 20] [--scenario push_recovery]
+
+In lockstep: the board closes the loop, and the host's controller is shown the same readings; RMS difference of both
+estimated rates over all worlds and ticks. Closed loop: means of velocity RMS error and settle time over the worlds on
+the host with their 95 % intervals, then with the board in the loop, and whether these lie within. About a minute an
+observer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmg_mj.board import Board, on_a_board
+from cmg_mj.controller import Controller, Decision
+from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.intervals import known_interval
+from cmg_mj.markdown import table
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.scenario import load_scenario
+
+FIGURES = {"velocity_rms_error_rad_s": "{:.5f}", "settle_time_s": "{:.3f}"}
+
+
+class Beside:
+    """The board, and a controller on the host that is shown what the board is shown.
+
+    Attributes:
+        differences: Of the estimated rates, a number a tick [rad/s].
+    """
+
+    def __init__(self, board: Board, controller: Controller) -> None:
+        self.board, self.controller = board, controller
+        self.differences: list[float] = []
+        self._tick = 0
+
+    def start(self) -> None:
+        """The next update is the first."""
+        self.board.start()
+        self.controller.reset()
+        self._tick = 0
+
+    def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
+        """What the board decides."""
+        decision = self.board.update(accelerations, encoders)
+        step = self._tick * self.controller.period
+        tick = self.controller.decide(step, accelerations, encoders, math.nan, math.nan)
+        self.differences.append(decision.estimate[1] - tick.estimates[0][1])
+        self._tick += 1
+        return decision
+
+
+def row(experiment: Experiment, worlds: int) -> list[str]:
+    """An observer's row of the table."""
+    host = experiment.run_many(worlds, keep_trajectory=False)
+    runs = []
+    with on_a_board(experiment.controller()) as board:
+        beside = Beside(board, experiment.controller())
+        for world in range(worlds):
+            runs.append(experiment.run_on(beside, world, keep_trajectory=False))
+    cells = [experiment.scenario.observer.kind, f"{np.sqrt(np.mean(np.square(beside.differences))):.1e}"]
+    cells.append(f"{int(host.fell.sum())} / {sum(bool(run.fell[0]) for run in runs)}")
+    for key, pattern in FIGURES.items():
+        cells += _beside(pattern, host.values(key), np.array([run.values(key)[0] for run in runs]))
+    return cells
+
+
+def _beside(pattern: str, on_host: np.ndarray, on_board: np.ndarray) -> list[str]:
+    """The host's mean and interval, the board's mean, and whether that lies within."""
+    host, board = known_interval(on_host), known_interval(on_board)
+    if host is None or board is None:
+        return ["-", "-", "-"]
+    within = host.low <= board.mean <= host.high
+    mean, half, its = (pattern.format(number) for number in (host.mean, host.half, board.mean))
+    return [f"{mean} +- {half}", its, "yes" if within else "NO"]
+
+
+def main() -> None:
+    """Print the table, a row an observer as they come."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--observers", default=",".join(OBSERVERS))
+    parser.add_argument("--worlds", type=int, default=20)
+    parser.add_argument("--scenario", default="push_recovery")
+    of = parser.parse_args()
+    headings = ["observer", "lockstep [rad/s]", "fell: host / board"]
+    for what in ("error [rad/s]", "settles [s]"):
+        headings += [f"{what}: host", "board", "within"]
+    rows = []
+    for name in of.observers.split(","):
+        rows.append(row(prepare(load_scenario(of.scenario, [], name)), of.worlds))
+        print(f"  {rows[-1]}", flush=True)
+    print(table(headings, rows))
+
+
+if __name__ == "__main__":
+    main()
