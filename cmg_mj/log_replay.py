@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.accelerometer import STANDARD_GRAVITY, Accelerometer
 from cmg_mj.alignment import Alignment, alignment
 from cmg_mj.errors import InputError, raised
 from cmg_mj.log_scores import noise_gain, scores
@@ -21,7 +22,6 @@ from cmg_mj.reduced import ReducedModel
 from cmg_mj.references import ZERO
 from cmg_mj.rehearsal import rehearse
 from cmg_mj.replay import replay_all
-from cmg_mj.sensors import STANDARD_GRAVITY, Accelerometer
 from cmg_mj.tilt import TiltNoise
 
 SKIPPED_S = 1.0

@@ -14,7 +14,7 @@ from cmg_mj.logs import read_log
 from cmg_mj.observers import make_observer
 from cmg_mj.replay import replay
 from cmg_mj.trajectory import Trajectory
-from tests.logs.motion import AMPLITUDE, COLUMNS, DT, N, OMEGA, rate, sine, tilt, write_csv
+from tests.logs.motion import AMPLITUDE, COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
 from tests.observers.reference import PAPER
 
 PEAK = AMPLITUDE * OMEGA
@@ -22,8 +22,8 @@ GAIN = math.sin(OMEGA * DT / 2.0) / (OMEGA * DT / 2.0)
 """A difference over DT is the rate in the middle of it, by that much smaller."""
 
 
-def replayed(tmp_path: Path, **options: float) -> Replayed:
-    return replay_log(read_log(write_csv(tmp_path / "sine.csv", sine()), COLUMNS, **options), skip_s=1.0)
+def replayed(tmp_path: Path) -> Replayed:
+    return replay_log(read_log(write_csv(tmp_path / "sine.csv", sine()), COLUMNS), skip_s=1.0)
 
 
 def test_the_difference_of_a_sine(tmp_path: Path) -> None:
@@ -56,7 +56,7 @@ def test_zero_has_a_fit_of_zero_and_no_lag(tmp_path: Path) -> None:
 
 
 def test_without_a_reference(tmp_path: Path) -> None:
-    """The difference's integral is the mean of two measured tilts: half a step behind. Roughness: w^2 dt^2 of a sine."""
+    """The difference's integral is the mean of two measured tilts: half a step behind."""
     path = write_csv(tmp_path / "sine.csv", sine())
     found = replay_log(read_log(path, {"time": "t_s", "tilt": "tilt_rad"})).summaries
     assert set(found["finite_difference"]) == {"reconstruction_rms_deg", "roughness_rad_s", "noise_gain_1_s"}
