@@ -1,0 +1,195 @@
+"""Who takes part in a replay and why, and a run's own recording, which replays to the figures of its run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj import InputError, ReducedModel, load_scenario, prepare
+from cmg_mj.log_replay import NO_MODEL, noise_of, replay_log
+from cmg_mj.log_runs import model_of, noise_numbers, parameters_of, replay_ready
+from cmg_mj.logs import Log, read_log
+from cmg_mj.observers import OBSERVERS, Measurement, make_observer, observer_class
+from cmg_mj.observers.protocol import needs
+from cmg_mj.runs import save_run, summary_of
+from cmg_mj.tilt import RadialTilt, TiltNoise
+from cmg_mj.trajectory import Trajectory
+from tests.logs.motion import COLUMNS, DT, N, sine, write_csv
+from tests.observers.reference import PAPER
+
+KEYS = ("velocity_rms_error_rad_s", "velocity_fit", "velocity_rms_error_push_rad_s", "velocity_fit_push")
+SETTINGS = ["duration_s=1.4", "push.0.start_s=0.3", 'companions="all"', "observer.k1=23.0", "seed=5"]
+SETTINGS += ["sensors.accelerometer.noise_density_ug_rthz=300"]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    experiment = prepare(load_scenario("push_recovery", SETTINGS))
+    folder = tmp_path_factory.mktemp("runs") / "a-run"
+    result = experiment.run()
+    save_run(folder, experiment, result)
+    assert summary_of(experiment, result)["observer"] == "homogeneous"
+    return folder
+
+
+def log(tmp_path: Path, **more: np.ndarray) -> Log:
+    columns = dict(COLUMNS, **{name.partition("_")[0]: name for name in more})
+    return read_log(write_csv(tmp_path / "log.csv", {**sine(), **more}), columns)
+
+
+def test_a_run_replays_to_its_figures(run: Path) -> None:
+    """Estimates bit for bit, of the loop's observer (whose k1 is not the default) and of every companion."""
+    replayed = replay_ready(read_log(run))
+    summary = json.loads((run / "summary.json").read_text())
+    kept = Trajectory.load(run / "trajectory.parquet")
+    assert replayed.left_out == {}
+    assert set(replayed.estimates) == set(OBSERVERS)
+    for name, figures in replayed.summaries.items():
+        of = summary if name == "homogeneous" else {**summary["companions"], **summary["references"]}[name]
+        for key in KEYS:
+            assert figures[key] == pytest.approx(of[key], rel=1e-12, abs=1e-13), (name, key)
+        for signal, values in replayed.estimates.get(name, {}).items():
+            np.testing.assert_array_equal(values, kept[f"estimate/{name}/{signal}"])
+
+
+def test_a_runs_file_is_the_same_as_its_folder(run: Path) -> None:
+    whole, file = read_log(run), read_log(run / "trajectory.parquet")
+    np.testing.assert_array_equal(whole["y1_rad"], file["y1_rad"])
+    assert whole.name == file.name == "a-run"
+
+
+def test_a_runs_parameters_model_and_noise_can_be_changed(run: Path) -> None:
+    recorded = read_log(run)
+    as_it_was = replay_ready(recorded, ["homogeneous", "gyro_free"])
+    other = {"homogeneous": {"alpha": 0.9}}
+    changed = replay_ready(recorded, ["homogeneous", "gyro_free"], parameters=other, noises={"tilt": 1.0})
+    for name in ("homogeneous", "gyro_free"):
+        assert np.abs(changed.estimates[name]["x2_rad_s"] - as_it_was.estimates[name]["x2_rad_s"]).max() > 1e-3
+
+
+def test_a_runs_recording_as_any_parquet(run: Path) -> None:
+    """With --columns it is a log like others: the same estimates of those that need no more."""
+    path = run / "trajectory.parquet"
+    plain = read_log(path, {"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"})
+    replayed = replay_log(plain, ["linear"], skip_s=0.0)
+    kept = Trajectory.load(path)["estimate/linear/x2_rad_s"]
+    np.testing.assert_allclose(replayed.estimates["linear"]["x2_rad_s"], kept, atol=1e-9)
+
+
+def test_who_takes_part(tmp_path: Path) -> None:
+    """What an observer needs and what is there decide, for every combination."""
+    plain = log(tmp_path)
+    t = DT * np.arange(N)
+    gimbals = {"gimbal_rad": 0.01 * t, "command_rad_s": 0.01 + 0.0 * t}
+    for more, has in (
+        ({}, set()),
+        (gimbals, {"gimbals"}),
+        ({"acceleration_rad_s2": -sine()["tilt_rad"]}, {"acceleration"}),
+    ):
+        one = log(tmp_path, **more)
+        for model in (None, PAPER):
+            there = has | ({"model"} if model else set())
+            replayed = replay_log(one, model=model)
+            for kind in OBSERVERS:
+                lacks = set(needs(observer_class(kind))) - there
+                assert (kind in replayed.left_out) == bool(lacks), kind
+                assert (kind in replayed.estimates) != bool(lacks), kind
+    assert "needs a model (--model)" in replay_log(plain).left_out["ltv"]
+
+
+def test_of_a_pendulum_without_gimbals_the_model_alone_is_enough(tmp_path: Path) -> None:
+    hanging = model_of("inertia=0.06,gravity_torque=3.4")
+    assert hanging == ReducedModel(0.06, 0.0, 0.0, 1.0, 3.4)
+    replayed = replay_log(log(tmp_path), ["homogeneous", "high_gain", "gyro_free"], model=hanging)
+    assert set(replayed.left_out) == {"gyro_free"}
+
+
+def test_observers_that_need_no_model_do_not_look_at_it() -> None:
+    """They are given one of NaN; whatever is made of it is no number."""
+    for kind in OBSERVERS:
+        if "model" not in needs(observer_class(kind)):
+            observer = make_observer(kind, DT, NO_MODEL, TiltNoise(1e-3, 1.0, 0.5))
+            _, estimate = observer.step(observer.init(Measurement(0.1, 0.0, 0.2)), Measurement(0.11, 0.0, 0.2), 0.0)
+            assert np.isfinite(list(estimate)).all(), kind
+
+
+def test_parts_are_replayed_each_from_its_start(tmp_path: Path) -> None:
+    kept = np.ones(N, dtype=bool)
+    kept[2000:2300] = False
+    parted = read_log(write_csv(tmp_path / "p.csv", {k: v[kept] for k, v in sine().items()}), COLUMNS)
+    second = read_log(write_csv(tmp_path / "s.csv", {k: v[2300:] for k, v in sine().items()}), COLUMNS)
+    both, one = replay_log(parted, ["linear"], skip_s=0.5), replay_log(second, ["linear"], skip_s=0.5)
+    np.testing.assert_array_equal(both.estimates["linear"]["x2_rad_s"][2000:], one.estimates["linear"]["x2_rad_s"])
+    assert parted.scored(0.5).sum() == 1900 + 1600
+
+
+def test_one_that_is_lost_is_said_and_the_others_go_on(tmp_path: Path) -> None:
+    replayed = replay_log(
+        log(tmp_path), ["linear", "tests.logs.test_replayed:Loses", "tests.logs.test_replayed:Raises"]
+    )
+    assert set(replayed.estimates) == {"linear"}
+    assert "x2_rad_s is not finite from 0.05 s on" in replayed.left_out["tests.logs.test_replayed:Loses"]
+    assert "raised ZeroDivisionError" in replayed.left_out["tests.logs.test_replayed:Raises"]
+
+
+class Loses:
+    needs = ()
+
+    def __init__(self, dt: float, model: ReducedModel) -> None:
+        pass
+
+    def init(self, y: Measurement) -> int:
+        return 0
+
+    def step(self, state: int, y: Measurement, u: float) -> tuple[int, tuple]:
+        return state + 1, (y.y1, float("nan") if state == 9 else 0.0, 0.0)
+
+
+class Raises(Loses):
+    def step(self, state: int, y: Measurement, u: float) -> tuple[int, tuple]:
+        return state + 1, (y.y1, 1.0 / (9 - state), 0.0)
+
+
+def test_noise_of_two_accelerometers_follows_from_theirs(tmp_path: Path) -> None:
+    one = log(tmp_path)
+    assert noise_of(one).tilt == pytest.approx(np.radians(0.1))
+    from dataclasses import replace
+
+    radial = RadialTilt(0.1, 0.3)
+    found = noise_of(replace(one, tilt=radial), accelerometer_ug_rthz=200.0)
+    sigma = 200e-6 * 9.80665 * np.sqrt(100.0)
+    assert found == radial.noise(sigma, 9.80665)
+
+
+@pytest.mark.parametrize(
+    ("made", "says"),
+    [
+        (lambda: model_of("inertia=0.06"), "--model: gravity_torque is missing: mass x gravity x height"),
+        (lambda: model_of("inertia=-1,gravity_torque=3"), "must be greater than 0"),
+        (lambda: model_of("inertia=a,gravity_torque=3"), "--model inertia=a: must be a finite number"),
+        (lambda: model_of("mass=2"), "--model mass: no such number; allowed: gimbal_inertia"),
+        (lambda: model_of("nothing.xml"), "no such file, nor a bundled one"),
+        (lambda: noise_numbers("tild=3"), "--noise tild: no such noise; did you mean 'tilt'?"),
+        (lambda: noise_numbers("tilt=0"), "must be greater than 0"),
+        (lambda: parameters_of(["k1=3"]), "write OBSERVER.PARAMETER=VALUE"),
+        (lambda: parameters_of(["homogenous.k1=3"]), "did you mean 'homogeneous'?"),
+        (lambda: parameters_of(["homogeneous.k1=x"]), "'x' is no number"),
+    ],
+)
+def test_what_cannot_be(made, says: str) -> None:
+    with pytest.raises(InputError) as caught:
+        made()
+    assert says in str(caught.value)
+
+
+def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
+    one = log(tmp_path)
+    with pytest.raises(InputError, match="linear has no such parameter"):
+        replay_log(one, ["linear"], parameters={"linear": {"tou": 0.1}})
+    with pytest.raises(InputError, match="nothing is left to be judged"):
+        replay_log(one, skip_s=20.0)
+    with pytest.raises(InputError, match="no observer can take part: ltv needs a model"):
+        replay_log(one, ["ltv"])
