@@ -11,7 +11,7 @@ from cmg_mj.errors import InputError
 COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
 PACKAGES = {
     COMPILER: "gcc-arm-none-eabi",
-    SIZE: "binutils-arm-none-eabi",
+    SIZE: "gcc-arm-none-eabi",
     "nano.specs": "libnewlib-arm-none-eabi",
     EMULATOR: "qemu-system-arm",
 }
@@ -20,7 +20,7 @@ PACKAGES = {
 
 def missing() -> list[str]:
     """Debian's packages that are needed and not installed."""
-    return [package for thing, package in PACKAGES.items() if not _is_there(thing)]
+    return list(dict.fromkeys(package for thing, package in PACKAGES.items() if not _is_there(thing)))
 
 
 def available() -> bool:
@@ -37,8 +37,8 @@ def require() -> None:
     packages = missing()
     if packages:
         raise InputError(
-            f"the emulated board needs {', '.join(packages)}: install with `apt install {' '.join(packages)}`, or what "
-            "your system calls it (a C compiler and newlib for ARM Cortex-M, QEMU for ARM)"
+            f"the emulated board needs what is not installed here: apt install {' '.join(packages)} (Debian's names: "
+            "a C compiler and newlib for ARM Cortex-M, and QEMU for ARM)"
         )
 
 
@@ -46,6 +46,6 @@ def _is_there(thing: str) -> bool:
     if not thing.endswith(".specs"):
         return shutil.which(thing) is not None
     if shutil.which(COMPILER) is None:
-        return True  # nobody can say; the compiler is missing first
+        return False
     told = subprocess.run([COMPILER, f"-print-file-name={thing}"], capture_output=True, text=True, check=False)
     return told.stdout.strip() != thing  # the whole path where there is such a file

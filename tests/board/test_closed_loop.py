@@ -173,3 +173,40 @@ def test_most_of_11_is_powers(tmp_path: Path) -> None:
             steps.append(board.step(0.013, 0.85, 0.0, 0.0)[1].instructions)
     assert powers == 4
     assert powers * (steps[1] - steps[0]) > 0.5 * json.loads(on_the_board.RECORDED.read_text())["homogeneous"]
+
+
+COMPANION = """
+import signal
+from cmg_mj import Estimate
+
+class Presses:
+    '''Presses Ctrl-C at the 20th sample.'''
+    def __init__(self, dt, model):
+        pass
+    def init(self, y):
+        return 0
+    def step(self, k, y, u):
+        if k == 18:
+            signal.raise_signal(signal.SIGINT)
+        return k + 1, Estimate(y.y1, 0.0 * y.y1, y.y2)
+"""
+
+
+@pytest.mark.usefixtures("elsewhere", "ctrl_c")
+def test_ctrl_c_ends_the_board_too() -> None:
+    Path("pressing.py").write_text(COMPANION)
+    others = children()
+    said = cmg_mj(
+        *["run", "push_recovery", "--driver", "board", "--out", "here"], "--set", "companions=['pressing:Presses']"
+    )
+    assert said.status == 130
+    assert said.err.endswith("cmg-mj: interrupted at 0.095 s; what was recorded until then is in here\n")
+    assert json.loads(Path("here/summary.json").read_text())["outcome"] == "interrupted"
+    assert children() == others
+
+
+def children() -> set[str]:
+    """Processes that this one has started."""
+    if not Path("/proc/self/task").exists():
+        return set()
+    return {pid for task in Path("/proc/self/task").iterdir() for pid in (task / "children").read_text().split()}
