@@ -39,7 +39,7 @@ SUMMARY = [
 ]
 """Names that users' scripts rely on."""
 
-COMMANDS = ["bench", "check", "compare", "list", "reproduce", "run", "tune"]
+COMMANDS = ["bench", "check", "compare", "export", "list", "replay", "reproduce", "run", "tune"]
 
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
