@@ -1,9 +1,9 @@
 """Which colour an observer has: the same in recordings, in plots of a run and in plots of a comparison.
 
 `colour("ltv")` is (69, 148, 253), and `hexadecimal(colour("ltv"))` is what matplotlib takes. Names are those of the
-observers; `true`, `gyro`, `zero` (an estimate of zero) and `mems_gyro` are what they are compared with. All can be seen
-on the viewer's dark ground and on white paper, and told apart with each kind of colour blindness: a test says
-how well.
+observers; `true`, `gyro` and what tables have beside observers (`cmg_mj/references.py`) are what they are compared
+with. All can be seen on the viewer's dark ground and on white paper, and told apart with each kind of colour blindness:
+a test says how well.
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ YARDSTICKS: dict[str, Colour] = {
     "gyro": (95, 130, 190),
     "zero": (120, 120, 120),
     "mems_gyro": (6, 109, 61),
+    "floor_y1": (133, 179, 209),
+    "floor_acceleration": (143, 83, 167),
 }
 """What observers are compared with."""
 

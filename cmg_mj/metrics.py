@@ -11,6 +11,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.fields import STRICT, Instant, Positive
+from cmg_mj.floors import Floors
 from cmg_mj.push import Push, inside, push_windows
 
 
@@ -41,6 +42,7 @@ class Metrics:
         settings: The settle band, and from when on a bias estimate is judged.
         targets: Extra signal -> what an observer that estimates it should find in each world, (n_worlds,); in rad.
         references: Names of what the estimates are judged beside.
+        floors: What no estimate can go below.
     """
 
     def __init__(
@@ -53,9 +55,11 @@ class Metrics:
         settings: MetricsSettings,
         targets: Mapping[str, Sequence[float]] | None = None,
         references: Sequence[str] = (),
+        floors: Floors | None = None,
     ) -> None:
         self.observers = list(observers)
         self.references = list(references)
+        self._floors = floors
         self._dt = dt
         self._push_end = max((push.end_s for push in pushes), default=0.0)
         self._windows = push_windows(pushes)
@@ -87,6 +91,7 @@ class Metrics:
         fog: np.ndarray,
         estimates: Sequence[Mapping[str, np.ndarray]],
         references: Mapping[str, np.ndarray] | None = None,
+        y1: np.ndarray | None = None,
     ) -> None:
         """Add the next ticks.
 
@@ -98,6 +103,7 @@ class Metrics:
             fog: The gyro's rate, (n_rows, n_worlds) [rad/s].
             estimates: Each observer's estimates by their names, `x2_rad_s` among them, (n_rows, n_worlds).
             references: Each reference's tilt rate, (n_rows, n_worlds) [rad/s].
+            y1: Measured tilt, for the floors, (n_rows, n_worlds) [rad].
         """
         counted = np.isfinite(x1)
         tick = self._ticks + np.arange(len(x1))[:, None]
@@ -109,6 +115,8 @@ class Metrics:
         pushed = counted & inside(tick * self._dt, self._windows)
         self._push_count += pushed.sum(axis=0)
         self._squares["velocity_push"] += _sum_of_squares(x2, pushed)
+        if self._floors and y1 is not None:
+            self._floors.add(y1, x2, counted, pushed)
         rates = {name: estimate["x2_rad_s"] for name, estimate in zip(self.observers, estimates, strict=True)}
         for name, rate in (rates | dict(references or {})).items():
             self._errors[name] += _sum_of_squares(rate - x2, counted)
@@ -161,6 +169,8 @@ class Metrics:
             name: {**self._rate_summary(name, world), **self._found_summary(name, world)} for name in self.observers[1:]
         }
         references = {name: self._rate_summary(name, world) for name in self.references}
+        floors = self._floors.errors(world) if self._floors else {}
+        references |= {name: self._figures(world, *errors) for name, errors in floors.items()}
         return {
             "settle_time_s": self._settle_time(world, stood),
             **self._rate_summary(loop, world),
@@ -177,14 +187,22 @@ class Metrics:
         """How well the true rate was estimated, over the whole run and in the push windows."""
         n, n_push = self._count[world], self._push_count[world]
         error, push_error = _rms(self._errors[name][world], n), _rms(self._push_errors[name][world], n_push)
+        return self._figures(world, error, push_error, _rms(self._fog_errors[name][world], n))
+
+    def _figures(
+        self, world: int, error: float | None, push_error: float | None, fog_error: float | None = None
+    ) -> dict[str, float | None]:
+        """The errors beside the motion."""
+        n, n_push = self._count[world], self._push_count[world]
         motion = _rms(self._squares["velocity"][world], n)
+        push_motion = _rms(self._squares["velocity_push"][world], n_push)
         return {
             "velocity_rms_error_rad_s": error,
-            "velocity_rms_error_fog_rad_s": _rms(self._fog_errors[name][world], n),
-            "velocity_rms_error_push_rad_s": push_error,
+            "velocity_rms_error_fog_rad_s": fog_error,
+            "velocity_rms_error_push_rad_s": push_error if n_push else None,
             "velocity_rms_rad_s": motion,
             "velocity_fit": _fit(error, motion),
-            "velocity_fit_push": _fit(push_error, _rms(self._squares["velocity_push"][world], n_push)),
+            "velocity_fit_push": _fit(push_error, push_motion),
         }
 
     def _settle_time(self, world: int, stood: bool) -> float | None:

@@ -1,4 +1,4 @@
-"""What every estimate of the rate is judged beside: an estimate of zero, and a cheap gyro on the same motion."""
+"""What every estimate of the rate is judged beside: zero, a cheap gyro on the same motion, and two floors."""
 
 from __future__ import annotations
 
@@ -6,19 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmg_mj.floors import FLOORS
 from cmg_mj.mems_gyro import MemsGyro
 from cmg_mj.sensors import normals
 
 ZERO, MEMS_GYRO = "zero", "mems_gyro"
-REFERENCES = (ZERO, MEMS_GYRO)
-"""Their names, in the order of every table."""
+RATES = (ZERO, MEMS_GYRO)
+"""Those that say what the rate is."""
+REFERENCES = (*RATES, *FLOORS)
+"""The names of all, in the order of every table."""
 
 STREAM = 3
 """The gyro's noise: streams 0 to 2 are those of the sensors that the controller reads."""
 
 
 class References:
-    """Both at work. They see the true rate and close no loop.
+    """Those that say a rate, at work. They see the true rate and close no loop.
 
     Args:
         gyro: The gyro.

@@ -90,7 +90,7 @@ class Rows:
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)
         named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
-        self._metrics.update(x1, x2, x3, u, fog, named, self._references.rates(x2))
+        self._metrics.update(x1, x2, x3, u, fog, named, self._references.rates(x2), y1)
         if self._keep:
             columns = [
                 x1,

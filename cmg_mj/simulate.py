@@ -16,11 +16,12 @@ from cmg_mj.callback import installed
 from cmg_mj.controller import Controller, Tick
 from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError, RunStopped, nearest
+from cmg_mj.floors import Floors
 from cmg_mj.metrics import Metrics, MetricsSettings
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
-from cmg_mj.references import REFERENCES, References
+from cmg_mj.references import RATES, References
 from cmg_mj.rows import Rows
 from cmg_mj.timing import whole_steps
 from cmg_mj.trajectory import Trajectory
@@ -225,7 +226,9 @@ def simulate(
     dt = controller.law.dt
     targets = {BIAS: [rig.apparent_bias(controller.sensors.accelerometer) for rig in plants]}
     limit = controller.law.rate_limit
-    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, REFERENCES)
+    accelerometer = controller.sensors.accelerometer
+    floors = Floors(rig.facts.noise(accelerometer), max(dt, 1.0 / accelerometer.rate_hz), len(plants))
+    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, floors)
     beside = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds)
     rows = Rows(plants, observers, controller.extra_signals, metrics, beside, dt, keep=keep_trajectory, single=single)
     ends: list[Outcome | None] = [None] * len(plants)

@@ -19,6 +19,7 @@ from rich.table import Table
 from cmg_mj import comparison, load_scenario
 from cmg_mj.cli import cli
 from cmg_mj.observers import OBSERVERS
+from cmg_mj.references import REFERENCES
 from cmg_mj.report import columns_of, comparison_table
 from cmg_mj.resources import bundled
 from cmg_mj.standings import standings
@@ -208,7 +209,7 @@ def test_compare_prints_a_list_of_summaries(quick: str) -> None:
     said = cmg_mj("compare", quick, "--observers", "ltv, linear,ltv", "--worlds", 2, "--json")
     assert (said.status, said.err) == (0, "")
     compared = json.loads(said.out)
-    assert [entry["observer"] for entry in compared] == ["ltv", "linear", "zero", "mems_gyro"]
+    assert [entry["observer"] for entry in compared] == ["ltv", "linear", *REFERENCES]
     assert all([key for key in entry if key in SUMMARY] == SUMMARY for entry in compared)
     assert json.loads(Path("runs/quick-compare-0/summary.json").read_text()) == compared
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from cmg_mj.references import REFERENCES
 from cmg_mj.trajectory import Trajectory
 from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj_process, environment
 from tests.run_folders import assert_whole, names, write
@@ -165,7 +166,7 @@ def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
         "worlds.parquet",
     ]
     observers = [entry["observer"] for entry in json.loads(Path("it/summary.json").read_text())]
-    assert observers == ["linear", "zero", "mems_gyro"]
+    assert observers == ["linear", *REFERENCES]
 
 
 def test_before_the_first_observer_is_done_leaves_nothing() -> None:

@@ -27,6 +27,7 @@ from cmg_mj.recording.shapes import shapes
 from cmg_mj.recording.summary import ROW_TABLES
 from cmg_mj.recording.timeline import column as time_column
 from cmg_mj.recording.timeline import instant
+from cmg_mj.references import REFERENCES
 from cmg_mj.scenario import Scenario, load_scenario
 from cmg_mj.simulate import Outcome
 from cmg_mj.summary_keys import KEYS, heading, written
@@ -197,7 +198,7 @@ def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
     assert ["", "Outcome", "done at 0.5 s", ""] in rows
     (observers,) = static(path, "/observers", "TextDocument:text")
     riding = [[cell.strip() for cell in line.split("|")][1] for line in observers.splitlines() if "|" in line]
-    rows = ["**homogeneous**", "**linear**", "zero", "mems_gyro"]
+    rows = ["**homogeneous**", "**linear**", *REFERENCES]
     assert [name for name in riding if name and not name.startswith(":-")] == 2 * rows  # two tables, for their width
     assert 'kind = "made up"' in static(path, "/scenario", "TextDocument:text")[0]
     assert static(path, "/__properties", "RecordingInfo:name") == ["A title: homogeneous"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import math
 import statistics
@@ -15,6 +16,7 @@ from scipy import stats
 
 from cmg_mj.comparison import Compared, compare, prepare_comparison
 from cmg_mj.distribution_plot import _Panel
+from cmg_mj.references import REFERENCES
 from cmg_mj.report import comparison_markdown
 from cmg_mj.scenario import load_scenario
 from cmg_mj.simulate import Outcome, Result
@@ -29,9 +31,8 @@ def entry(
     """An observer with these errors in its worlds, some of which fell."""
     one = {"settle_time_s": 1.0, "tilt_rms_deg": 0.5, PUSH_ERROR: None, FIT: None} | (more or {})
     rate = {ERROR: 0.2, PUSH_ERROR: None, FIT: 0.0}
-    summaries = [
-        {**one, ERROR: error, "references": {"zero": rate, "mems_gyro": rate | {ERROR: 0.01}}} for error in errors
-    ]
+    references = dict.fromkeys(REFERENCES, rate) | {"mems_gyro": rate | {ERROR: 0.01}}
+    summaries = [{**one, ERROR: error, "references": copy.deepcopy(references)} for error in errors]
     outcomes = [Outcome("fell" if i in lost else "done", 3.0 if i in lost else 9.0) for i in range(len(errors))]
     (experiment,) = prepare_comparison(load_scenario("push_recovery", ["seed=7"]), [kind])
     return Compared(experiment, Result(outcomes, summaries, observers=[kind], seed=7), Result(outcomes, summaries))
@@ -104,8 +105,8 @@ def test_references_ride_along_with_the_best_in_the_push_window() -> None:
     slow = entry("ltv", [0.1, 0.1], more={PUSH_ERROR: 0.4})
     quick = entry("linear", [0.2, 0.2], more={PUSH_ERROR: 0.3})
     rows = by_name([slow, quick])
-    assert list(rows) == ["ltv", "linear", "zero", "mems_gyro"]
-    assert {rows[name]["rides_along_in"] for name in ("zero", "mems_gyro")} == {"linear"}
+    assert list(rows) == ["ltv", "linear", *REFERENCES]
+    assert {rows[name]["rides_along_in"] for name in REFERENCES} == {"linear"}
     assert "rides_along_in" not in rows["linear"]
     calm = by_name([entry("ltv", [0.1, 0.1]), entry("linear", [0.2, 0.2])])
     assert calm["zero"]["rides_along_in"] == "ltv"
@@ -151,12 +152,12 @@ def compared() -> tuple[Compared, ...]:
 
 def test_the_table_has_every_world_of_every_row() -> None:
     table = worlds_table(compared())
-    assert table.num_rows == 4 * 3
-    assert table["observer"].to_pylist() == [n for n in ("ltv", "luenberger", "zero", "mems_gyro") for _ in range(3)]
-    assert table["world"].to_pylist() == [0, 1, 2] * 4
+    assert table.num_rows == (2 + len(REFERENCES)) * 3
+    assert table["observer"].to_pylist() == [n for n in ("ltv", "luenberger", *REFERENCES) for _ in range(3)]
+    assert table["world"].to_pylist() == [0, 1, 2] * (2 + len(REFERENCES))
     assert set(table["seed"].to_pylist()) == {3}
-    assert table["outcome"].to_pylist() == ["done"] * 3 + ["fell"] * 3 + ["done"] * 6
-    assert table["rides_along_in"].to_pylist() == [None] * 6 + ["ltv"] * 6
+    assert table["outcome"].to_pylist() == ["done"] * 3 + ["fell"] * 3 + ["done"] * 3 * len(REFERENCES)
+    assert table["rides_along_in"].to_pylist() == [None] * 6 + ["ltv"] * 3 * len(REFERENCES)
     assert set(compared()[0].result.summaries[0]) - {"references"} <= set(table.column_names)
 
 
