@@ -43,11 +43,17 @@ def cell(values: np.ndarray) -> str:
     return f"{middle:.2f} ({low:.2f} to {high:.2f})"
 
 
-cases = [(f"`{name}`", [], name) for name in OBSERVERS]
-cases += [("gyro feedback", ['controller.feedback="fog"'], "homogeneous")]
-cases += [("true feedback", ['controller.feedback="truth"'], "homogeneous")]
-rows = []
-for label, overrides, observer in cases:
-    pushed, quiet = (limits([*overrides, *more], observer) for more in ([], ["push=[]"]))
-    rows.append((label, *(cell(values) for values in (*pushed, *quiet))))
-print(markdown.table(("in the loop", "e < 0, push", "e > 0, push", "e < 0, no push", "e > 0, no push"), rows))
+def main() -> None:
+    """Print the table of docs/results.md."""
+    cases = [(f"`{name}`", [], name) for name in OBSERVERS]
+    cases += [("gyro feedback", ['controller.feedback="fog"'], "homogeneous")]
+    cases += [("true feedback", ['controller.feedback="truth"'], "homogeneous")]
+    rows = []
+    for label, overrides, observer in cases:
+        pushed, quiet = (limits([*overrides, *more], observer) for more in ([], ["push=[]"]))
+        rows.append((label, *(cell(values) for values in (*pushed, *quiet))))
+    print(markdown.table(("in the loop", "e < 0, push", "e > 0, push", "e < 0, no push", "e > 0, no push"), rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""Which observer for which robot: README's table.
+
+python docs/studies/for_a_builder.py [--worlds 20] (about four minutes on two quiet cores)
+
+Errors are those of `cmg-mj compare push_recovery`: the same worlds and noise for every observer, each in its own loop.
+How much bias a loop bears is `bias_limits.py`'s, under the same push. Instructions are those of `cmg-mj bench --board`;
+without the tools for that they are left out.
+"""
+
+import argparse
+
+import numpy as np
+from bias_limits import limits
+
+from cmg_mj import board_cost, load_scenario, markdown, prepare
+from cmg_mj.errors import InputError
+from cmg_mj.intervals import mean_interval
+from cmg_mj.observers import OBSERVERS, needs, observer_class
+from cmg_mj.references import REFERENCES
+from cmg_mj.simulate import Result
+
+ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
+WORDS = {"model": "model", "gimbals": "y2, u", "acceleration": "acceleration"}
+
+
+def errors(result: Result, companion: str | None = None) -> list[str]:
+    """Error over the run and in the push window, with 95 % intervals."""
+    cells = []
+    for key in (ERROR, PUSH_ERROR):
+        values = result.values(key, companion)
+        known = values[np.isfinite(values)]
+        interval = mean_interval(known) if len(known) else None
+        cells.append("-" if interval is None else f"{interval.mean:.4f} ±{interval.half:.4f}")
+    return cells
+
+
+def bears(observer: str) -> str:
+    """The range of e in which it stands, to 1/16 degree, median over worlds."""
+    below, above = np.median(limits([], observer), axis=1)
+    return f"-{below:.2f} to {above:.2f}" if min(below, above) >= 0.0 else "falls at 0"
+
+
+def instructions() -> dict[str, str]:
+    """Of a whole update on the board, by observer."""
+    try:
+        figures = board_cost.measure(list(OBSERVERS), lambda share: None)["figures"]
+    except InputError as error:
+        print(f"no board: {error}")
+        return {}
+    return {row["observer"]: f"{row['update_instructions']:.0f}" for row in figures}
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--worlds", type=int, default=20)
+    worlds = parser.parse_args().worlds
+    counted = instructions()
+    results = {
+        name: prepare(load_scenario("push_recovery", [], name)).run_many(worlds, keep_trajectory=False)
+        for name in OBSERVERS
+    }
+    rows = []
+    for name, result in results.items():
+        asked = [WORDS[need] for need in needs(observer_class(name))]
+        fell = f"{100.0 * result.fell.mean():.0f}%"
+        rows.append(
+            [f"`{name}`", *errors(result), fell, bears(name), counted.get(name, "-"), ", ".join(["y1", *asked])]
+        )
+    stood = {name: mean for name, r in results.items() if r.stood.all() and (mean := r.mean(ERROR)) is not None}
+    best = min(stood, key=stood.__getitem__)
+    asked = {"mems_gyro": "a gyro"}
+    rows += [[f"`{name}`", *errors(results[best], name), "-", "-", "-", asked.get(name, "-")] for name in REFERENCES]
+    headings = ["observer", "error [rad/s]", "in push window", "fell", "stands at e [deg]", "instructions", "needs"]
+    print(f"{worlds} worlds; the last rows ride along in the loop of {best}\n")
+    print(markdown.table(headings, rows))
+
+
+if __name__ == "__main__":
+    main()
