@@ -6,7 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
-EXTRAS = ("papers", "test")
+EXTRAS = ("papers", "export", "test")
 
 
 def main() -> None:

@@ -55,7 +55,7 @@ class Compiled:
     def run(self, samples: np.ndarray) -> np.ndarray:
         """What `update` makes of raw samples, (n, 4 + gimbals): the estimates and u, (n, 4 + extra signals)."""
         controller = ctypes.create_string_buffer(8192)
-        samples = samples.astype(self.type)
+        samples = np.ascontiguousarray(samples, self.type)
         results = np.full((len(samples), self.width + 1), np.nan, self.type)
         self._call("start", controller)
         for sample, result in zip(samples, results, strict=True):
