@@ -20,7 +20,7 @@ from cmg_mj.board_cost import cost_markdown, cost_of, cost_table
 from cmg_mj.controller import Decision
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
-from cmg_mj.observers import OBSERVERS
+from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.papers.aranovskiy2020 import on_the_board
 from cmg_mj.scenario import load_scenario
 from tests.board.toy import toy
@@ -99,6 +99,27 @@ def test_lockstep_on_the_same_inputs(observer: str) -> None:
         assert np.sqrt(np.mean((its - ours) ** 2)) < 1e-5
     u, its_u = (np.array([decision.u for decision in those]) for those in (host.decided, decided))
     assert np.sqrt(np.mean((its_u - u) ** 2)) < 1e-4
+
+
+def test_super_twisting_is_chaotic_by_itself() -> None:
+    """So no lockstep can hold over a whole run, of single precision or of anything else; of linear it can."""
+    ends = []
+    for name in ("super_twisting", "linear"):
+        experiment = prepare(load_scenario("push_recovery", [], name))
+        recorded = experiment.run().trajectory
+        assert recorded is not None
+        columns = [recorded[key].tolist() for key in ("y1_rad", "y2_rad", "u_rad_s")]
+        rates = []
+        for moved in (0.0, 1e-12):
+            observer = experiment.design.observer()
+            state = observer.init(Measurement(columns[0][0] + moved, columns[1][0]))
+            rates.append([])
+            for y1, y2, u in zip(columns[0][1:], columns[1][1:], columns[2], strict=False):
+                state, estimate = observer.step(state, Measurement(y1 + moved, y2), u)
+                rates[-1].append(estimate[1])
+        ends.append(np.abs(np.subtract(*rates)).max())
+    assert ends[0] > 0.01
+    assert ends[1] < 1e-9
 
 
 @pytest.mark.parametrize(
