@@ -278,6 +278,11 @@ def test_observer(given: str, fragments: list[str]) -> None:
         "[sensors.accelerometer]\nskew_s = 0.0025\n[plant]\ntimestep_s = 0.001",
         f"sensors.accelerometer.skew_s = 0.0025 s: {GRID}",
     ),
+    (
+        "a low-pass that passes nothing",
+        "[sensors.accelerometer]\nbandwidth_hz = 1e-9",
+        "bandwidth_hz: 1e-09 Hz: at least 1 Hz, or 0 for no low-pass",
+    ),
     ("a low-pass that passes all", "[sensors.accelerometer]\nbandwidth_hz = 500", "equal to 0 and less than 500"),
     (
         "a low-pass at a rate that does not divide its own",
