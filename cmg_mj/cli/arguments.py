@@ -71,16 +71,26 @@ def _letters(argument: str) -> str:
         return argument
 
 
-def of_a_run(command: Callable) -> Callable:
-    """Arguments of every command that runs a scenario, which it takes as one `Chosen`."""
+def of_a_run(command: Callable, *, required: bool = True) -> Callable:
+    """Arguments of every command that runs a scenario, which it takes as one `Chosen`.
+
+    Args:
+        command: The command.
+        required: Whether a scenario must be named.
+
+    Returns:
+        The command.
+    """
 
     @functools.wraps(command)
-    def chosen(scenario: str, settings: tuple, seed: int | None, out: str | None, as_json: bool, **others: Any) -> Any:
-        return command(Chosen(scenario, settings, seed, out, as_json), **others)
+    def chosen(
+        scenario: str | None, settings: tuple, seed: int | None, out: str | None, as_json: bool, **others: Any
+    ) -> Any:
+        return command(Chosen(scenario or "", settings, seed, out, as_json), **others)
 
     for decorate in reversed(
         (
-            click.argument("scenario"),
+            click.argument("scenario", required=required),
             click.option(
                 "--set",
                 "settings",

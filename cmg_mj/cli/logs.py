@@ -77,7 +77,8 @@ def of_a_log(command: Callable) -> Callable:
     """Options of every command that reads logs, which it takes as one `Reading`."""
 
     @functools.wraps(command)
-    def reading(
+    def read_so(
+        *before: Any,
         columns: tuple[str, ...],
         units: tuple[str, ...],
         scale: tuple[str, ...],
@@ -105,11 +106,12 @@ def of_a_log(command: Callable) -> Callable:
             "radii_m": None if radii is None else _pair(radii, ",", "--radii", "INNER,OUTER, such as 0.05,0.15"),
             "between_s": None if between is None else span(between, "--between"),
         }
-        return command(Reading(assignments(columns, "--columns"), options), **others)
+        reading = Reading(assignments(columns, "--columns"), options)
+        return command(*before, reading=reading, **others)
 
     for decorate in reversed(LOG_OPTIONS):
-        reading = decorate(reading)
-    return reading
+        read_so = decorate(read_so)
+    return read_so
 
 
 def _numbers(texts: dict[str, str], option: str) -> dict[str, float]:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import click
 
 from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, check_observer, claim, named, names_of, of_a_run, of_observers
+from cmg_mj.cli.logs import Reading, of_a_log
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code, where
+from cmg_mj.differences import safe_name
 from cmg_mj.errors import InputError, nearest
 
 
@@ -85,7 +89,7 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
 
 @click.command(short_help="Fit an observer's parameters to the gyro.")
 @click.option("--observer", metavar="NAME", help="What to tune: a name, or your own as package.module:Class.")
-@of_a_run
+@partial(of_a_run, required=False)
 @click.option(
     "--worlds",
     type=click.IntRange(2, MOST_WORLDS // 10),  # whose trajectories are kept
@@ -103,9 +107,31 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     help="Where to search for a parameter; may be given again.",
 )
 @click.option("--noise", default="", metavar="LIST", help="Accelerometer noise densities to tune at [ug/rtHz].")
+@click.option("--log", "logs", multiple=True, metavar="LOG", help="Tune on your own log instead; may be given again.")
+@click.option(
+    "--split",
+    type=float,
+    default=0.5,
+    show_default=True,
+    metavar="SHARE",
+    help="Share of each log, from its start, that is fitted; the rest is scored.",
+)
+@click.option("--model", metavar="RIG", help="Of a log, your pendulum, as replay takes it.")
+@click.option("--skip", type=float, default=1.0, metavar="SECONDS", help="Of a log, not judged after each start.")
+@of_a_log
 @users_code()
 def tune(
-    chosen: Chosen, observer: str | None, worlds: int, parameters: str, ranges: tuple[str, ...], noise: str
+    chosen: Chosen,
+    observer: str | None,
+    worlds: int,
+    parameters: str,
+    ranges: tuple[str, ...],
+    noise: str,
+    logs: tuple[str, ...],
+    split: float,
+    model: str | None,
+    skip: float,
+    reading: Reading,
 ) -> None:
     """Fit an observer's parameters to the gyro, as section V of aranovskiy2020 does; observer_tuning is its experiment.
 
@@ -115,7 +141,18 @@ def tune(
     given parameters are the best ones.
 
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
+
+    With --log and --columns (as in replay) instead of SCENARIO it is a log's reference that is fitted, on one part of
+    the log, and scored on another: cmg-mj tune --log LOG.csv --columns tilt=pitch_deg,rate=gyro_dps --observer linear
     """
+    chosen_numbers = [name.strip() for name in parameters.split(",") if name.strip()]
+    if logs:
+        _tune_on_logs(chosen, observer, logs, reading, split, model, skip, chosen_numbers, dict(map(_range, ranges)))
+        return
+    if not chosen.name:
+        raise InputError("tune: name a scenario, such as observer_tuning, or a log with --log")
+    if reading.columns:
+        raise InputError("--columns: is for --log LOG")
     from cmg_mj.runs import file_name
     from cmg_mj.tuning import figures_of, files_of_study, save_study, tuning_table
     from cmg_mj.tuning import tune as fit
@@ -133,7 +170,7 @@ def tune(
             study = fit(
                 scenario,
                 worlds=worlds,
-                parameters=[name.strip() for name in parameters.split(",") if name.strip()],
+                parameters=chosen_numbers,
                 ranges=dict(_range(text) for text in ranges),
                 noise_ug_rthz=densities,
                 on_share=on_progress,
@@ -146,6 +183,55 @@ def tune(
     if ctrl_c.noted:
         say(f"interrupted; {len(study.levels)} of {wanted} noise densities are in {where(folder, place)}")
         sys.exit(INTERRUPTED)
+
+
+def _tune_on_logs(
+    chosen: Chosen,
+    observer: str | None,
+    logs: Sequence[str],
+    reading: Reading,
+    split: float,
+    model: str | None,
+    skip: float,
+    parameters: Sequence[str],
+    ranges: Mapping[str, tuple[float, float]],
+) -> None:
+    """Tune on a user's logs."""
+    from cmg_mj.log_runs import model_of, parameters_of
+    from cmg_mj.runs import file_name
+    from cmg_mj.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
+    from cmg_mj.tuning.logged import FILES
+
+    if chosen.name:
+        raise InputError(f"{chosen.name}: either a scenario or --log, not both")
+    if observer is None:
+        raise InputError("--log: say which observer, --observer NAME")
+    check_observer("--observer", observer)
+    for setting in chosen.settings:
+        if not setting.startswith("observer."):
+            raise InputError(f"--set {setting}: of a log write observer.PARAMETER=VALUE")
+    given = parameters_of([observer + setting.removeprefix("observer") for setting in chosen.settings])
+    read = [reading.read(path) for path in logs]
+    pendulum = None if model is None else model_of(model)
+    default = Path("runs") / f"tune-{file_name(observer)}-{safe_name(read[0].name)}"
+    folder = claim(default if chosen.out is None else named(chosen.out), FILES)
+    with CtrlC() as ctrl_c:
+        with progress(f"{read[0].name}: {observer}", 1.0, ctrl_c) as on_progress:
+            study = tune_on_logs(
+                read,
+                observer,
+                model=pendulum,
+                given=given.get(observer),
+                split=split,
+                skip_s=skip,
+                parameters=parameters,
+                ranges=ranges,
+                on_share=on_progress,
+            )
+        show(figures_of_logs(study), logs_table(study), chosen.as_json)
+        place = save_log_study(folder, study)
+    said = ",".join(f"{n.parameter}" for n in study.numbers)
+    say_written(folder, place, f"Tuned: {said}; replay it with --set {observer}.NAME=VALUE", chosen.as_json)
 
 
 def _range(text: str) -> tuple[str, tuple[float, float]]:

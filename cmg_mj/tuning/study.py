@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -25,6 +25,34 @@ AT_A_LIMIT = 1.02
 """A number this close to a limit of its range is at the limit."""
 
 OnShare = Callable[[float], None]
+
+
+class Scored(Protocol):
+    """What parameters are scored on: recorded worlds, or stretches of logs."""
+
+    @property
+    def fell(self) -> int:
+        """How many more fell."""
+        ...
+
+    @property
+    def worlds(self) -> int:
+        """How many."""
+        ...
+
+    @property
+    def zero_rms(self) -> float:
+        """The error of an estimate of zero, their mean [rad/s]."""
+        ...
+
+    @property
+    def largest_acceleration(self) -> float:
+        """Of the tilt [rad/s^2]."""
+        ...
+
+    def errors(self, observer: Observer) -> np.ndarray:
+        """An observer's RMS error in each, (n,) [rad/s]; NaN where it is lost."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -169,11 +197,11 @@ def tune(
             recorded(scenario, span, noise_ug_rthz=density, warm_up_s=warm_up_s)
             for span in (range(worlds), range(worlds, 2 * worlds))
         )
-        fitter = _Fitter(kind, _maker(experiment, density), given, fit, share)
+        fitter = Fitter(kind, _maker(experiment, density), given, fit, share)
         if not levels:
             still, window = fitter.idle(numbers), fit.window
             if len(still) == len(numbers):
-                raise InputError(f"the rate that {kind} estimates does not depend on {_names(numbers)}")
+                raise InputError(f"the rate that {kind} estimates does not depend on {names_of(numbers)}")
             numbers = [number for number in numbers if number not in still]
         fitter.expected = evaluations(len(numbers))
         # What was best at the noise before is near the best at this one.
@@ -181,7 +209,7 @@ def tune(
             [replace(n, given=math.copysign(levels[-1].sizes[n.name], n.given)) for n in numbers] if levels else numbers
         )
         try:
-            levels.append(_level(density, fitter, from_here, held_out, starts))
+            levels.append(level_of(density, fitter, from_here, held_out, starts))
             share(1.0)
         except KeyboardInterrupt:
             if not levels:
@@ -190,7 +218,8 @@ def tune(
     return Study(scenario, kind, given, numbers, [number.name for number in still], worlds, window, levels)
 
 
-def _names(numbers: Sequence[Number]) -> str:
+def names_of(numbers: Sequence[Number]) -> str:
+    """Numbers in a message."""
     return ", ".join(number.name for number in numbers)
 
 
@@ -203,11 +232,11 @@ def _maker(experiment: Experiment, noise_ug_rthz: float | None = None) -> Callab
     return partial(make_observer, experiment.scenario.observer.kind, dt, model, noise)
 
 
-class _Fitter:
+class Fitter:
     """Scores parameters on the fitted worlds, and counts how often."""
 
     def __init__(
-        self, kind: str, make: Callable[..., Observer], given: Mapping[str, Any], recorded: Recorded, on_share: OnShare
+        self, kind: str, make: Callable[..., Observer], given: Mapping[str, Any], recorded: Scored, on_share: OnShare
     ) -> None:
         self.kind, self.make, self.given, self.recorded = kind, make, given, recorded
         self.on_share = on_share
@@ -215,7 +244,7 @@ class _Fitter:
         self.count = 0
         self.given_loss = self._mean(given)
 
-    def errors(self, parameters: Mapping[str, Any], recorded: Recorded) -> np.ndarray:
+    def errors(self, parameters: Mapping[str, Any], recorded: Scored) -> np.ndarray:
         """Velocity RMS errors, (n_worlds,) [rad/s]; not a number where the observer refuses or fails."""
         try:
             return recorded.errors(self.make(**parameters))
@@ -239,7 +268,22 @@ class _Fitter:
         return idle(lambda sizes: self.loss(numbers, sizes), numbers, self.given_loss)
 
 
-def _level(noise: float, fitter: _Fitter, numbers: Sequence[Number], held_out: Recorded, starts: int) -> Level:
+def level_of(noise: float, fitter: Fitter, numbers: Sequence[Number], held_out: Scored, starts: int) -> Level:
+    """Search, and score what was found.
+
+    Args:
+        noise: Noise density of the accelerometers, to be told [ug/sqrt(Hz)].
+        fitter: Scores on what is fitted.
+        numbers: What is tuned.
+        held_out: What is scored.
+        starts: Starts of a search in several dimensions.
+
+    Returns:
+        What came out.
+
+    Raises:
+        InputError: No parameters give an estimate that stays finite.
+    """
     fitter.count = 0
     sizes, found = search(lambda tried: fitter.loss(numbers, tried), numbers, starts=starts)
     if not math.isfinite(found):

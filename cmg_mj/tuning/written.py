@@ -28,19 +28,20 @@ def figures_of(study: Study) -> dict[str, Any]:
         "worlds_fitted": study.worlds,
         "window_s": list(study.window),
         "scored_s": [list(window) for window in windows_of(study.scenario)],
-        "given_parameters": _plain(study.given),
+        "given_parameters": plain(study.given),
         "tuned": [number.name for number in study.numbers],
         "idle": list(study.idle),
-        "levels": [_level(level) for level in study.levels],
+        "levels": [level_figures(level) for level in study.levels],
         "given_best_at_noise_density_ug_rthz": best.noise_ug_rthz,
         **({"given_best_noise_is": best.where} if len(study.levels) > 1 else {}),
     }
 
 
-def _level(level: Level) -> dict[str, Any]:
+def level_figures(level: Level) -> dict[str, Any]:
+    """One level's figures."""
     return {
         "noise_density_ug_rthz": level.noise_ug_rthz,
-        "parameters": _plain(level.parameters),
+        "parameters": plain(level.parameters),
         "at_a_limit": list(level.edges),
         "fit_rms_error_rad_s": _number(level.fit_rms),
         "fit_given_rms_error_rad_s": _number(level.fit_given_rms),
@@ -57,7 +58,8 @@ def _level(level: Level) -> dict[str, Any]:
     }
 
 
-def _plain(parameters: Mapping[str, Any]) -> dict[str, Any]:
+def plain(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters as JSON and TOML can hold them."""
     return {name: _listed(value) for name, value in parameters.items() if value is not None}
 
 
@@ -100,13 +102,13 @@ def tuning_table(study: Study) -> Table:
             *sizes,
             f"{level.rms.mean():.4f}",
             f"{level.given_rms.mean():.4f}",
-            _spread(level.ratio),
+            spread(level.ratio),
             level.verdict,
         )
     return table
 
 
-def _spread(ratio: Interval) -> str:
+def spread(ratio: Interval) -> str:
     """To three decimals, or as many as show on which side of 1 an end lies."""
     digits = 3
     while digits < 6 and any(value != 1.0 and round(value, digits) == 1.0 for value in ratio[1:]):
