@@ -35,7 +35,7 @@ YARDSTICKS: dict[str, Colour] = {
     "zero": (120, 120, 120),
     "mems_gyro": (6, 109, 61),
     "floor_y1": (133, 179, 209),
-    "floor_acceleration": (143, 83, 167),
+    "floor_accel": (143, 83, 167),
 }
 """What observers are compared with."""
 

@@ -11,7 +11,7 @@ from scipy.linalg import solve_discrete_are
 
 from cmg_mj.tilt import TiltNoise
 
-FLOOR_Y1, FLOOR_ACCELERATION = "floor_y1", "floor_acceleration"
+FLOOR_Y1, FLOOR_ACCELERATION = "floor_y1", "floor_accel"
 FLOORS = (FLOOR_Y1, FLOOR_ACCELERATION)
 """Their names, in the order of every table."""
 

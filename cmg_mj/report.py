@@ -106,10 +106,10 @@ def comparison_note(summaries: Sequence[Mapping[str, Any]]) -> str:
     riding = next((summary["rides_along_in"] for summary in summaries if "rides_along_in" in summary), None)
     if riding:
         lines.append(
-            f"What closes no loop rides along in that of {riding}, the best: zero, an estimate of zero;\n"
-            "mems_gyro, a two-dollar gyro; floor_y1, the best linear filter of the last 0.5 s of y1 for this very\n"
-            "world, found afterwards; floor_acceleration, the least that y1 with its acceleration allow for\n"
-            "whatever motion, by the noise of their datasheet."
+            f"What closes no loop rides along in that of {riding}, the best:\n"
+            "zero, an estimate of zero; mems_gyro, a two-dollar gyro; floor_y1, the best linear filter of\n"
+            "y1 alone (its last 0.5 s) for this very world, found afterwards; floor_accel, the least error that\n"
+            "y1 with its acceleration allow for whatever motion, by the noise of their datasheet."
         )
     return "\n".join(lines)
 

@@ -103,7 +103,7 @@ def bars(noises: Sequence[float], biases: tuple[float, ...], worlds: int) -> Non
             for key, bar in zip((ERROR, PUSH_ERROR), BARS.get(noise, (math.nan, math.nan)), strict=True):
                 rival = best(present, key)
                 row += [f"`{rival}`", against(ratio(of.values(key), present[rival].values(key)), bar)]
-            row.append(against(ratio(of.values(ERROR), of.values(ERROR, "floor_acceleration")), FLOOR_BAR))
+            row.append(against(ratio(of.values(ERROR), of.values(ERROR, "floor_accel")), FLOOR_BAR))
             row += [against(ratio(off[offset][i].values(ERROR), of.values(ERROR)), OFFSET_BAR) for offset in OFFSETS]
             rows.append(row)
     print(f"\nVelocity RMS error, in the push window after the stroke [rad/s], {worlds} worlds:\n")
@@ -195,13 +195,13 @@ def model(noises: Sequence[float]) -> None:
     for noise in noises:
         of = experiment("gyro_free", noise)
         dt, reduced, said = of.design.given
-        free = of.run_many(1, keep_trajectory=False).mean(ERROR, "floor_acceleration") or math.nan
+        free = of.run_many(1, keep_trajectory=False).mean(ERROR, "floor_accel") or math.nan
         known = velocity_floor(reduced, dt, said.tilt)
         rows.append([f"{noise:g}", f"{free:.5f}", f"{known:.5f}", f"{100.0 * (1.0 - known / free):.1f} %"])
     print(
         "\nThe floor of y1 and its acceleration for any motion, and the floor with model, command, push and e known, to"
     )
-    print("which the measured acceleration adds nothing [rad/s]: so much can a model take off at most.\n")
+    print("to which the measured acceleration adds nothing [rad/s]: so much can a model take off at most.\n")
     print(table(["ug/rtHz", "any motion", "all known", "less"], rows), flush=True)
 
 
