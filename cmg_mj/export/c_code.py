@@ -18,7 +18,7 @@ from cmg_mj.errors import InputError
 
 Precision = Literal["double", "single"]
 
-WIDEST = 90
+WIDEST = 70
 """Characters: an expression that is longer is named, and the name goes on."""
 
 ATOM, UNARY, TIMES, PLUS, COMPARED, EQUAL, AND, OR, CHOICE = range(9)

@@ -13,6 +13,7 @@ from cmg_mj.errors import InputError, raised
 from cmg_mj.export import check
 from cmg_mj.export.c_code import Precision, operations
 from cmg_mj.export.constants import constants_of
+from cmg_mj.export.example import example, vector
 from cmg_mj.export.names import files_of
 from cmg_mj.export.texts import Texts
 from cmg_mj.export.trace import trace
@@ -71,9 +72,11 @@ def _code(controller: Controller, precision: Precision) -> Code:
     samples = check.signals(controller, 0, precision)
     expected = check.in_python(controller, samples)
     allowed = check.allowed(controller, samples, expected, precision)
-    vector = texts.vector(samples.tolist(), expected.tolist(), allowed.tolist())
-    made = (texts.header(), texts.source(), texts.example(), vector)
-    files = dict(zip(files_of(texts.name), made, strict=True))
+    beside = (
+        example(texts.name, check.columns(controller)),
+        vector(texts.name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
+    )
+    files = dict(zip(files_of(texts.name), (texts.header(), texts.source(), *beside), strict=True))
     compile_with = check.compiler()
     figures = {
         "observer": texts.name,

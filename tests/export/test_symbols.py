@@ -1,0 +1,89 @@
+"""Symbols in the place of numbers: what `elementwise` makes of them, and what a state may be made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.export.tree import form, identifiers, numbers, rebuilt
+from cmg_mj.observers import Measurement
+from tests.export import own
+from tests.export.compiled import controller
+from tests.test_elementwise import FUNCTIONS, SPECIAL
+
+import casadi  # isort: skip  (skipped above where it is missing)
+
+from cmg_mj.export.symbol import Symbol  # isort: skip
+from cmg_mj.export.trace import _as_written  # isort: skip
+from cmg_mj.export.work import code  # isort: skip
+
+
+def symbol(name: str = "x") -> Any:
+    return Symbol(casadi.SX.sym(name))
+
+
+TRACED = [function for function in FUNCTIONS if function.id not in ("round", "digitise")]
+"""All but those that only sensors need."""
+
+
+@pytest.mark.parametrize("function", TRACED)
+def test_a_symbol_equals_floats_bit_by_bit(function: Callable) -> None:
+    """But for the sign of a zero, as with arrays."""
+    x = symbol()
+    with _as_written():
+        traced = casadi.Function("f", [x.sx], [function(x).sx])
+    values = [*SPECIAL, *np.random.default_rng(3).normal(0.0, 1.0, 200).tolist()]
+    assert [float(traced(value)) for value in values] == [function(value) for value in values]  # type: ignore[arg-type]
+
+
+def test_numpys_numbers_and_arrays_on_the_left() -> None:
+    x = symbol()
+    for left in (np.float64(2.0), np.array(2.0), 2, 2.0, np.int64(2), True):
+        assert isinstance(left * x, Symbol)
+        assert isinstance(x < left, Symbol)
+    column = np.array([1.0, 2.0]) * x + np.array([x, 1.0], dtype=object)
+    assert [type(part) for part in column] == [Symbol, Symbol]
+    assert isinstance((np.eye(2) @ column)[0], Symbol)
+    assert isinstance(np.sin(column)[1], Symbol)
+
+
+@pytest.mark.parametrize("name", ["Elaborate", "Branches"])
+def test_casadi_is_left_as_it_was(name: str) -> None:
+    for before in (True, False):
+        casadi.GlobalOptions.setSimplificationOnTheFly(before)
+        try:
+            code(controller(f"tests.export.own:{name}"), "double")
+        except InputError:
+            assert name == "Branches"
+        assert casadi.GlobalOptions.getSimplificationOnTheFly() is before
+    casadi.GlobalOptions.setSimplificationOnTheFly(True)
+
+
+def test_a_state_is_taken_apart_and_put_together() -> None:
+    state = own.Elaborate(0.005, None).init(Measurement(0.1, 0.2, 0.3))
+    found = list(numbers(state))
+    assert [leaf.value for leaf in found] == [0, False, 0.1, 0.0, 0.0, 0.1, 0.2, 0.3, 0.0]
+    again = rebuilt(state, iter(range(9)))
+    assert form(again) == form(state)
+    assert (again.last.acceleration, again.parts["π"].other, again.label) == (7, [3, 4], "a constant")
+    assert form(state._replace(label="another")) != form(state)
+
+
+def test_names_in_c() -> None:
+    paths = [("x", "1"), ("x_1",), ("double",), ("0",), ("π", "a"), (), ("__x",), ("x", "1")]
+    names = identifiers(paths, taken=("value",))
+    assert names == ["x_1", "x_1_", "double_", "s0", "s__a", "value_", "s__x", "x_1__"]
+
+
+def test_a_symbol_has_no_value() -> None:
+    for ask in (bool, float, int, complex, round, math.sin, math.floor):
+        with pytest.raises(InputError):
+            ask(symbol())
+    with pytest.raises(TypeError):
+        hash(symbol())
+    assert repr(symbol("tilt")) == "Symbol(tilt)"
