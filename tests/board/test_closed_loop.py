@@ -28,6 +28,7 @@ from tests.command import cmg_mj
 
 pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
 
+NO_COUNTS = ("sensors.accelerometer.counts_per_g=0", "sensors.encoder.counts_per_revolution=0")
 SHORT = ("duration_s=0.5", "plant.initial_tilt_deg=0.5", "push=[]")
 
 
@@ -127,15 +128,15 @@ def test_super_twisting_is_chaotic_by_itself() -> None:
     [("gyro_free", ()), ("adaptive", ("controller.trim_s=0.2", "controller.angles=estimated"))],
 )
 def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
-    """As long as single precision allows, tick by tick: an unstable plant doubles a difference every 0.1 s."""
-    experiment = short(observer, *settings)
+    """Tick by tick, without the sensors' counts: a reading just between two of them may fall to either side."""
+    experiment = short(observer, *NO_COUNTS, *settings)
     host, board = experiment.run(), experiment.run(driver="board")
     assert board.outcomes == host.outcomes
     assert host.trajectory is not None
     assert board.trajectory is not None
     assert board.trajectory.columns.keys() == host.trajectory.columns.keys()
     for name in ("x1_rad", "x2_rad_s", "u_rad_s", "x_e_rad_times_s", f"estimate/{observer}/x2_rad_s"):
-        np.testing.assert_allclose(board.trajectory[name], host.trajectory[name], atol=1e-3, err_msg=name)
+        np.testing.assert_allclose(board.trajectory[name], host.trajectory[name], atol=1e-4, err_msg=name)
     assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
 
 
