@@ -14,7 +14,7 @@ from cmg_mj.logs import read_log
 from cmg_mj.observers import make_observer
 from cmg_mj.replay import replay
 from cmg_mj.trajectory import Trajectory
-from tests.logs.motion import AMPLITUDE, COLUMNS, DT, N, OMEGA, rate, sine, tilt, write_csv
+from tests.logs.motion import AMPLITUDE, COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
 from tests.observers.reference import PAPER
 
 PEAK = AMPLITUDE * OMEGA

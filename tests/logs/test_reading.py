@@ -14,7 +14,7 @@ import pytest
 from cmg_mj.errors import InputError
 from cmg_mj.logs import Log, read_log
 from cmg_mj.units import unit_of_name
-from tests.logs.motion import COLUMNS, DT, N, OMEGA, rate, sine, tilt, write_csv
+from tests.logs.motion import COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
 
 SIGNALS = ("time_s", "y1_rad", "reference_rad_s")
 
