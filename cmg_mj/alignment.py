@@ -10,7 +10,7 @@ import numpy as np
 
 LONGEST_LAG_S = 0.5
 """Lags are looked for up to this, and no farther than a quarter of what there is [s]."""
-AS_GOOD = 0.995
+AS_GOOD = 0.98
 """A periodic motion fits itself every period: of peaks this close to the highest, the one nearest to no lag counts."""
 SPAN_S = 0.2
 """A reference's size is taken from how far it says the tilt has come in so long [s]."""

@@ -127,6 +127,8 @@ def replay_log(
     names = list(OBSERVERS) if observers is None else list(dict.fromkeys(observers))
     parameters = dict(parameters or {})
     noise = noise or noise_of(log)
+    if not 0.0 <= skip_s < math.inf:
+        raise InputError(f"--skip {skip_s:g}: must be a number of seconds not below 0")
     scored = log.scored(skip_s)
     _check_scored(log, scored, skip_s)
     ready, left_out = _ready(log, names, model, noise, parameters)
@@ -153,8 +155,6 @@ def replay_log(
 
 
 def _check_scored(log: Log, scored: np.ndarray, skip_s: float) -> None:
-    if not 0.0 <= skip_s < math.inf:
-        raise InputError(f"--skip {skip_s:g}: must be a number of seconds not below 0")
     if scored.sum() < 10:
         raise InputError(
             f"{log.name}: nothing is left to be judged: {log.duration_s:.3g} s in {len(log.parts)} "

@@ -12,7 +12,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.logs.columns import ACCELEROMETERS, Column, columns_of
-from cmg_mj.logs.sampling import Part, Sampler, sampled_where_known
+from cmg_mj.logs.sampling import SAME_TIME, Part, Sampler, sampled_where_known
 from cmg_mj.logs.table import read_table
 from cmg_mj.push import Push, Window, push_windows
 from cmg_mj.tilt import RadialTilt
@@ -21,6 +21,8 @@ from cmg_mj.trajectory import Trajectory
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
 SAY_COLUMNS = "say which columns are what, --columns tilt=HEADING,rate=HEADING,..."
+LARGEST = 1e12
+"""Of anything measured, times since 1970 included [rad, rad/s, m/s^2, s]."""
 A_TURN = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is an angle that starts again, not a motion [rad]."""
 
@@ -138,7 +140,9 @@ def read_log(
         raise InputError("--delay: there is no reference to shift; name it, --columns rate=...")
     headings = [column.name for column in found.values()]
     table, notes = read_table(path, headings, found["time"].name if "time" in found else None)
-    raw = {role: table[column.name.strip()] * column.factor + column.offset for role, column in found.items()}
+    with np.errstate(over="ignore"):
+        raw = {role: table[column.name.strip()] * column.factor + column.offset for role, column in found.items()}
+    _check_sizes(path, found, raw)
     time = raw.pop("time", None)
     if "time" in found and not found["time"].told:
         notes.append(f"the time {found['time'].name!r} is taken as seconds")
@@ -257,12 +261,22 @@ def _joined(
         stamps, reference = stamps[known], reference[known]
         order = np.argsort(stamps, kind="stable")
         stamps, reference = stamps[order], reference[order]
-        first = np.concatenate([[True], np.diff(stamps) > 0.0])
+        first = np.concatenate([[True], np.diff(stamps) > SAME_TIME * parts[0].step])
         stamps, reference = stamps[first], reference[first]
         columns[REFERENCE] = np.concatenate(
             [sampled_where_known(part.time, part.when(stamps) - delay, reference) for part in parts]
         )
     return columns
+
+
+def _check_sizes(path: Path, found: Mapping[str, Column], raw: Mapping[str, np.ndarray]) -> None:
+    """Refuse numbers so large that formulas overflow; nothing measured has them."""
+    for role, values in raw.items():
+        beyond = np.abs(values) > LARGEST
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            where = f"{path}: row {row + 1}, column {found[role].name!r}"
+            raise InputError(f"{where}: {values[row]:.3g} in SI units is no {role}; at most {LARGEST:g}")
 
 
 def _check_motion(path: Path, columns: Mapping[str, np.ndarray], referred: bool) -> None:

@@ -21,6 +21,8 @@ FEWEST = 20
 """A part with fewer rows is left out."""
 FEW_REPEATED = 0.05
 """More rows than this share with the stamp of the row before are a mistake, fewer are left out."""
+SAME_TIME = 1e-6
+"""Rows so small a part of the usual step apart are of the same time."""
 SLOWEST_HZ, FASTEST_HZ = 0.1, 1e6
 
 
@@ -39,6 +41,11 @@ class Part:
     values: Mapping[str, np.ndarray]
     stamps: np.ndarray
     placed: np.ndarray
+
+    @property
+    def step(self) -> float:
+        """Between samples [s]."""
+        return float(self.time[1] - self.time[0])
 
     def when(self, stamps: np.ndarray) -> np.ndarray:
         """Times in this part of what other rows' stamps say, beyond its ends too, (k,) [s]."""
@@ -113,8 +120,8 @@ class Sampler:
                 f"{'there alone' if (steps < 0.0).sum() == 1 else f'the first of {(steps < 0.0).sum()} times'}: "
                 "cut the log there, or leave time out and give --rate"
             )
-        again = steps == 0.0
-        if again.mean() > FEW_REPEATED if len(again) else False:
+        again = steps <= SAME_TIME * np.median(steps) if len(steps) else steps > 0.0
+        if len(again) and again.mean() > FEW_REPEATED:
             raise InputError(
                 f"{self.where}: {again.sum():,} of {len(time):,} rows have the same time as the row before: the stamps "
                 "are too coarse; leave time out and give --rate"

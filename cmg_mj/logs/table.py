@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -57,15 +58,18 @@ def read_table(path: Path, wanted: Sequence[str], time: str | None) -> tuple[dic
         InputError: It cannot be read, lacks a column, or has text among the numbers.
     """
     try:
-        if not path.is_file():
-            what = "no file" if path.exists() else "no such file"
-            raise InputError(f"{path}: {what}; name a CSV or Parquet file, or the folder of a run")
-        with path.open("rb") as file:
-            head = file.read(HEAD)
+        regular, there = path.is_file(), path.exists()
+        head = b""
+        if regular:
+            with path.open("rb") as file:
+                head = file.read(HEAD)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:  # such as a name with a zero byte
         raise InputError(f"{str(path)!r}: cannot be read: {error}") from error
+    if not regular:
+        what = "no file" if there else "no such file"
+        raise InputError(f"{path}: {what}; name a CSV or Parquet file, or the folder of a run")
     if not head.strip():
         raise InputError(f"{path}: empty")
     notes: list[str] = []
@@ -158,15 +162,25 @@ def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
     if encoding == "utf-8":
         if b"\0" in head:
             raise InputError(f"{path}: neither CSV nor Parquet")
-        try:
-            head[: head.rfind(b"\n") + 1].decode("utf-8")
-        except UnicodeDecodeError:
-            encoding = "latin-1"
+        encoding = "utf-8" if _is_utf8(path) else "latin-1"
     lines = head.decode(encoding, "ignore").lstrip("\ufeff").splitlines()
     for i, line in enumerate(lines):
         if line.strip() and not line.lstrip().startswith(COMMENTS):
             return encoding, i, line
     raise InputError(f"{path}: no heading in its first {HEAD // 1024} kB")
+
+
+def _is_utf8(path: Path) -> bool:
+    """Whether all of a file is."""
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    with path.open("rb") as file:
+        try:
+            while chunk := file.read(1 << 20):
+                decoder.decode(chunk)
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError:
+            return False
+    return True
 
 
 def _check_columns(path: Path, wanted: Sequence[str], names: Sequence[str]) -> None:

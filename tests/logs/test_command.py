@@ -1,0 +1,180 @@
+"""`cmg-mj replay` and `cmg-mj tune --log` as a user types them."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj.recording.logs import MAIN
+from cmg_mj.trajectory import Trajectory
+from tests.command import ROOT, Said, cmg_mj
+from tests.logs.motion import COLUMNS, sine, write_csv
+
+LOG = ROOT / "examples" / "data" / "stepper_encoder_gyro.csv"
+REAL = "time=time_s,tilt=encoder_rad,rate=gyr_y_rad_s"
+PLAIN = ",".join(f"{role}={name}" for role, name in COLUMNS.items())
+FILES = ["plot.png", "recording.rrd", "replay.toml", "signals.parquet", "summary.json"]
+
+
+@pytest.fixture(autouse=True)
+def _logs(elsewhere: None) -> None:
+    write_csv("sine.csv", sine())
+
+
+def replay(*arguments: object) -> Said:
+    return cmg_mj("replay", *arguments)
+
+
+def files(folder: Path | str) -> list[str]:
+    return sorted(name for name in os.listdir(folder) if name != ".cmg-mj")
+
+
+def test_the_real_log() -> None:
+    """Its gyro comes 12 ms behind and is 1.5 % too small, says its .txt; a difference is half a sample late."""
+    as_it_is = json.loads(replay(LOG, "--columns", REAL, "--observers", "linear", "--json").out)["logs"][0]
+    assert as_it_is["reference"]["lag_s"] == pytest.approx(0.012, abs=2e-4)
+    assert as_it_is["reference"]["scale"] == pytest.approx(1.015, abs=2e-3)
+    said = replay(LOG, "--columns", REAL, "--delay", 0.012, "--scale", "rate=1.015", "--json")
+    (log,) = json.loads(said.out)["logs"]
+    assert log["observers"]["finite_difference"]["lag_s"] == pytest.approx(0.005, abs=5e-4)
+    assert 0.75 < log["observers"]["finite_difference"]["velocity_fit"] < 0.8
+    assert 0.02 < log["observers"]["linear"]["lag_s"] < 0.03
+    assert log["observers"]["zero"]["velocity_fit"] == 0.0
+    assert abs(log["reference"]["lag_s"]) < 2e-4
+    assert set(log["left_out"]) >= {"ltv", "homogeneous", "gyro_free"}
+
+
+def test_what_it_writes() -> None:
+    said = replay("sine.csv", "--columns", PLAIN, "--out", "it")
+    assert said.status == 0
+    assert "Open the recording: rerun it/recording.rrd" in said.err
+    assert files("it") == FILES
+    assert (Path("it") / "plot.png").read_bytes()[:4] == b"\x89PNG"
+    summary = json.loads((Path("it") / "summary.json").read_text())
+    signals = Trajectory.load(Path("it") / "signals.parquet")
+    assert signals.observers == tuple(name for name in summary["logs"][0]["observers"] if name != "zero")
+    np.testing.assert_array_equal(signals["reference_rad_s"], sine()["gyro_rad_s"])
+    assert "estimate/linear/x2_rad_s" in signals.columns
+
+
+def test_its_recording() -> None:
+    from rerun.chunk import RrdReader
+
+    replay("sine.csv", "--columns", PLAIN, "--out", "it", "--observers", "linear")
+    entities = {str(chunk.entity_path) for chunk in RrdReader("it/recording.rrd").stream()}
+    assert {"/sine/tilt/measured", "/sine/rate/true", "/sine/rate_estimate/linear", "/summary", "/settings"} <= entities
+    assert len(MAIN) == 3
+
+
+def test_the_same_replay_goes_to_the_same_folder() -> None:
+    for wanted in ("runs/replay-sine", "runs/replay-sine", "runs/replay-sine-2"):
+        skip = ("--skip", "0.5") if wanted.endswith("2") else ()
+        assert f"Written to {wanted}." in replay("sine.csv", "--columns", PLAIN, *skip).err
+
+
+def test_several_logs() -> None:
+    half = {name: values[:2000] for name, values in sine().items()}
+    os.mkdir("other")
+    write_csv("other/sine.csv", half)
+    said = replay("sine.csv", "other/sine.csv", "--columns", PLAIN, "--out", "it", "--json", "--observers", "linear")
+    found = json.loads(said.out)
+    assert [log["samples"] for log in found["logs"]] == [4000, 2000]
+    each = [log["observers"]["linear"]["velocity_rms_error_rad_s"] for log in found["logs"]]
+    mean = found["mean"]["linear"]["velocity_rms_error_rad_s"]
+    assert mean["mean"] == pytest.approx(np.mean(each))
+    assert mean["interval"][0] <= min(each)
+    assert files("it") == [
+        "plot-sine-2.png",
+        "plot-sine.png",
+        "recording.rrd",
+        "replay.toml",
+        "signals-sine-2.parquet",
+        "signals-sine.parquet",
+        "summary.json",
+    ]
+    assert "Means over 2 logs" in replay("sine.csv", "other/sine.csv", "--columns", PLAIN).out
+
+
+def test_markdown_and_table_say_the_same() -> None:
+    arguments = ("sine.csv", "--columns", PLAIN, "--observers", "linear,finite_difference")
+    table, markdown = replay(*arguments).out, replay(*arguments, "--markdown").out
+    assert "| `finite_difference` |" in markdown
+    for text in (table, markdown):
+        assert "2.50" in text  # the lag [ms]
+        assert "Fit: 1 - RMS error" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((), "say which columns are what"),
+        (("--columns", "tilt=tilt_rad"), "no time"),
+        (("--columns", PLAIN, "--rate", "0"), "--rate 0: must be from 0.1 to 1e6 Hz"),
+        (("--columns", PLAIN, "--max-gap", "-1"), "--max-gap -1"),
+        (("--columns", PLAIN, "--delay", "nan"), "--delay nan: must be a finite number"),
+        (("--columns", PLAIN, "--scale", "rate=x"), "--scale rate=x: must be a number"),
+        (("--columns", PLAIN, "--radii", "1"), "write INNER,OUTER"),
+        (("--columns", PLAIN, "--between", "5:1"), "must end after its start"),
+        (("--columns", PLAIN, "--window", "a"), "--window 'a': write START:END"),
+        (("--columns", PLAIN, "--observers", "liner"), "did you mean 'linear'?"),
+        (
+            ("--columns", PLAIN, "--observers", "linear", "--set", "ltv.Q=1"),
+            "--set ltv: is not among --observers linear",
+        ),
+        (("--columns", PLAIN, "--set", "linear.tau=-1"), "tau = -1: must be a number greater than 0"),
+        (("--columns", PLAIN, "--skip", "nan"), "--skip nan"),
+        (("--columns", PLAIN, "--noise", "accelerometer=3"), "the tilt is not that of two accelerometers"),
+        (("--columns", PLAIN, "--model", "x.xml"), "no such file, nor a bundled one"),
+        (("--columns", PLAIN, "--out", ""), "name a folder"),
+    ],
+)
+def test_wrong_arguments(arguments: tuple, says: str) -> None:
+    assert says in replay("sine.csv", *arguments).complaint
+    assert not Path("runs").exists()
+
+
+def test_a_window_of_ones_own() -> None:
+    said = replay("sine.csv", "--columns", PLAIN, "--window", "2:4", "--json", "--observers", "linear")
+    figures = json.loads(said.out)["logs"][0]["observers"]["linear"]
+    assert figures["velocity_rms_error_push_rad_s"] == pytest.approx(figures["velocity_rms_error_rad_s"], rel=1e-2)
+
+
+def test_tune_on_a_log() -> None:
+    """Of a sine without noise the smallest time constant is the best; fitted on one part, scored on the other."""
+    arguments = ("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
+    said = cmg_mj("tune", *arguments, "--split", "0.3", "--json", "--out", "it")
+    found = json.loads(said.out)
+    assert found["parameters"]["tau"] == pytest.approx(0.004, rel=0.01)
+    assert found["at_a_limit"] == ["tau"]
+    assert (found["split"], found["held_out_stretches"], found["verdict"]) == (0.3, 10, "better")
+    assert files("it") == ["tuned.json"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("observer_tuning", "--log", "sine.csv", "--columns", PLAIN, "--observer", "linear"), "not both"),
+        (("--log", "sine.csv", "--columns", PLAIN), "say which observer"),
+        (
+            ("--log", "sine.csv", "--columns", "time=t_s,tilt=tilt_rad", "--observer", "linear"),
+            "no reference to tune to",
+        ),
+        (("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--split", "1"), "between 0 and 1"),
+        (("--log", "sine.csv", "--columns", PLAIN, "--observer", "ltv"), "needs a model"),
+        (("observer_tuning", "--columns", PLAIN), "is for --log"),
+        ((), "name a scenario"),
+    ],
+)
+def test_wrong_tuning(arguments: tuple, says: str) -> None:
+    assert says in cmg_mj("tune", *arguments).complaint
+
+
+def test_a_real_log_has_its_licence_beside_it() -> None:
+    text = LOG.with_suffix(".txt").read_text()
+    assert "Copyright (c) 2020 ssong47" in text
+    assert "Permission is hereby granted" in text
+    assert LOG.stat().st_size < 300_000
