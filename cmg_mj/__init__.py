@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from cmg_mj.errors import InputError, RunStopped
     from cmg_mj.experiment import Experiment, prepare
     from cmg_mj.law import Law, lqr_gains
+    from cmg_mj.log_replay import Replayed, replay_log
+    from cmg_mj.logs import Log, read_log
     from cmg_mj.observers import OBSERVERS, Estimate, Measurement, Observer, make_observer
     from cmg_mj.plant import Plant, load_plant
     from cmg_mj.plant_settings import PlantSettings
@@ -38,6 +40,8 @@ _HOMES = {
     "reduced": ("ReducedModel",),
     "experiment": ("Experiment", "prepare"),
     "law": ("Law", "lqr_gains"),
+    "log_replay": ("Replayed", "replay_log"),
+    "logs": ("Log", "read_log"),
     "scenario": ("load_scenario", "parse_scenario"),
     "schema": ("Scenario",),
     "sensors": ("Accelerometer", "Encoder", "Fog", "Sensors"),
@@ -57,6 +61,7 @@ __all__ = [
     "Fog",
     "InputError",
     "Law",
+    "Log",
     "Measurement",
     "Observer",
     "Outcome",
@@ -65,6 +70,7 @@ __all__ = [
     "Push",
     "RadialTilt",
     "ReducedModel",
+    "Replayed",
     "Result",
     "RunStopped",
     "Scenario",
@@ -78,6 +84,8 @@ __all__ = [
     "make_observer",
     "parse_scenario",
     "prepare",
+    "read_log",
+    "replay_log",
 ]
 
 

@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 from rich import box
+from rich.console import Group
 from rich.table import Table
+from rich.text import Text
 
 from cmg_mj.errors import InputError
 from cmg_mj.log_replay import NO_MODEL, noise_of, replay_log
@@ -188,7 +190,7 @@ def figures_of_logs(study: LogStudy) -> dict[str, Any]:
     }
 
 
-def logs_table(study: LogStudy) -> Table:
+def logs_table(study: LogStudy) -> Group:
     """The table that `cmg-mj tune --log` prints."""
     level = study.level
     share = f"{study.split:.0%}"
@@ -202,7 +204,6 @@ def logs_table(study: LogStudy) -> Table:
     if level.edges:
         lines.append("* at a limit of its range.")
     table = Table(title=f"{', '.join(study.names)}: {study.kind}", box=box.SIMPLE_HEAD, title_justify="left")
-    table.caption, table.caption_justify = "\n".join(lines), "left"
     for heading in ("parameter", "given", "tuned"):
         table.add_column(heading, justify="left" if heading == "parameter" else "right")
     for number in study.numbers:
@@ -212,7 +213,7 @@ def logs_table(study: LogStudy) -> Table:
     table.add_row("held out [rad/s]", f"{level.given_rms.mean():.4f}", f"{level.rms.mean():.4f}")
     table.add_row("given / tuned, 95 %", "", spread(level.ratio))
     table.add_row("tuned is", "", level.verdict)
-    return table
+    return Group(table, Text("\n".join(lines)))
 
 
 def save_log_study(folder: RunFolder | Path, study: LogStudy) -> Path:
