@@ -26,3 +26,11 @@ def test_the_tables_of_the_accelerometers_errors() -> None:
     assert [len(row) for row in rows] == [10, 5]
     assert float(rows[0][1]) == 0.14  # atan(0.5 * 5e-3)
     assert "- to the MEMS gyro: in " in done.stdout
+
+
+def test_the_tables_of_gyro_free() -> None:
+    study = STEPS.with_name("gyro_free.py")
+    arguments = "--worlds 2 --noise 400 --e 0.5 --parts model,taps"
+    done = subprocess.run([sys.executable, study, *arguments.split()], capture_output=True, text=True, check=True)
+    assert "| 400       |      0.01406 |     0.01268 |  9.8 % |" in done.stdout
+    assert done.stdout.count("as in the tables") == 3

@@ -8,8 +8,8 @@ world by world. Means over the worlds; intervals are of 95 %. The parts:
 - bars: `gyro_free` by the best of the ten that stood in every world of the cell, over the whole run and in the push
   window, against the bars that were set before; by the floor of its signals; with an offset of 5 mg on either
   accelerometer by its own error without.
-- kalman: `kalman` less (9), (10) and (11), with its defaults and tuned at each noise: the white torque that has the
-  least error in the loop on seeds of its own, over the whole run and in the push window.
+- kalman: `kalman` less (9), (10) and (11), with its defaults and tuned at each noise: the torque's noises that have
+  the least error in the loop on seeds of their own, over the whole run and in the push window.
 - limits: the e at which half of 20 worlds fall, in steps of 1/16 degree.
 - model: what a filter could gain that knows the model, the command, the push and e: two floors.
 - taps: the floor of y1 alone by taps and memory, and the same fit with the acceleration beside it.
@@ -43,7 +43,7 @@ ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
 BARS = {200.0: (0.25, 0.12), 400.0: (0.35, 0.18), 800.0: (0.50, 0.25)}
 FLOOR_BAR, OFFSET_BAR = 1.1, 1.25
 OFFSETS = ("[5,0]", "[0,5]")
-WHITE = tuple(float(f"{value:.2g}") for value in np.geomspace(0.01, 0.16, 9))
+WHITE, WALK = (0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11), (0.003, 0.03)
 STEP_DEG, LARGEST = 1.0 / 16.0, 64
 
 
@@ -121,38 +121,35 @@ def _mean(result: Result) -> str:
 
 
 @cache
-def tuned_white(noise: float, biases: tuple[float, ...], key: str) -> float:
-    """The white torque of `kalman` that has the least mean error in the loop, over all e, on seeds of its own."""
+def tuned(noise: float, biases: tuple[float, ...], key: str) -> tuple[str, ...]:
+    """The torques' noise of `kalman` that has the least mean error in the loop, over all e, on seeds of its own."""
 
-    def loss(white: float) -> float:
-        found = cells("kalman", noise, biases, TUNING_WORLDS, f"observer.torque_white={white}", seed=TUNING_SEED)
+    def loss(settings: tuple[str, ...]) -> float:
+        found = cells("kalman", noise, biases, TUNING_WORLDS, *settings, seed=TUNING_SEED)
         means = [result.mean(key) if result.stood.all() else None for result in found]
         return math.inf if None in means else sum(mean for mean in means if mean is not None)
 
-    return min(WHITE, key=loss)
+    tried = product(WHITE, WALK)
+    return min(((f"observer.torque_white={white}", f"observer.torque_walk={walk}") for white, walk in tried), key=loss)
 
 
 def kalman(noises: Sequence[float], biases: tuple[float, ...], worlds: int) -> None:
     """Print `kalman` against (9), (10), (11), and what the other observers are to it."""
     others = (*OF_THE_PAPER, "high_gain", "adaptive")
     for key, where in ((ERROR, "over the whole run"), (PUSH_ERROR, "in the push window")):
-        for tuned in (False, True):
+        for fitted in (False, True):
             rows = []
             for noise in noises:
-                white = tuned_white(noise, biases, key) if tuned else None
-                of = cells("kalman", noise, biases, worlds, *([f"observer.torque_white={white}"] if white else []))
+                settings = tuned(noise, biases, key) if fitted else ()
+                of = cells("kalman", noise, biases, worlds, *settings)
+                said = ", ".join(setting.partition("=")[2] for setting in settings) or "default"
                 for i, e in enumerate(biases):
-                    row = [
-                        f"{noise:g}",
-                        f"{e:g}",
-                        "default" if white is None else f"{white:g}",
-                        f"{of[i].mean(key):.4f}",
-                    ]
+                    row = [f"{noise:g}", f"{e:g}", said, f"{of[i].mean(key):.4f}"]
                     rows.append(row + [_less(of[i], cells(name, noise, biases, worlds)[i], key) for name in others])
-            how = "tuned at each noise for this" if tuned else "its defaults"
+            how = "tuned at each noise for this" if fitted else "its defaults"
             print(f"\n`kalman`, {how}, {where}: its error, and less that of others")
             print("(in 1e-3 rad/s, with the interval's half):\n")
-            headings = ["ug/rtHz", "e [deg]", "torque_white", "error [rad/s]", *(f"less `{name}`" for name in others)]
+            headings = ["ug/rtHz", "e [deg]", "white, walk", "error [rad/s]", *(f"less `{name}`" for name in others)]
             print(table(headings, rows), flush=True)
 
 

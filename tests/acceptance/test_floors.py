@@ -1,0 +1,55 @@
+"""No observer is below the floor of its signals, and how near gyro_free comes to its own; kalman beside the paper's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmg_mj.observers import OBSERVERS, observer_class
+from cmg_mj.observers.protocol import needs
+from cmg_mj.worlds_table import riding_along
+from tests.acceptance.cases import GROUP, closed_loop, ride_along
+
+SEED = 7
+ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
+OF_Y1 = [name for name in OBSERVERS if not needs(observer_class(name))]
+
+
+def loop(name: str, key: str, reference: str | None = None) -> np.ndarray:
+    """A figure of push_recovery, (GROUP,)."""
+    return closed_loop(name, (), SEED, GROUP).values(key, reference)
+
+
+def upper_end(a: np.ndarray, b: np.ndarray) -> float:
+    """Of the 95 % interval of the ratio of two means over the same worlds, to first order."""
+    ratio = a.mean() / b.mean()
+    return ratio + 2.09 * np.std((a - ratio * b) / b.mean(), ddof=1) / np.sqrt(len(a))
+
+
+def test_these_see_y1_alone() -> None:
+    assert OF_Y1 == ["linear", "finite_difference", "super_twisting", "linear_high_gain"]
+
+
+@pytest.mark.parametrize("key", [ERROR, PUSH_ERROR])
+def test_no_observer_of_y1_alone_is_below_its_floor(key: str) -> None:
+    """On one and the same motion, in no world: the floor is found afterwards, in each world by itself."""
+    result = ride_along(SEED, GROUP)
+    worlds = [{result.observers[0]: s, **riding_along(s)} for s in result.summaries]
+    for name in OF_Y1:
+        assert all(world[name][key] > world["floor_y1"][key] for world in worlds), name
+
+
+@pytest.mark.parametrize(("key", "within"), [(ERROR, 1.2), (PUSH_ERROR, 1.3)])
+def test_gyro_free_is_at_its_floor(key: str, within: float) -> None:
+    """Above it but for chance, and by little. A push's edges are no straight line, as the floor has it."""
+    of, floor = loop("gyro_free", key), loop("gyro_free", key, "floor_accel")
+    assert np.ptp(floor) == 0.0
+    assert upper_end(of, floor) > 1.0
+    assert upper_end(of, floor) < within
+
+
+def test_gyro_free_is_several_times_nearer_than_the_best_of_y1_y2_and_u() -> None:
+    for key, most in ((ERROR, 0.35), (PUSH_ERROR, 0.18)):
+        others = [name for name in OBSERVERS if name not in ("gyro_free", "kalman", "luenberger")]
+        best = min(others, key=lambda name, key=key: np.nan_to_num(loop(name, key), nan=np.inf).mean())
+        assert upper_end(loop("gyro_free", key), loop(best, key)) < most, best
