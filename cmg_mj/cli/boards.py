@@ -11,7 +11,7 @@ from cmg_mj.cli.arguments import Chosen, check_observer, claim, named
 from cmg_mj.cli.terminal import say, say_hints, say_written, show, users_code
 
 
-@click.command(short_help="Write an observer and the control law around it as C.")
+@click.command(short_help="Write an observer and the control law around it as C code.")
 @click.argument("observer")
 @click.option("--out", metavar="FOLDER", help="Folder to write to; by default one in runs/.")
 @click.option(
