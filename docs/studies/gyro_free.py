@@ -68,7 +68,9 @@ def cells(
 
 
 def ratio(a: np.ndarray, b: np.ndarray) -> Interval:
-    """Ratio of two means over the same worlds, with its interval to first order."""
+    """Ratio of two means over the worlds that stood in both, with its interval to first order."""
+    both = np.isfinite(a) & np.isfinite(b)
+    a, b = a[both], b[both]
     mean = float(a.mean() / b.mean())
     half = mean_interval((a - mean * b) / b.mean()).half
     return Interval(mean, mean - half, mean + half)
@@ -104,7 +106,10 @@ def bars(noises: Sequence[float], biases: tuple[float, ...], worlds: int) -> Non
                 rival = best(present, key)
                 row += [f"`{rival}`", against(ratio(of.values(key), present[rival].values(key)), bar)]
             row.append(against(ratio(of.values(ERROR), of.values(ERROR, "floor_accel")), FLOOR_BAR))
-            row += [against(ratio(off[offset][i].values(ERROR), of.values(ERROR)), OFFSET_BAR) for offset in OFFSETS]
+            for offset in OFFSETS:
+                moved = off[offset][i]
+                fell = f" [{moved.fell.sum()} fell]" if moved.fell.any() else ""
+                row.append(against(ratio(moved.values(ERROR), of.values(ERROR)), OFFSET_BAR) + fell)
             rows.append(row)
     print(f"\nVelocity RMS error, in the push window after the stroke [rad/s], {worlds} worlds:\n")
     print(table(["ug/rtHz", "e [deg]", *(f"`{name}`" for name in OBSERVERS)], errors))
