@@ -90,7 +90,7 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
 def _untrimmed(scenario: Scenario, plant: Plant) -> Scenario:
     """The same without trimming the integrator, if the observer does not estimate the bias that takes."""
     controller, sensors = scenario.controller, scenario.sensors
-    given = 1.0 / controller.rate_hz, plant.reduced, plant.facts.noise(sensors.accelerometer)
+    given = 1.0 / controller.rate_hz, plant.reduced, plant.facts.noise(sensors)
     if not controller.trim_s or BIAS in extra_signals(scenario.observer.make(*given)):
         return scenario
     return scenario.model_copy(update={"controller": controller.model_copy(update={"trim_s": 0.0})})

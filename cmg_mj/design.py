@@ -42,7 +42,7 @@ class Design:
     @property
     def given(self) -> tuple[float, ReducedModel, TiltNoise]:
         """What every observer is given: the control period [s], the reduced model, the noise by the datasheet."""
-        return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors.accelerometer)
+        return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors)
 
     def observer(self) -> Observer:
         """The observer in the loop, fresh."""

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find, folder
-from cmg_mj.sensors import Accelerometer
+from cmg_mj.sensors import Sensors
 from cmg_mj.tilt import RadialTilt, TiltNoise
 
 FILE = "read_off.json"
@@ -42,9 +44,10 @@ class RigFacts(NamedTuple):
     largest_step: float
     hints: tuple[str, ...]
 
-    def noise(self, accelerometer: Accelerometer) -> TiltNoise:
-        """The noise of tilt and angular acceleration with these accelerometers."""
-        return self.tilt.noise(accelerometer.deviation, self.gravity)
+    def noise(self, sensors: Sensors) -> TiltNoise:
+        """The noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""
+        gimbal = sensors.encoder.deviation / math.sqrt(self.reduced.gimbals)
+        return replace(self.tilt.noise(sensors.accelerometer.deviation, self.gravity), gimbal=gimbal)
 
 
 def name_of(model: str, *, locked: bool) -> str:

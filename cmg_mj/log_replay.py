@@ -22,6 +22,7 @@ from cmg_mj.reduced import ReducedModel
 from cmg_mj.references import ZERO
 from cmg_mj.rehearsal import rehearse
 from cmg_mj.replay import replay_all
+from cmg_mj.sensors import Encoder
 from cmg_mj.tilt import TiltNoise
 
 SKIPPED_S = 1.0
@@ -91,10 +92,10 @@ def noise_of(
     if log.tilt is not None:
         density = NOISE_DENSITY_UG_RTHZ if accelerometer_ug_rthz is None else accelerometer_ug_rthz
         sensor = Accelerometer(rate_hz=1.0 / log.dt, noise_density_ug_rthz=density)
-        return log.tilt.noise(sensor.sigma, STANDARD_GRAVITY)
+        return dataclasses.replace(log.tilt.noise(sensor.sigma, STANDARD_GRAVITY), gimbal=Encoder().deviation)
     tilt = TILT_NOISE_DEG if tilt_deg is None else tilt_deg
     acceleration = ACCELERATION_NOISE_RAD_S2 if acceleration_rad_s2 is None else acceleration_rad_s2
-    return TiltNoise(math.radians(tilt), acceleration, 0.0)
+    return TiltNoise(math.radians(tilt), acceleration, 0.0, Encoder().deviation)
 
 
 def replay_log(

@@ -232,7 +232,7 @@ class Plant:
         sensors = sensors or Sensors()
         parameters = {name: options.pop(name) for name in options.keys() - CONTROLLER_OPTIONS}
         if isinstance(observer, str):
-            noise = self.facts.noise(sensors.accelerometer)
+            noise = self.facts.noise(sensors)
             observer = make_observer(observer, law.dt, self.reduced, noise, **parameters)
         elif parameters:
             name = next(iter(parameters))

@@ -45,6 +45,11 @@ class Encoder:
 
     channels = 0
 
+    @property
+    def deviation(self) -> float:
+        """Of one reading from the angle, by the resolution [rad]."""
+        return 2.0 * math.pi / self.counts_per_revolution / math.sqrt(12.0) if self.counts_per_revolution else 0.0
+
     def meter(self) -> Callable[[Ideal, Sequence[Scalar]], Sequence[Scalar]]:
         """A function (ideal reading, nothing) -> gimbal angles [rad]."""
         if not self.counts_per_revolution:

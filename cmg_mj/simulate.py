@@ -227,7 +227,7 @@ def simulate(
     targets = {BIAS: [rig.apparent_bias(controller.sensors.accelerometer) for rig in plants]}
     limit = controller.law.rate_limit
     accelerometer = controller.sensors.accelerometer
-    floors = Floors(rig.facts.noise(accelerometer), max(dt, 1.0 / accelerometer.rate_hz), len(plants))
+    floors = Floors(rig.facts.noise(controller.sensors), max(dt, 1.0 / accelerometer.rate_hz), len(plants))
     metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, floors)
     beside = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds)
     rows = Rows(plants, observers, controller.extra_signals, metrics, beside, dt, keep=keep_trajectory, single=single)

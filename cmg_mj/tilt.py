@@ -17,17 +17,19 @@ from cmg_mj.elementwise import Scalar, atan2
 
 @dataclass(frozen=True)
 class TiltNoise:
-    """The noise of one sample of what `RadialTilt` makes of two accelerometers.
+    """The noise of one sample of what observers are given.
 
     Attributes:
         tilt: Standard deviation of the tilt y1 [rad].
         acceleration: Standard deviation of the angular acceleration [rad/s^2].
         correlation: Of both, which come from the same two readings.
+        gimbal: Standard deviation of the gimbal angle y2 [rad].
     """
 
     tilt: float
     acceleration: float
     correlation: float
+    gimbal: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,7 @@ MUTATIONS = [
     Mutation("high_gain: d_inf", OBSERVERS + "high_gain.py", r"d_inf: Annotated\[.*?\] = " + NUMBER),
     *(
         Mutation(f"kalman: {name}", OBSERVERS + "kalman.py", rf"\n    {name}: (?:Positive|int) = " + NUMBER)
-        for name in ("torque_walk", "torque_white", "gimbal_white", "encoder_counts", "rate_start", "torque_start")
+        for name in ("torque_walk", "torque_white", "gimbal_white", "rate_start", "torque_start")
     ),
     Mutation("super_twisting: L", OBSERVERS + "super_twisting.py", r"    L: Positive = " + NUMBER),
     Mutation("super_twisting: l0", OBSERVERS + "super_twisting.py", r"l0: Positive = " + NUMBER),

@@ -85,13 +85,12 @@ class Kalman:
     Attributes:
         dt: Sample period [s].
         model: The reduced model.
-        noise: Of the tilt, by the sensors' datasheet.
+        noise: Of the tilt and of the gimbal angle, by the sensors' datasheet.
         torque_walk: How fast the torque may change: standard deviation after a second [N m]. Not tuned: it would be
             none, since e does not change there.
         torque_white: White torque: the standard deviation of its integral after a second [N m s]. Default, as of the
             next one: `cmg-mj tune observer_tuning --seed 60000`.
         gimbal_white: White part of the gimbals' rate: the standard deviation of its integral after a second [rad].
-        encoder_counts: Resolution of the gimbals' encoders [counts a revolution].
         rate_start: Standard deviation of the rate at the start, about zero [rad/s].
         torque_start: The same of the torque [N m]. On the bundled rig a bias of 1.7 degrees makes 0.2 of it.
     """
@@ -105,19 +104,13 @@ class Kalman:
     torque_walk: Positive = 0.03
     torque_white: Positive = 0.082
     gimbal_white: Positive = 0.017
-    encoder_counts: int = 4096
     rate_start: Positive = 0.1
     torque_start: Positive = 0.2
 
-    def __post_init__(self) -> None:
-        if self.encoder_counts < 1:
-            raise ValueError(f"encoder_counts = {self.encoder_counts}: must be at least 1")
-
     @cached_property
     def measurement_noise(self) -> tuple[float, float]:
-        """Variances of v1 and v2: y2 is the mean of n encoders, each rounded to whole counts [rad^2]."""
-        step = 2.0 * math.pi / self.encoder_counts
-        return self.noise.tilt**2, step**2 / 12.0 / self.model.gimbals
+        """Variances of v1 and v2 [rad^2]."""
+        return self.noise.tilt**2, self.noise.gimbal**2
 
     @cached_property
     def process_noise(self) -> Covariance:

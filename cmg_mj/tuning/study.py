@@ -227,8 +227,9 @@ def _maker(experiment: Experiment, noise_ug_rthz: float | None = None) -> Callab
     """Makes the scenario's observer of its parameters, told the noise of the sensors it is tuned at."""
     dt, model, noise = experiment.design.given
     if noise_ug_rthz is not None:
-        accelerometer = experiment.scenario.sensors.accelerometer
-        noise = experiment.plant.facts.noise(replace(accelerometer, noise_density_ug_rthz=noise_ug_rthz))
+        sensors = experiment.scenario.sensors
+        accelerometer = replace(sensors.accelerometer, noise_density_ug_rthz=noise_ug_rthz)
+        noise = experiment.plant.facts.noise(replace(sensors, accelerometer=accelerometer))
     return partial(make_observer, experiment.scenario.observer.kind, dt, model, noise)
 
 

@@ -27,7 +27,7 @@ HEAVY = ReducedModel(J1=0.06, J2=0.05, J_d=2e-3, omega_d=150.0, gravity_torque=2
 EPSILON, BOUND = 0.0287, 10.4
 """Defaults that are not a paper's: epsilon of linear_high_gain and L of super_twisting, from `cmg-mj tune`."""
 
-NOISE = TiltNoise(0.0063, 0.41, 0.89)
+NOISE = TiltNoise(0.0063, 0.41, 0.89, 3.1e-4)
 """Of the bundled rig's accelerometers, 400 ug/rtHz at 200 Hz."""
 
 Signal = Sequence[float] | np.ndarray

@@ -146,7 +146,7 @@ def test_the_trap_of_the_offset() -> None:
     assert found < 1.1 * figures(0.0)
     assert figures(5.0, **without) > 4.0 * found
     for bias_walk in (0.03, 0.3):
-        assert figures(5.0, steady, bias_walk=bias_walk) > 1.2 * found
+        assert 1.2 * found < figures(5.0, steady, bias_walk=bias_walk) < 0.5 * figures(5.0, **without)
 
 
 def test_without_a_measured_acceleration_it_is_refused() -> None:

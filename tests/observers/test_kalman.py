@@ -12,7 +12,7 @@ from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
-from cmg_mj.errors import InputError
+from cmg_mj import load_scenario, prepare
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.kalman import COLUMNS, PAIRS, Covariance, Kalman, State
 from cmg_mj.reduced import ReducedModel
@@ -28,7 +28,6 @@ DEFAULTS: Any = {
     "rate_start": 0.1,
     "torque_start": 0.2,
 }
-COUNTS = 4096
 
 
 def kalman(model: ReducedModel = PAIR, **parameters: float) -> Kalman:
@@ -68,8 +67,8 @@ def added_noise(of: Kalman, A: np.ndarray) -> np.ndarray:
 
 
 def measured_noise(of: Kalman) -> np.ndarray:
-    """Covariance of (y1, y2): white noise, and encoders' counts, whose mean is taken, (2, 2)."""
-    return np.diag([of.noise.tilt**2, (2.0 * math.pi / of.encoder_counts) ** 2 / 12.0 / of.model.gimbals])
+    """Covariance of (y1, y2), (2, 2)."""
+    return np.diag([of.noise.tilt**2, of.noise.gimbal**2])
 
 
 def matrix(P: Covariance) -> np.ndarray:
@@ -120,7 +119,7 @@ def test_equals_the_textbooks_filter(model: ReducedModel) -> None:
 
 
 def test_defaults() -> None:
-    assert kalman() == kalman(**DEFAULTS, encoder_counts=COUNTS)
+    assert kalman() == kalman(**DEFAULTS)
 
 
 def test_settles_at_the_linear_filter() -> None:
@@ -230,6 +229,9 @@ def test_a_bias_is_found_as_a_torque() -> None:
     assert "bias_rad" not in of.extra_signals
 
 
-def test_an_encoder_without_counts_is_refused() -> None:
-    with pytest.raises(InputError, match=r"encoder_counts = 0: must be at least 1"):
-        kalman(encoder_counts=0)
+@pytest.mark.parametrize("counts", [64, 4096])
+def test_is_told_the_scenarios_encoders(counts: int) -> None:
+    """y2 is the mean of two, each rounded to whole counts."""
+    changes = [f"sensors.encoder.counts_per_revolution={counts}"]
+    of: Any = prepare(load_scenario("push_recovery", changes, "kalman")).design.observer()
+    assert of.noise.gimbal**2 == pytest.approx((2.0 * math.pi / counts) ** 2 / 12.0 / 2.0)
