@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from cmg_mj.board import on_a_board
+from cmg_mj.board import Board, on_a_board
 from cmg_mj.controller import Controller, Processor
 from cmg_mj.design import Design, design
 from cmg_mj.differences import differences
@@ -26,6 +26,13 @@ from cmg_mj.scenario import base_of, located
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Driver, Result, simulate
 from cmg_mj.trajectory import whole_file
+
+ON_THE_BOARD = """\
+# Run on the emulated board (docs/board.md), whose numbers are not quite the host's. To the same numbers it runs with
+#     cmg-mj run scenario.toml --driver board
+
+"""
+"""Above the scenario of a run on the board."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,7 +92,8 @@ class Experiment:
 
     def run_on(self, processor: Processor, world: int = 0, **options: Any) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
-        return self._simulate(self.plant, self.controller(int(world), processor), **options)
+        result = self._simulate(self.plant, self.controller(int(world), processor), **options)
+        return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
 
     def run_many(
         self,
@@ -199,10 +207,14 @@ class Experiment:
             bundled = prepare(base)
         return differences(bundled.resolved(), self.resolved())
 
-    def save(self, path: Path) -> None:
-        """Write the resolved scenario as TOML: running that file again gives the same run."""
+    def as_toml(self, driver: Driver = "native") -> str:
+        """The resolved scenario: running it again gives the same run; its head says so if only the board does."""
+        return (ON_THE_BOARD if driver == "board" else "") + tomli_w.dumps(self.resolved())
+
+    def save(self, path: Path, driver: Driver = "native") -> None:
+        """Write it as TOML."""
         with whole_file(path) as temporary:
-            temporary.write_text(tomli_w.dumps(self.resolved()), encoding="utf-8")
+            temporary.write_text(self.as_toml(driver), encoding="utf-8")
 
 
 def load_rig(scenario: Scenario) -> Plant:

@@ -114,14 +114,20 @@ def comparison_note(summaries: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def run_title(summary: Mapping[str, Any]) -> str:
+    """Above what a run prints and draws: scenario, observer, seed, and what differs from the bundled scenario."""
+    place = " on the board" if summary.get("driver") == "board" else ""
+    differs = in_words(summary["differs"])
+    return f"{summary['scenario'] or 'Run'}: {summary['observer']}{place}, seed {summary['seed']}{differs}"
+
+
 def summary_table(summary: Mapping[str, Any]) -> Group:
     """What `cmg-mj run` prints: the figures, and how well those that rode along estimated the rate."""
     ends = {"done": "stood to the end, {:g} s", "fell": "fell at {:.2f} s"}
     outcome = str(summary["outcome"])
     end = ends.get(outcome, outcome + " at {:g} s").format(summary["end_time_s"])
-    differs = in_words(summary["differs"])
     table = Table(
-        title=_title(f"{summary['scenario'] or 'Run'}: {summary['observer']}, seed {summary['seed']}{differs}"),
+        title=_title(run_title(summary)),
         box=box.SIMPLE_HEAD,
         title_justify="left",
         show_header=False,

@@ -8,14 +8,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
 from cmg_mj.comparison import Compared
-from cmg_mj.differences import in_words
 from cmg_mj.distribution_plot import plot_worlds
 from cmg_mj.engine import quiet
 from cmg_mj.experiment import Experiment
 from cmg_mj.plots import plot_run
+from cmg_mj.report import run_title
 from cmg_mj.run_folder import RunFolder, claimed, write_text
 from cmg_mj.simulate import Outcome, Result
 from cmg_mj.standings import standings, worlds_table
@@ -32,6 +30,7 @@ def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[s
         "scenario": scenario.title,
         "observer": scenario.observer.kind,
         "seed": scenario.seed,
+        **_driver(result),
         "outcome": outcome.kind,
         "end_time_s": outcome.time_s,
         "fell": outcome.fell,
@@ -64,15 +63,13 @@ def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *
         InputError: The folder, or a file, cannot be written.
     """
     trajectory = trajectory_with_metadata(experiment, result)
-    scenario = experiment.scenario
-    differs = in_words(experiment.differences)
-    title = f"{scenario.title or 'Run'}: {scenario.observer.kind}, seed {scenario.seed}{differs}"
+    summary = summary_of(experiment, result)
     writers = (
         trajectory.save,
-        lambda path: _write_json(path, summary_of(experiment, result)),
-        experiment.save,
+        lambda path: _write_json(path, summary),
+        lambda path: experiment.save(path, result.driver),
         lambda path: _record(path, [(experiment, result)]),
-        lambda path: _plot(path, trajectory, title, experiment, result),
+        lambda path: _plot(path, trajectory, summary, experiment),
     )
     with claimed(folder) as it:
         complete = result.outcomes[0].kind in ("done", "fell")
@@ -138,15 +135,21 @@ def trajectory_with_metadata(experiment: Experiment, result: Result) -> Trajecto
     """The trajectory with what is needed to know later where it came from."""
     assert result.trajectory is not None
     outcome = dataclasses.asdict(result.outcomes[0])
-    return dataclasses.replace(result.trajectory, metadata={"outcome": outcome, "scenario": experiment.resolved()})
+    metadata = {"outcome": outcome, **_driver(result), "scenario": experiment.resolved()}
+    return dataclasses.replace(result.trajectory, metadata=metadata)
 
 
-def _plot(path: Path, trajectory: Trajectory, title: str, experiment: Experiment, result: Result) -> None:
+def _driver(result: Result) -> dict[str, str]:
+    """Who drove, where that changes the numbers."""
+    return {"driver": result.driver} if result.driver == "board" else {}
+
+
+def _plot(path: Path, trajectory: Trajectory, summary: dict[str, Any], experiment: Experiment) -> None:
     plot_run(
         path,
         trajectory,
-        title,
-        summary_of(experiment, result),
+        run_title(summary),
+        summary,
         settle_band_deg=experiment.scenario.metrics.settle_band_deg,
         rate_limit_rad_s=experiment.law.rate_limit,
     )
@@ -155,7 +158,7 @@ def _plot(path: Path, trajectory: Trajectory, title: str, experiment: Experiment
 def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
     from cmg_mj.recording import Run, write_recording  # 0.4 s of import, needed only here
 
-    experiment = runs[0][0]
+    experiment, first = runs[0]
     scenario = experiment.scenario
     recorded = []
     for e, result in runs:
@@ -166,11 +169,11 @@ def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
         path,
         experiment.plant,
         recorded,
-        title=scenario.title,
+        title=(scenario.title or "Run") + ", on the board" if first.driver == "board" else scenario.title,
         pushes=scenario.push,
         settings=scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,
-        scenario_toml=tomli_w.dumps(experiment.resolved()),
+        scenario_toml=experiment.as_toml(first.driver),
     )
 
 

@@ -70,6 +70,7 @@ class Result:
         observers: The observer in the loop, then the companions.
         seed: Seed of the sensors' noise.
         worlds: The worlds' numbers, (n_worlds,).
+        driver: Who called the controller, or was it.
     """
 
     outcomes: list[Outcome]
@@ -79,6 +80,7 @@ class Result:
     observers: Sequence[str] = ("",)
     seed: int = 0
     worlds: Sequence[int] = ()
+    driver: Driver = "native"
 
     @property
     def stood(self) -> np.ndarray:
@@ -154,6 +156,7 @@ class Result:
                 self.observers,
                 self.seed,
                 self.worlds[part],
+                self.driver,
             )
             for part in parts
         ]
@@ -283,7 +286,7 @@ def simulate(
     summaries = [metrics.summary(i, outcome.kind == "done") for i, outcome in enumerate(outcomes)]
     numbers = (controller.worlds,) if isinstance(controller.worlds, int) else tuple(controller.worlds)
     longest = max(outcome.time_s for outcome in outcomes)
-    return Result(outcomes, summaries, rows.trajectory(), longest, tuple(observers), controller.seed, numbers)
+    return Result(outcomes, summaries, rows.trajectory(), longest, tuple(observers), controller.seed, numbers, driver)
 
 
 def _stop_blind(worlds: ManyWorlds, tick: Tick, ends: list[Outcome | None], time: float) -> None:

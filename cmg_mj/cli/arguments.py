@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cmg_mj.experiment import Experiment
     from cmg_mj.run_folder import RunFolder
     from cmg_mj.schema import Scenario
+    from cmg_mj.simulate import Driver
 
 
 MOST_WORLDS = 10_000
@@ -49,18 +50,17 @@ class Chosen:
         scenario = load_scenario(self.name, settings, observer)
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
-    def folder(self, what: str, names: Sequence[str], experiment: Experiment) -> RunFolder:
+    def folder(self, what: str, names: Sequence[str], experiment: Experiment, driver: Driver = "native") -> RunFolder:
         """The folder to write these files to: without --out it is named for what is run and what differs in it."""
-        import tomli_w
-
         from cmg_mj.differences import in_a_name, safe_name
         from cmg_mj.run_folder import unused_folder
 
         if self.out is not None:
             return claim(named(self.out), names)
-        parts = (safe_name(Path(self.name).stem), safe_name(what), str(experiment.scenario.seed))
+        what = safe_name(what) + ("-board" if driver == "board" else "")
+        parts = (safe_name(Path(self.name).stem), what, str(experiment.scenario.seed))
         name = "-".join(parts) + in_a_name(experiment.differences)
-        return released_at_the_end(unused_folder(Path("runs"), name, names, tomli_w.dumps(experiment.resolved())))
+        return released_at_the_end(unused_folder(Path("runs"), name, names, experiment.as_toml(driver)))
 
 
 def _letters(argument: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -23,6 +24,9 @@ from cmg_mj.cli.terminal import (
 )
 from cmg_mj.errors import InputError, RunStopped
 
+if TYPE_CHECKING:
+    from cmg_mj.simulate import Driver
+
 
 @click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
 @click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
@@ -37,11 +41,11 @@ from cmg_mj.errors import InputError, RunStopped
 )
 @click.option("--plot", is_flag=True, help="Write plot.png as well.")
 @users_code()
-def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
+def run(chosen: Chosen, observer: str | None, driver: Driver, plot: bool) -> None:
     """Run a scenario and write a folder.
 
     Its files: summary.json, trajectory.parquet, recording.rrd (a rerun recording), and scenario.toml, which has every
-    default written out and reruns to the same numbers.
+    default written out and reruns to the same numbers (of a run on the board, with --driver board again).
     """
     from cmg_mj import report, runs
     from cmg_mj.experiment import prepare
@@ -53,11 +57,11 @@ def run(chosen: Chosen, observer: str | None, driver: str, plot: bool) -> None:
     say_hints(experiment.hints)
     if scenario.compare:
         say("[compare] is for cmg-mj compare; this is one run")
-    what = runs.file_name(scenario.observer.kind) + ("-board" if driver == "board" else "")
-    folder = chosen.folder(what, runs.files_of_run(plot=plot), experiment)
+    what = runs.file_name(scenario.observer.kind)
+    folder = chosen.folder(what, runs.files_of_run(plot=plot), experiment, driver)
     with CtrlC() as ctrl_c:
         with progress(scenario.title or chosen.name, scenario.duration_s, ctrl_c) as on_progress:
-            result = experiment.run(driver=driver, on_progress=on_progress)  # type: ignore[arg-type]
+            result = experiment.run(driver=driver, on_progress=on_progress)
         summary = runs.summary_of(experiment, result)
         try:
             place = runs.save_run(folder, experiment, result, plot=plot)

@@ -6,6 +6,7 @@ import json
 import math
 import re
 import subprocess
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.papers.aranovskiy2020 import on_the_board
 from cmg_mj.scenario import load_scenario
+from cmg_mj.trajectory import Trajectory
 from tests.board.toy import toy
 from tests.command import cmg_mj
 
@@ -168,6 +170,31 @@ def test_the_commands(tmp_path: Path) -> None:
     assert json.loads(said.out) == json.loads((out / "summary.json").read_text())
     assert json.loads(said.out)["outcome"] == "done"
     assert cmg_mj("bench", "--markdown").complaint == "--markdown: only the table of --board is printed so"
+
+
+@pytest.mark.usefixtures("elsewhere")
+def test_a_run_on_the_board_says_so_and_reruns_to_the_same_numbers() -> None:
+    first = cmg_mj("run", "push_recovery", "--driver", "board", *sets(SHORT))
+    host = cmg_mj("run", "push_recovery", *sets(SHORT))
+    assert "homogeneous on the board, seed 0" in " ".join(first.out.split())
+    assert "board" not in host.out
+    assert len(list(Path("runs").iterdir())) == 2
+    ran, beside = sorted(Path("runs").iterdir(), key=lambda folder: "-board-0" not in folder.name)
+    file = ran / "scenario.toml"
+    assert "cmg-mj run scenario.toml --driver board" in file.read_text().splitlines()[1]
+    assert "board" not in (beside / "scenario.toml").read_text()
+    assert cmg_mj("run", file, "--driver", "board", "--out", "again").status == 0
+    assert cmg_mj("run", file, "--out", "on_host").status == 0
+    folders = [ran, Path("again"), beside, Path("on_host")]
+    summaries = [(folder / "summary.json").read_text() for folder in folders]
+    assert summaries[0] == summaries[1] != summaries[2] == summaries[3]
+    assert (ran / "scenario.toml").read_text() == Path("again/scenario.toml").read_text()
+    assert tomllib.loads(file.read_text()) == tomllib.loads(Path("on_host/scenario.toml").read_text())
+    told = ["board", "board", None, None]
+    assert [json.loads(summary).get("driver") for summary in summaries] == told
+    assert [Trajectory.load(folder / "trajectory.parquet").metadata.get("driver") for folder in folders] == told
+    cmg_mj("run", "push_recovery", "--driver", "board", *sets(SHORT))
+    assert len(list(Path("runs").iterdir())) == 2  # the same run again goes to the same folder
 
 
 def test_what_they_cost() -> None:
