@@ -16,28 +16,31 @@ from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, 
 from cmg_mj.differences import safe_name
 from cmg_mj.errors import InputError, nearest
 
+BATCH = 256
+"""Worlds that are timed at once."""
+
 
 @click.command(short_help="Time the closed loop against bare MuJoCo.")
 @of_observers
 @click.option(
     "--worlds",
     type=click.IntRange(1, MOST_WORLDS),
-    default=256,
-    show_default=True,
     metavar="N",
-    help="Worlds of the batch.",
+    help=f"Worlds of the batch.  [default: {BATCH}]",
 )
 @click.option("--board", is_flag=True, help="Count what an update takes on an emulated Cortex-M7 instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 @click.option("--markdown", is_flag=True, help="Print the table of --board as Markdown.")
 @users_code()
-def bench(observers: str, worlds: int, board: bool, as_json: bool, markdown: bool) -> None:
+def bench(observers: str, worlds: int | None, board: bool, as_json: bool, markdown: bool) -> None:
     """Time the closed loop against bare MuJoCo doing the same physics, and an update of each observer.
 
     With --board: instructions, stack, memory and flash of an update as C on the papers' processor.
     """
     names = names_of(observers)
     if board:
+        if worlds is not None:
+            raise InputError("--worlds: is for the batch on the host; --board has no worlds")
         from cmg_mj.board_cost import cost_markdown, cost_table
         from cmg_mj.board_cost import measure as count
 
@@ -50,7 +53,7 @@ def bench(observers: str, worlds: int, board: bool, as_json: bool, markdown: boo
     from cmg_mj.bench import bench_table, measure
 
     with progress("Bench", 1.0) as on_progress:
-        figures = measure(names, worlds, on_progress)
+        figures = measure(names, worlds or BATCH, on_progress)
     show(figures, bench_table(figures), as_json)
 
 

@@ -58,6 +58,11 @@ def test_options(command: str, given: list[str], fragments: list[str]) -> None:
         "--set observer.k1=3: is a setting of homogeneous, which is not among --observers ltv",
     ),
     ("bench", ["bench", "--observers", "ltvv"], "--observers 'ltvv': no such observer; did you mean 'ltv'?"),
+    (
+        "bench on the board",
+        ["bench", "--board", "--worlds", "5"],
+        "--worlds: is for the batch on the host; --board has no",
+    ),
     ("no scenario", ["run"], "Missing argument 'SCENARIO'"),
     ("command", ["rnu", "push_recovery"], "No such command 'rnu'"),
     ("list", ["list", "observer"], "'observer' is not one of 'scenarios', 'observers'"),
