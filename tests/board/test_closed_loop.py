@@ -31,6 +31,9 @@ from tests.command import cmg_mj
 pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
 
 NO_COUNTS = ("sensors.accelerometer.counts_per_g=0", "sensors.encoder.counts_per_revolution=0")
+ARE_PUSHED = ("homogeneous", "kalman", "gyro_free")
+"""In lockstep; the others stand there for half a second."""
+PUSHED = ("duration_s=2.5", "push.0.start_s=1.0", "push.0.torque_n_m=2.5")
 SHORT = ("duration_s=0.5", "plant.initial_tilt_deg=0.5", "push=[]")
 
 
@@ -87,7 +90,7 @@ def test_a_processor_that_is_the_controller_changes_nothing() -> None:
 @pytest.mark.parametrize("observer", list(OBSERVERS))
 def test_lockstep_on_the_same_inputs(observer: str) -> None:
     """What the board is shown is rounded to single precision, and so are its numbers; nothing is in double."""
-    experiment = short(observer)
+    experiment = prepare(load_scenario("push_recovery", PUSHED if observer in ARE_PUSHED else SHORT, observer))
     host = Recorded(experiment)
     experiment.run_on(host)
     with exported(experiment.controller()) as files:
@@ -100,6 +103,8 @@ def test_lockstep_on_the_same_inputs(observer: str) -> None:
     for signal in (lambda decision: decision.estimate[1], lambda decision: decision.x_e):
         ours, its = (np.array([signal(decision) for decision in those]) for those in (host.decided, decided))
         assert np.sqrt(np.mean((its - ours) ** 2)) < 1e-5
+    if observer in ARE_PUSHED:  # and hard: the command went to its limit
+        assert max(abs(decision.u) for decision in host.decided) == experiment.law.rate_limit
     u, its_u = (np.array([decision.u for decision in those]) for those in (host.decided, decided))
     assert np.sqrt(np.mean((its_u - u) ** 2)) < 1e-4
 
