@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from cmg_mj.board.tools import missing
+from cmg_mj.cli import cli
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers import PAPERS
 from cmg_mj.references import REFERENCES
@@ -43,6 +44,11 @@ def section(title: str) -> str:
 def first_cells(text: str) -> list[str]:
     """What stands in backticks at the beginning of a table's rows."""
     return re.findall(r"^\| `([^`]+)` \|", text, flags=re.MULTILINE)
+
+
+def test_every_command_is_listed_once() -> None:
+    listed = re.findall(r"^cmg-mj (\w+)", section("Commands"), flags=re.MULTILINE)
+    assert sorted(listed) == sorted(cli.commands)
 
 
 def test_is_one_page() -> None:
