@@ -36,7 +36,8 @@ class Accelerometer:
     on the tangential axes acts like the equilibrium bias e. What else a part and its mounting do is off by default; the
     datasheet allows a scale error of 3 % and a cross-axis sensitivity of 2 % before calibration.
 
-    What happens to a reading, in this order: misalignment, cross-axis, scale, offset, noise, low-pass, resolution.
+    What happens to a reading, in this order: misalignment, cross-axis, scale, offset, noise (white, then 1/f), range,
+    low-pass, resolution. What the low-pass overshoots is cut off at the range once more.
 
     Attributes:
         rate_hz: Samples a second.

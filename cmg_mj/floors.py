@@ -29,7 +29,7 @@ def acceleration_floor(noise: TiltNoise, dt: float) -> float:
 
     The acceleration runs straight between samples, and nothing else is known of the motion. Then only the noise is
     left of the error: with (v, n) the noise of y1 and of the acceleration, v = c n + v', it obeys, driven by each
-    sample's n,
+    sample's n, which is white (it is not behind the part's low-pass: there this is no floor),
 
         x1+ = x1 + dt x2 - dt^2 (2 n + n+)/6,  x2+ = x2 - dt (n + n+)/2,  y1 = x1 + c n + v',
 
@@ -59,7 +59,7 @@ class TiltFloor:
 
     Without a model y1 bounds nothing unless it is told what motions there are. This filter is told more than any
     observer can know: what the rate was, in the very world that is judged. No time-invariant linear filter of y1 with
-    its memory, started at rest, has a smaller error there, however it is tuned. The whole run and the push windows
+    its taps, started at rest, has a smaller error there, however it is tuned. The whole run and the push windows
     have a filter each. One filter for all of 20 worlds has an error 1 % larger over the whole run of push_recovery,
     and 6 % in the push window: so much is fitted to the one world's noise.
 

@@ -122,6 +122,15 @@ def test_defaults() -> None:
     assert kalman() == kalman(**DEFAULTS)
 
 
+@pytest.mark.parametrize(("pole_dt", "most"), [(0.05, 4e-12), (0.0374, 6e-13)])
+def test_the_series_ends_where_it_says(pole_dt: float, most: float) -> None:
+    """Against the closed forms with b = 0: phi = sinh(p dt)/p, psi = (cosh(p dt) - 1)/p^2."""
+    dt, phi, psi, _ = kalman()._integrals((pole_dt / DT) ** 2, 0.0)
+    exact = math.sinh(pole_dt) / pole_dt * dt, 2.0 * (math.sinh(pole_dt / 2.0) / pole_dt * dt) ** 2
+    assert 0.5 * most < 1.0 - phi / exact[0] < most
+    assert 0.0 < 1.0 - psi / exact[1] < most
+
+
 def test_settles_at_the_linear_filter() -> None:
     """About the upright the gains become those of the algebraic Riccati equation."""
     of = kalman()
