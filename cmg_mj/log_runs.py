@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from cmg_mj.design import design
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.experiment import load_rig
 from cmg_mj.known_rigs import RigFacts, known_rig
-from cmg_mj.log_replay import OnShare, Replayed, noise_of, replay_log
+from cmg_mj.log_replay import SKIPPED_S, OnShare, Replayed, noise_of, replay_log
 from cmg_mj.logs import Log
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.reduced import ReducedModel
@@ -106,6 +106,48 @@ def parameters_of(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
     return found
 
 
+class Told(NamedTuple):
+    """What the observers of a log are told."""
+
+    model: ReducedModel | None
+    """The pendulum, if it is known."""
+    noise: TiltNoise
+    """Of the sensors."""
+    parameters: Mapping[str, Mapping[str, Any]]
+    """Observer -> parameter -> value, where not the default."""
+
+
+def told(
+    log: Log,
+    *,
+    model: ReducedModel | None = None,
+    noises: Mapping[str, float] | None = None,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+) -> Told:
+    """What the observers of a user's log are told, or those of a run's recording as they were in the run.
+
+    Args:
+        log: The log. A run's recording brings its rig, its sensors' noise, the parameters of its loop's observer.
+        model: The pendulum, instead of the run's.
+        noises: What `noise_numbers` gives; nothing else is told of the sensors' noise.
+        parameters: Observer -> parameter -> value, before the run's.
+
+    Returns:
+        All three.
+
+    Raises:
+        InputError: Something does not fit.
+    """
+    noise, parameters = _noise(log, noises or {}), dict(parameters or {})
+    if log.scenario is None:
+        return Told(model, noise or noise_of(log), parameters)
+    scenario = parse_scenario(dict(log.scenario), log.name)
+    _, of_the_run, of_its_sensors = design(scenario, _rig(scenario)).given
+    in_its_loop = {scenario.observer.kind: scenario.observer.parameters}
+    merged = {kind: {**in_its_loop.get(kind, {}), **parameters.get(kind, {})} for kind in {**in_its_loop, **parameters}}
+    return Told(model or of_the_run, noise or of_its_sensors, merged)
+
+
 def replay_ready(
     log: Log,
     observers: Sequence[str] | None = None,
@@ -133,21 +175,10 @@ def replay_ready(
     Raises:
         InputError: Something does not fit.
     """
-    options: dict[str, Any] = {"parameters": parameters, "on_share": on_share}
-    if skip_s is not None:
-        options["skip_s"] = skip_s
-    noise = _noise(log, noises or {})
-    if log.scenario is not None:
-        options.setdefault("skip_s", 0.0)
-        scenario = parse_scenario(dict(log.scenario), log.name)
-        _, of_the_run, of_its_sensors = design(scenario, _rig(scenario)).given
-        model, noise = model or of_the_run, noise or of_its_sensors
-        in_its_loop = {scenario.observer.kind: scenario.observer.parameters}
-        options["parameters"] = {
-            kind: {**in_its_loop.get(kind, {}), **(parameters or {}).get(kind, {})}
-            for kind in {**in_its_loop, **(parameters or {})}
-        }
-    return replay_log(log, observers, model=model, noise=noise, **options)
+    what = told(log, model=model, noises=noises, parameters=parameters)
+    if skip_s is None:
+        skip_s = SKIPPED_S if log.scenario is None else 0.0
+    return replay_log(log, observers, **what._asdict(), skip_s=skip_s, on_share=on_share)
 
 
 def _noise(log: Log, noises: Mapping[str, float]) -> TiltNoise | None:

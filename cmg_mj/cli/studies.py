@@ -109,7 +109,12 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     metavar="NAME=LOW:HIGH",
     help="Where to search for a parameter; may be given again.",
 )
-@click.option("--noise", default="", metavar="LIST", help="Accelerometer noise densities to tune at [ug/rtHz].")
+@click.option(
+    "--noise",
+    default="",
+    metavar="LIST",
+    help="Accelerometer noise densities to tune at [ug/rtHz]; of a log NAME=VALUE,... as replay takes it.",
+)
 @click.option("--log", "logs", multiple=True, metavar="LOG", help="Tune on your own log instead; may be given again.")
 @click.option(
     "--split",
@@ -150,7 +155,8 @@ def tune(
     """
     chosen_numbers = [name.strip() for name in parameters.split(",") if name.strip()]
     if logs:
-        _tune_on_logs(chosen, observer, logs, reading, split, model, skip, chosen_numbers, dict(map(_range, ranges)))
+        found = dict(map(_range, ranges))
+        _tune_on_logs(chosen, observer, logs, reading, split, model, noise, skip, chosen_numbers, found)
         return
     if not chosen.name:
         raise InputError("tune: name a scenario, such as observer_tuning, or a log with --log")
@@ -195,12 +201,13 @@ def _tune_on_logs(
     reading: Reading,
     split: float,
     model: str | None,
+    noise: str,
     skip: float,
     parameters: Sequence[str],
     ranges: Mapping[str, tuple[float, float]],
 ) -> None:
     """Tune on a user's logs."""
-    from cmg_mj.log_runs import model_of, parameters_of
+    from cmg_mj.log_runs import model_of, noise_numbers, parameters_of
     from cmg_mj.runs import file_name
     from cmg_mj.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
     from cmg_mj.tuning.logged import FILES
@@ -214,6 +221,9 @@ def _tune_on_logs(
         if not setting.startswith("observer."):
             raise InputError(f"--set {setting}: of a log write observer.PARAMETER=VALUE")
     given = parameters_of([observer + setting.removeprefix("observer") for setting in chosen.settings])
+    if noise and "=" not in noise:
+        raise InputError(f"--noise {noise}: densities are for a scenario; of a log write NAME=VALUE,... as in replay")
+    noises = noise_numbers(noise)
     read = [reading.read(path) for path in logs]
     pendulum = None if model is None else model_of(model)
     default = Path("runs") / f"tune-{file_name(observer)}-{safe_name(read[0].name)}"
@@ -224,6 +234,7 @@ def _tune_on_logs(
                 read,
                 observer,
                 model=pendulum,
+                noises=noises,
                 given=given.get(observer),
                 split=split,
                 skip_s=skip,

@@ -17,7 +17,8 @@ from rich.table import Table
 from rich.text import Text
 
 from cmg_mj.errors import InputError
-from cmg_mj.log_replay import NO_MODEL, noise_of, replay_log
+from cmg_mj.log_replay import NO_MODEL, replay_log
+from cmg_mj.log_runs import Told, told
 from cmg_mj.logs import Log
 from cmg_mj.logs.log import REFERENCE
 from cmg_mj.observers import Observer, make_observer
@@ -67,10 +68,10 @@ class Logged:
         judged = np.flatnonzero(log.scored(self.skip_s) & np.isfinite(log[REFERENCE]))
         return [rows for rows in np.array_split(judged, BLOCKS) if len(rows)]
 
-    def errors(self, observer: Observer) -> np.ndarray:
-        """RMS of the estimated rate less the reference in every stretch, (n_stretches,) [rad/s]."""
+    def errors(self, observers: Sequence[Observer], /) -> np.ndarray:
+        """RMS of the estimated rate less the reference in every stretch, (n_stretches,) [rad/s]: an observer a log."""
         found = []
-        for log in self.logs:
+        for log, observer in zip(self.logs, observers, strict=True):
             rate = np.full(len(log), math.nan)
             for part in log.parts:
                 with np.errstate(all="ignore"):
@@ -96,6 +97,7 @@ class LogStudy:
         names: The logs.
         split: The share of each log that was fitted; the rest is scored.
         level: What came out.
+        noises: Log by log what the observer was told of the sensors.
     """
 
     kind: str
@@ -105,6 +107,7 @@ class LogStudy:
     names: Sequence[str]
     split: float
     level: Level
+    noises: Sequence[TiltNoise]
 
 
 def tune_on_logs(
@@ -112,7 +115,7 @@ def tune_on_logs(
     kind: str,
     *,
     model: ReducedModel | None = None,
-    noise: TiltNoise | None = None,
+    noises: Mapping[str, float] | None = None,
     given: Mapping[str, Any] | None = None,
     split: float = 0.5,
     skip_s: float = 1.0,
@@ -126,9 +129,9 @@ def tune_on_logs(
     Args:
         logs: With a reference; all with the same sample period.
         kind: The observer.
-        model: The pendulum, for an observer that needs it.
-        noise: What the observer is told of the sensors; by default `noise_of`.
-        given: Parameters to start from and to compare with, where not the defaults.
+        model: The pendulum, for an observer that needs it; a run's recording brings its own.
+        noises: What `noise_numbers` gives; by default each log's own, as `replay_ready` has them.
+        given: Parameters to start from and to compare with, where not the defaults, or those of a run's loop.
         split: The share of each log, from its start, that is fitted; the rest is scored.
         skip_s: So long from every start of an observer is not judged [s].
         parameters: Names to tune; by default every number of the observer.
@@ -150,23 +153,44 @@ def tune_on_logs(
             raise InputError(f"{log.name}: no reference to tune to: name it, --columns rate=...")
         if abs(log.dt / dt - 1.0) > 1e-3:
             raise InputError(f"{log.name}: {1.0 / log.dt:g} Hz, {logs[0].name} {1.0 / dt:g} Hz: give --rate HZ")
-    noise = noise or noise_of(logs[0])
+    each = [told(log, model=model, noises=noises, parameters={kind: given or {}}) for log in logs]
+    given = _common(kind, logs, each)
     fit, held_out = (
         Logged([log.cut(_share(log, split, first=first)) for log in logs], skip_s) for first in (True, False)
     )
-    for part in (*fit.logs, *held_out.logs):  # an observer that cannot take part is refused, with the reason
-        replay_log(part, [kind], model=model, noise=noise, parameters={kind: dict(given or {})}, skip_s=skip_s)
-    make: Callable[..., Observer] = partial(make_observer, kind, dt, model or NO_MODEL, noise)
-    values = parameters_of(kind, make(**(given or {})), given or {})
-    numbers = narrowed(numbers_of(kind, values, make, parameters), ranges or {}, "--range")
-    fitter = Fitter(kind, make, values, fit, on_share or (lambda share: None))
+    for part, what in zip((*fit.logs, *held_out.logs), (*each, *each), strict=True):
+        # An observer that cannot take part is refused, with the reason.
+        replay_log(part, [kind], **what._asdict(), skip_s=skip_s)
+    makers: list[Callable[..., Observer]] = [
+        partial(make_observer, kind, dt, what.model or NO_MODEL, what.noise) for what in each
+    ]
+    values = parameters_of(kind, makers[0](**given), given)
+    numbers = narrowed(numbers_of(kind, values, makers[0], parameters), ranges or {}, "--range")
+
+    def one_a_log(**tried: Any) -> list[Observer]:
+        return [make(**tried) for make in makers]
+
+    fitter = Fitter(kind, one_a_log, values, fit, on_share or (lambda share: None))
     still = fitter.idle(numbers)
     if len(still) == len(numbers):
         raise InputError(f"the rate that {kind} estimates does not depend on {names_of(numbers)}")
     numbers = [number for number in numbers if number not in still]
     fitter.expected = evaluations(len(numbers))
     level = level_of(0.0, fitter, numbers, held_out, starts)
-    return LogStudy(kind, values, numbers, [n.name for n in still], [log.name for log in logs], split, level)
+    names, noises_told = [log.name for log in logs], [what.noise for what in each]
+    return LogStudy(kind, values, numbers, [n.name for n in still], names, split, level, noises_told)
+
+
+def _common(kind: str, logs: Sequence[Log], each: Sequence[Told]) -> dict[str, Any]:
+    """The parameters that the observer is given, the same in all logs."""
+    given = dict(each[0].parameters[kind])
+    for log, what in zip(logs, each, strict=True):
+        if what.parameters[kind] != given:
+            raise InputError(
+                f"{logs[0].name} and {log.name} ran with different parameters of {kind}: say with which to begin, "
+                "--set observer.NAME=VALUE"
+            )
+    return given
 
 
 def _share(log: Log, split: float, *, first: bool) -> slice:
@@ -185,6 +209,10 @@ def figures_of_logs(study: LogStudy) -> dict[str, Any]:
         "given_parameters": plain(study.given),
         "tuned": [number.name for number in study.numbers],
         "idle": list(study.idle),
+        "noise": [
+            {"tilt_rad": noise.tilt, "acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}
+            for noise in study.noises
+        ],
         "held_out_stretches": len(study.level.rms),
         **{key: value for key, value in level.items() if key not in left_out},
     }

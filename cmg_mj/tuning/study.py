@@ -50,8 +50,8 @@ class Scored(Protocol):
         """Of the tilt [rad/s^2]."""
         ...
 
-    def errors(self, observer: Observer) -> np.ndarray:
-        """An observer's RMS error in each, (n,) [rad/s]; NaN where it is lost."""
+    def errors(self, made: Any, /) -> np.ndarray:
+        """An observer's RMS error in each, (n,) [rad/s]; NaN where it is lost. `made` is what `Fitter.make` gives."""
         ...
 
 
@@ -237,7 +237,7 @@ class Fitter:
     """Scores parameters on the fitted worlds, and counts how often."""
 
     def __init__(
-        self, kind: str, make: Callable[..., Observer], given: Mapping[str, Any], recorded: Scored, on_share: OnShare
+        self, kind: str, make: Callable[..., Any], given: Mapping[str, Any], recorded: Scored, on_share: OnShare
     ) -> None:
         self.kind, self.make, self.given, self.recorded = kind, make, given, recorded
         self.on_share = on_share

@@ -18,6 +18,7 @@ from cmg_mj.observers.protocol import needs
 from cmg_mj.runs import save_run, summary_of
 from cmg_mj.tilt import RadialTilt, TiltNoise
 from cmg_mj.trajectory import Trajectory
+from cmg_mj.tuning import tune_on_logs
 from tests.logs.motion import COLUMNS, DT, N, sine, write_csv
 from tests.observers.reference import PAPER
 
@@ -194,3 +195,35 @@ def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
         replay_log(one, skip_s=20.0)
     with pytest.raises(InputError, match="no observer can take part: ltv needs a model"):
         replay_log(one, ["ltv"])
+
+
+def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
+    """Its rig (no --model), its sensors' noise and its observer's parameters: the given error is that of a replay."""
+    recorded = read_log(run)
+    study = tune_on_logs([recorded], "homogeneous", parameters=["k1"], ranges={"k1": (22.0, 24.0)}, skip_s=0.3)
+    assert study.given["k1"] == 23.0
+    assert study.noises == [prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]]
+    half = recorded.cut(slice(len(recorded) // 2, None))
+    study = tune_on_logs([recorded], "gyro_free", parameters=["jerk"], skip_s=0.3)
+    error = half["reference_rad_s"] - replay_ready(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
+    stretches = np.array_split(error[half.scored(0.3)], len(study.level.given_rms))
+    np.testing.assert_allclose(study.level.given_rms, [np.sqrt(np.mean(s**2)) for s in stretches], rtol=1e-9)
+
+
+def test_every_log_is_tuned_with_its_own_noise(run: Path) -> None:
+    recorded = read_log(run)
+    plain = read_log(run / "trajectory.parquet", {"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"})
+    settings = {"skip_s": 0.2, "parameters": ["tau"], "ranges": {"tau": (0.01, 0.05)}}
+    own, other = tune_on_logs([recorded, plain], "linear", **settings).noises
+    assert own == prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]
+    assert other == noise_of(plain) != own
+    for noise in tune_on_logs([recorded, plain], "linear", noises={"tilt": 0.7}, **settings).noises:
+        assert np.degrees(noise.tilt) == pytest.approx(0.7)
+
+
+def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:
+    recorded = read_log(run)
+    assert recorded.scenario is not None
+    other = dict(recorded.scenario, observer={**recorded.scenario["observer"], "k1": 21.0})
+    with pytest.raises(InputError, match="different parameters of homogeneous"):
+        tune_on_logs([recorded, dataclasses.replace(recorded, scenario=other)], "homogeneous", skip_s=0.2)
