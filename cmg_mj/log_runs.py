@@ -71,6 +71,8 @@ def noise_numbers(text: str) -> dict[str, float]:
         name, _, value = (piece.strip() for piece in part.partition("="))
         if name not in NOISES:
             raise InputError(f"--noise {name}: no such noise; {nearest(name, NOISES)}")
+        if name in found:
+            raise InputError(f"--noise: {name} is given twice")
         found[name] = _finite(value, f"--noise {name}")
         if not found[name] > 0.0:
             raise InputError(f"--noise {name}={value}: must be greater than 0")

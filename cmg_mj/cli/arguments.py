@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from cmg_mj.errors import InputError, nearest
 
@@ -129,6 +130,19 @@ def released_at_the_end(folder: RunFolder) -> RunFolder:
     """The same, until the command is done; a folder it has made and has written nothing to goes with it."""
     click.get_current_context().call_on_close(folder.release)
     return folder
+
+
+def refuse_given(names: Sequence[str], why: str) -> None:
+    """Refuse options of the command at hand that were given and would be ignored.
+
+    Args:
+        names: Its parameters' names.
+        why: What they are for.
+    """
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        if parameter.name in names and context.get_parameter_source(parameter.name) == ParameterSource.COMMANDLINE:
+            raise InputError(f"{max(parameter.opts, key=len)}: {why}")
 
 
 def named(out: str) -> Path:

@@ -49,6 +49,8 @@ def _listed(value: Any) -> Any:
     return [_listed(item) for item in value] if isinstance(value, tuple) else value
 
 
+READING = ("columns", "units", "scale", "offset", "rate", "max_gap", "delay", "radii", "between")
+"""The names of `LOG_OPTIONS`."""
 LOG_OPTIONS = (
     click.option(
         "--columns",

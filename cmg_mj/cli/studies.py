@@ -10,8 +10,18 @@ from pathlib import Path
 
 import click
 
-from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, check_observer, claim, named, names_of, of_a_run, of_observers
-from cmg_mj.cli.logs import Reading, of_a_log
+from cmg_mj.cli.arguments import (
+    MOST_WORLDS,
+    Chosen,
+    check_observer,
+    claim,
+    named,
+    names_of,
+    of_a_run,
+    of_observers,
+    refuse_given,
+)
+from cmg_mj.cli.logs import READING, Reading, of_a_log
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code, where
 from cmg_mj.differences import safe_name
 from cmg_mj.errors import InputError, nearest
@@ -155,13 +165,13 @@ def tune(
     """
     chosen_numbers = [name.strip() for name in parameters.split(",") if name.strip()]
     if logs:
+        refuse_given(("worlds", "seed"), "is for a scenario; a log is what it is")
         found = dict(map(_range, ranges))
         _tune_on_logs(chosen, observer, logs, reading, split, model, noise, skip, chosen_numbers, found)
         return
     if not chosen.name:
         raise InputError("tune: name a scenario, such as observer_tuning, or a log with --log")
-    if reading.columns:
-        raise InputError("--columns: is for --log LOG")
+    refuse_given((*READING, "split", "model", "skip"), "is for --log LOG")
     from cmg_mj.runs import file_name
     from cmg_mj.tuning import figures_of, files_of_study, save_study, tuning_table
     from cmg_mj.tuning import tune as fit

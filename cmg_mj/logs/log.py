@@ -14,7 +14,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.logs.columns import ACCELEROMETERS, Column, columns_of
 from cmg_mj.logs.sampling import SAME_TIME, Part, Sampler, sampled_where_known
 from cmg_mj.logs.table import read_table
-from cmg_mj.push import Push, Window, push_windows
+from cmg_mj.push import Push, Window, inside, push_windows
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.trajectory import Trajectory
 
@@ -131,7 +131,13 @@ def read_log(
     if path.is_dir() and (path / "trajectory.parquet").is_file():
         path = path / "trajectory.parquet"
     if not columns:
-        return _of_trajectory(path)
+        log = _of_trajectory(path)
+        told = {"--units": units, "--scale": scale, "--offset": offset, "--rate": rate_hz, "--max-gap": max_gap_s}
+        told |= {"--delay": delay_s, "--radii": radii_m, "--between": between_s}
+        for option, value in told.items():
+            if value not in (None, 0.0, {}):
+                raise InputError(f"{option}: {path} is a run's own recording; read it with --columns for that")
+        return log if not windows_s else replace(log, windows=_inside(path, windows_s, log["time_s"]))
     found = columns_of(columns, units, scale, offset)
     tilt = _radial(found, radii_m)
     if not math.isfinite(delay_s):
@@ -172,8 +178,20 @@ def read_log(
         **({"between_s": list(between_s)} if between_s else {}),
         **({"windows_s": [list(window) for window in windows_s]} if windows_s else {}),
     }
+    if windows_s and reference is None:
+        raise InputError("--window: there is no reference to score against; name it, --columns rate=...")
+    windows = _inside(path, windows_s, joined["time_s"])
     slices = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
-    return Log(path.stem, dt, joined, slices, frozenset(has), tilt, tuple(windows_s), tuple(notes), given)
+    return Log(path.stem, dt, joined, slices, frozenset(has), tilt, windows, tuple(notes), given)
+
+
+def _inside(path: Path, windows: Sequence[Window], time: np.ndarray) -> tuple[Window, ...]:
+    """The windows, in each of which there is a sample."""
+    for start, end in windows:
+        if not inside(time, [(start, end)]).any():
+            ends = f"{time[0]:.6g} to {time[-1]:.6g} s"
+            raise InputError(f"--window {start:g}:{end:g}: {path} has no sample there; it goes from {ends}")
+    return tuple(windows)
 
 
 def _radial(found: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:

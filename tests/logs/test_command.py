@@ -128,6 +128,12 @@ def test_markdown_and_table_say_the_same() -> None:
         (("--columns", PLAIN, "--set", "linear.tau=-1"), "tau = -1: must be a number greater than 0"),
         (("--columns", PLAIN, "--skip", "nan"), "--skip nan"),
         (("--columns", PLAIN, "--noise", "accelerometer=3"), "the tilt is not that of two accelerometers"),
+        (("--columns", PLAIN, "--noise", "tilt=0.05,tilt=0.1"), "--noise: tilt is given twice"),
+        (("--columns", "time=t_s,tilt=tilt_rad", "--window", "2:4"), "--window: there is no reference"),
+        (
+            ("--columns", PLAIN, "--window", "30:40"),
+            "--window 30:40: sine.csv has no sample there; it goes from 0 to 19.995 s",
+        ),
         (("--columns", PLAIN, "--model", "x.xml"), "no such file, nor a bundled one"),
         (("--columns", PLAIN, "--out", ""), "name a folder"),
     ],
@@ -165,7 +171,15 @@ def test_tune_on_a_log() -> None:
         ),
         (("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--split", "1"), "between 0 and 1"),
         (("--log", "sine.csv", "--columns", PLAIN, "--observer", "ltv"), "needs a model"),
+        (("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--worlds", "20"), "--worlds: is for a"),
+        (("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--seed", "1"), "--seed: is for a scenario"),
+        (
+            ("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--noise", "100,200"),
+            "--noise 100,200: den",
+        ),
         (("observer_tuning", "--columns", PLAIN), "is for --log"),
+        (("observer_tuning", "--max-gap", "1"), "--max-gap: is for --log"),
+        (("observer_tuning", "--split", "0.5"), "--split: is for --log"),
         ((), "name a scenario"),
     ],
 )

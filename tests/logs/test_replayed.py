@@ -227,3 +227,11 @@ def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:
     other = dict(recorded.scenario, observer={**recorded.scenario["observer"], "k1": 21.0})
     with pytest.raises(InputError, match="different parameters of homogeneous"):
         tune_on_logs([recorded, dataclasses.replace(recorded, scenario=other)], "homogeneous", skip_s=0.2)
+
+
+def test_of_a_run_nothing_told_is_ignored(run: Path) -> None:
+    with pytest.raises(InputError, match=r"--delay: .* is a run's own recording"):
+        read_log(run, delay_s=0.1)
+    assert read_log(run, windows_s=[(0.4, 0.6)]).windows == ((0.4, 0.6),)
+    with pytest.raises(InputError, match=r"--window 5:6: .* has no sample there"):
+        read_log(run, windows_s=[(5.0, 6.0)])
