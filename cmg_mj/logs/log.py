@@ -17,12 +17,15 @@ from cmg_mj.logs.table import read_table
 from cmg_mj.push import Push, Window, inside, push_windows
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.trajectory import Trajectory
+from cmg_mj.units import in_si
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
 SAY_COLUMNS = "say which columns are what, --columns tilt=HEADING,rate=HEADING,..."
 LARGEST = 1e12
 """Of anything measured, times since 1970 included [rad, rad/s, m/s^2, s]."""
+SLOW_HZ = 5.0
+"""No rate of anything that balances; rows in milliseconds taken as seconds have at most this, from 5 kHz down [Hz]."""
 A_TURN = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is an angle that starts again, not a motion [rad]."""
 
@@ -145,12 +148,16 @@ def read_log(
     if delay_s and "rate" not in found:
         raise InputError("--delay: there is no reference to shift; name it, --columns rate=...")
     headings = [column.name for column in found.values()]
-    table, notes = read_table(path, headings, found["time"].name if "time" in found else None)
+    table, notes, dated = read_table(path, headings, found["time"].name if "time" in found else None)
+    if dated:  # seconds already, whatever the heading ends in
+        clock = found["time"]
+        found["time"] = replace(clock, unit="s", factor=clock.factor / in_si("time", clock.unit), told=True)
     with np.errstate(over="ignore"):
         raw = {role: table[column.name.strip()] * column.factor + column.offset for role, column in found.items()}
     _check_sizes(path, found, raw)
     time = raw.pop("time", None)
-    if "time" in found and not found["time"].told:
+    if time is not None and not found["time"].told:
+        _check_assumed(path, found["time"].name, time)
         notes.append(f"the time {found['time'].name!r} is taken as seconds")
     reference = raw.pop("rate", None)
     if between_s is not None:
@@ -295,6 +302,17 @@ def _check_sizes(path: Path, found: Mapping[str, Column], raw: Mapping[str, np.n
             row = int(np.argmax(beyond))
             where = f"{path}: row {row + 1}, column {found[role].name!r}"
             raise InputError(f"{where}: {values[row]:.3g} in SI units is no {role}; at most {LARGEST:g}")
+
+
+def _check_assumed(path: Path, name: str, time: np.ndarray) -> None:
+    """Refuse times whose unit nobody says and that would be slow in seconds: milliseconds of a quick log are."""
+    steps = np.abs(np.diff(time[np.isfinite(time)]))
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    if usual * SLOW_HZ > 1.0:
+        raise InputError(
+            f"{path}: in seconds the rows of {name!r} would be {usual:.4g} s apart, {1.0 / usual:.3g} Hz, and no unit "
+            "is said: --units time=ms, or time=s if that is right"
+        )
 
 
 def _check_motion(path: Path, columns: Mapping[str, np.ndarray], referred: bool) -> None:

@@ -43,7 +43,7 @@ MISSING = [
 COMMENTS = ("#", "%", "//")
 
 
-def read_table(path: Path, wanted: Sequence[str], time: str | None) -> tuple[dict[str, np.ndarray], list[str]]:
+def read_table(path: Path, wanted: Sequence[str], time: str | None) -> tuple[dict[str, np.ndarray], list[str], bool]:
     """Read columns of a log.
 
     Args:
@@ -52,7 +52,8 @@ def read_table(path: Path, wanted: Sequence[str], time: str | None) -> tuple[dic
         time: The heading among them that may also hold dates, which become seconds from the first.
 
     Returns:
-        Heading -> numbers, (n_rows,), NaN where there is none; and what was done that nobody has asked for.
+        Heading -> numbers, (n_rows,), NaN where there is none; what was done that nobody has asked for; whether the
+        time is of dates.
 
     Raises:
         InputError: It cannot be read, lacks a column, or has text among the numbers.
@@ -73,13 +74,18 @@ def read_table(path: Path, wanted: Sequence[str], time: str | None) -> tuple[dic
     if not head.strip():
         raise InputError(f"{path}: empty")
     notes: list[str] = []
-    columns = _of_parquet(path, wanted, time) if head[:4] == b"PAR1" else _of_csv(path, head, wanted, time, notes)
+    dated: list[str] = []
+    columns = (
+        _of_parquet(path, wanted, time, dated)
+        if head[:4] == b"PAR1"
+        else _of_csv(path, head, wanted, time, notes, dated)
+    )
     if not len(next(iter(columns.values()))):
         raise InputError(f"{path}: has a heading and no row")
-    return columns, notes
+    return columns, notes, bool(dated)
 
 
-def _of_parquet(path: Path, wanted: Sequence[str], time: str | None) -> dict[str, np.ndarray]:
+def _of_parquet(path: Path, wanted: Sequence[str], time: str | None, dated: list[str]) -> dict[str, np.ndarray]:
     import pyarrow.parquet as pq
 
     with _arrows_complaints(path), path.open("rb") as source:
@@ -88,11 +94,11 @@ def _of_parquet(path: Path, wanted: Sequence[str], time: str | None) -> dict[str
         if file.metadata.num_rows > MOST_ROWS:
             raise _too_long(path, file.metadata.num_rows)
         table = file.read(columns=list(dict.fromkeys(wanted)))
-    return {name: _numbers(path, name, table[name], dates=name == time) for name in wanted}
+    return {name: _numbers(path, name, table[name], dated if name == time else None) for name in wanted}
 
 
 def _of_csv(
-    path: Path, head: bytes, wanted: Sequence[str], time: str | None, notes: list[str]
+    path: Path, head: bytes, wanted: Sequence[str], time: str | None, notes: list[str], dated: list[str]
 ) -> dict[str, np.ndarray]:
     import pyarrow as pa
     import pyarrow.csv as pacsv
@@ -136,7 +142,9 @@ def _of_csv(
     if torn:
         lines = "line has" if len(torn) == 1 else "lines have"
         notes.append(f"{len(torn)} {lines} another number of cells and were left out; the first, {torn[0]}")
-    return {name.strip(): _numbers(path, name, table[name], dates=name == time, comma=comma) for name in wanted}
+    return {
+        name.strip(): _numbers(path, name, table[name], dated if name == time else None, comma=comma) for name in wanted
+    }
 
 
 def _batches(path: Path, pacsv: Any, read: Any, parse: Any, convert: Any) -> pa.Table:
@@ -192,15 +200,16 @@ def _check_columns(path: Path, wanted: Sequence[str], names: Sequence[str]) -> N
             raise InputError(f"{path}: has the column {name!r} {list(names).count(name)} times: rename all but one")
 
 
-def _numbers(path: Path, name: str, column: Any, *, dates: bool, comma: bool = False) -> np.ndarray:
-    """A column as floats."""
+def _numbers(path: Path, name: str, column: Any, dated: list[str] | None, *, comma: bool = False) -> np.ndarray:
+    """A column as floats; of the one that may hold dates it is noted whether it does."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
     kind = column.type
     if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-        if not dates:
+        if dated is None:
             raise InputError(f"{path}: column {name!r} holds times, not numbers")
+        dated.append(name)
         return _seconds(column)
     if (
         pa.types.is_boolean(kind)
@@ -215,9 +224,11 @@ def _numbers(path: Path, name: str, column: Any, *, dates: bool, comma: bool = F
     if not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
         raise InputError(f"{path}: column {name!r} holds {kind}, not numbers")
     text = pc.call_function("utf8_trim_whitespace", [column])
-    if dates:
+    if dated is not None:
         try:
-            return _seconds(text.cast(pa.timestamp("ns")))
+            seconds = _seconds(text.cast(pa.timestamp("ns")))
+            dated.append(name)
+            return seconds
         except pa.ArrowInvalid:
             pass  # numbers, or neither
     values = np.empty(len(text))
@@ -225,7 +236,7 @@ def _numbers(path: Path, name: str, column: Any, *, dates: bool, comma: bool = F
         try:
             values[i] = np.nan if cell is None or cell in MISSING else float(cell.replace(",", ".") if comma else cell)
         except ValueError:
-            wanted = "a number or a date" if dates else "a number"
+            wanted = "a number or a date" if dated is not None else "a number"
             raise InputError(f"{path}: row {i + 1}, column {name!r}: {shown(cell)} is not {wanted}") from None
     return np.where(np.isfinite(values), values, np.nan)
 

@@ -341,3 +341,23 @@ def test_too_many_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         read_log(write_csv(tmp_path / "long.csv", sine()), COLUMNS)
     with pytest.raises(InputError, match="4,000 rows, more than 100 rows"):
         read_log(parquet(tmp_path / "long.parquet", sine()), COLUMNS)
+
+
+def test_milliseconds_are_not_taken_as_seconds(tmp_path: Path) -> None:
+    columns = {"clock": sine()["t_s"] * 1e3, "tilt_rad": sine()["tilt_rad"]}
+    names = {"time": "clock", "tilt": "tilt_rad"}
+    path = write_csv(tmp_path / "ms.csv", columns)
+    with pytest.raises(InputError, match=r"would be 5 s apart, 0.2 Hz, and no unit is said: --units time=ms"):
+        read_log(path, names)
+    assert read_log(path, names, units={"time": "ms"}).dt == pytest.approx(DT)
+    assert read_log(path, names, units={"time": "s"}).dt == pytest.approx(1e3 * DT)
+
+
+def test_dates_are_not_assumed_to_be_seconds(tmp_path: Path) -> None:
+    start = np.datetime64("2024-05-01T12:00:00.000")
+    dates = [str(start + np.timedelta64(round(t * 1e3), "ms")) for t in sine()["t_s"]]
+    for heading in ("when", "when_ms"):
+        path = write_csv(tmp_path / "dates.csv", {heading: dates, "tilt_rad": sine()["tilt_rad"]})
+        log = read_log(path, {"time": heading, "tilt": "tilt_rad"})
+        assert not log.notes
+        assert log.dt == pytest.approx(DT)
