@@ -12,12 +12,20 @@ LONGEST_LAG_S = 0.5
 """Lags are looked for up to this, and no farther than a quarter of what there is [s]."""
 AS_GOOD = 0.98
 """A periodic motion fits itself every period: of peaks this close to the highest, the one nearest to no lag counts."""
+ALIKE = 0.5
+"""Of an estimate whose correlation peaks lower, less than a quarter of the variance is the reference, however late."""
+FAINT = 0.1
+"""Enough for a measured tilt's slopes: most of them may be noise, which is white and has no peak of its own."""
 SPAN_S = 0.2
 """A reference's size is taken from how far it says the tilt has come in so long [s]."""
 
 
 def lag(
-    behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], dt: float, longest_s: float = LONGEST_LAG_S
+    behind: Sequence[np.ndarray],
+    ahead: Sequence[np.ndarray],
+    dt: float,
+    longest_s: float = LONGEST_LAG_S,
+    least: float = ALIKE,
 ) -> float | None:
     """How long one signal comes after another: the peak of their correlation coefficient, between the samples too.
 
@@ -29,6 +37,7 @@ def lag(
         ahead: The pieces of the other at the same times.
         dt: Sample period [s].
         longest_s: Longest lag looked for, either way [s].
+        least: A correlation coefficient whose peak is lower shows no lag.
 
     Returns:
         The lag [s], negative if it comes before; None if there is none: no motion, no likeness, or the peak at the end.
@@ -45,7 +54,7 @@ def lag(
     n, sx, sy, sxx, syy, sxy = sums
     with np.errstate(all="ignore"):
         r = (sxy - sx * sy / n) / np.sqrt((sxx - sx * sx / n) * (syy - sy * sy / n))
-    if not np.isfinite(r).all() or r.max() <= 0.1:
+    if not np.isfinite(r).all() or r.max() <= least:
         return None
     peaks = [i for i in range(1, len(r) - 1) if r[i - 1] < r[i] >= r[i + 1] and r[i] >= AS_GOOD * r.max()]
     if not peaks:
@@ -109,7 +118,7 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
         The four numbers; None for those that cannot be found.
     """
     slopes = [np.gradient(piece, dt) for piece in tilt]
-    found = lag(reference, slopes, dt)
+    found = lag(reference, slopes, dt, least=FAINT)
     span = max(2, round(SPAN_S / dt))
     rises, travels = [], []
     for y, rate in zip(tilt, reference, strict=True):

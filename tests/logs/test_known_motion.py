@@ -120,3 +120,15 @@ def test_a_reference_that_counts_the_other_way() -> None:
     t = DT * np.arange(N)
     found = alignment([tilt(t)], [-rate(t)], DT)
     assert found.correlation == pytest.approx(-1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(("share", "there"), [(0.4, False), (0.6, True)])
+def test_a_faint_likeness_has_no_lag(share: float, there: bool) -> None:
+    """An estimate that is the reference, 20 ms early, and another motion: they correlate by `share`."""
+    from scipy.signal import butter, sosfiltfilt
+
+    motion, other = sosfiltfilt(butter(4, 0.1, output="sos"), np.random.default_rng(5).standard_normal((2, N)))
+    made = share * np.roll(motion, -4) + math.sqrt(1.0 - share**2) * other * motion.std() / other.std()
+    found = lag([made], [motion], DT)
+    assert (found is not None) == there
+    assert found is None or found == pytest.approx(-0.02, abs=2e-3)
