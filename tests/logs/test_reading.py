@@ -13,6 +13,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.logs import Log, read_log
+from cmg_mj.logs.columns import ACCELEROMETERS
 from cmg_mj.units import unit_of_name
 from tests.logs.motion import COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
 
@@ -301,6 +302,14 @@ def test_what_cannot_be(edit: Edit, says: str, tmp_path: Path) -> None:
         ({"columns": COLUMNS, "radii_m": (0.1, 0.2)}, "there are no accelerometers"),
         ({"columns": COLUMNS, "between_s": (100.0, 200.0)}, "has no row there; it lasts 19.995 s"),
         ({"columns": COLUMNS, "rate_hz": 1e6}, "at most 5,000,000"),
+        (
+            {
+                "columns": {"time": "t_s", **dict.fromkeys(ACCELEROMETERS, "tilt_rad")},
+                "units": dict.fromkeys(ACCELEROMETERS, "g"),
+                "radii_m": (67.0, 201.5),
+            },
+            "--radii 67,201.5: in metres, at most 10; are these millimetres?",
+        ),
         ({}, "say which columns are what"),
     ],
 )
@@ -361,3 +370,23 @@ def test_dates_are_not_assumed_to_be_seconds(tmp_path: Path) -> None:
         log = read_log(path, {"time": heading, "tilt": "tilt_rad"})
         assert not log.notes
         assert log.dt == pytest.approx(DT)
+
+
+def test_a_spike_is_no_turn(tmp_path: Path) -> None:
+    """One row that leaps by 300 degrees, or by a turn out of what the angle's range can be: kept, and named."""
+    for leap in (math.radians(300.0), 2.0 * math.pi):
+        columns = dict(sine(), tilt_rad=sine()["tilt_rad"] + leap * (np.arange(N) == 1000))
+        log = read_log(write_csv(tmp_path / "spike.csv", columns), COLUMNS)
+        np.testing.assert_allclose(log["y1_rad"], columns["tilt_rad"], atol=1e-12)
+        (note,) = log.notes
+        assert "and back in row 1001 alone: a spike, kept as it is" in note
+
+
+def test_a_tilt_that_flickers_at_the_end_of_its_turn_runs_on(tmp_path: Path) -> None:
+    t = np.arange(N) * DT
+    truth = 0.4 * t + 0.003 * np.random.default_rng(1).standard_normal(N)
+    columns = {"t_s": t, "tilt_rad": (truth + math.pi) % (2.0 * math.pi) - math.pi}
+    log = read_log(write_csv(tmp_path / "turns.csv", columns), {"time": "t_s", "tilt": "tilt_rad"})
+    assert np.ptp(log["y1_rad"] - truth) < 1e-9
+    assert len(log.notes) == 1
+    assert "jumps by a turn" in log.notes[0]
