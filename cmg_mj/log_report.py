@@ -178,27 +178,42 @@ def remarks(replayed: Replayed) -> list[str]:
     """What was done to one log, what its reference is, and who did not take part."""
     lines = [f"{note[:1].upper()}{note[1:]}." for note in replayed.log.notes]
     if replayed.alignment is not None:
-        lines.append(_of_the_reference(replayed.alignment, replayed.log.dt))
+        motion = replayed.summaries[ZERO].get("velocity_rms_error_rad_s") or 0.0
+        set_already = bool({"delay_s", "scale", "offset"} & replayed.log.given.keys())
+        lines += _of_the_reference(replayed.alignment, replayed.log.dt, motion, set_already)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)
     return [*lines, *(f"Without {', '.join(names)}: {reason}." for reason, names in reasons.items())]
 
 
-def _of_the_reference(found: Alignment, dt: float) -> str:
-    """The reference's lag, size and offset in words, and what would take them out."""
+def _of_the_reference(found: Alignment, dt: float, motion: float, set_already: bool) -> list[str]:
+    """The reference's lag, size and offset in words if they matter, and what would take them out.
+
+    Args:
+        found: What the reference is to the tilt.
+        dt: Sample period [s].
+        motion: RMS of the reference [rad/s].
+        set_already: Whether something was taken out.
+
+    Returns:
+        No line, or one.
+    """
     lag, scale, offset, correlation = found
     if scale is None or offset is None or correlation is None:
-        return "The reference cannot be compared with the tilt: too little motion, or too short."
+        return ["The reference cannot be compared with the tilt: too little motion, or too short."]
     if correlation < 0.5:
-        turned = "it counts the other way: --scale rate=-1" if correlation < -0.5 else "is it the rate of this tilt?"
-        return f"The reference does not go with the tilt (correlation {correlation:.2f}): {turned}."
+        turned = "it counts the other way: --scale rate=-1." if correlation < -0.5 else "is it the rate of this tilt?"
+        return [f"The reference does not go with the tilt (correlation {correlation:.2f}): {turned}"]
     late = "an unknown time" if lag is None else f"{abs(lag) * 1e3:.2f} ms {'behind' if lag >= 0.0 else 'before'}"
     sign = "plus" if offset >= 0.0 else "less"
     said = f"Beside the tilt the reference comes {late}; {scale:.4f} times it {sign} {abs(offset):.4f} rad/s fits"
     cures = [f"--delay {lag:.4f}"] if lag is not None and abs(lag) > LATE * dt else []
     cures += [f"--scale rate={scale:.4g}"] if abs(scale - 1.0) > OFF else []
-    return said + (f" (beyond what was set; to take it out: {' '.join(cures)})." if cures else ".")
+    if not cures and lag is not None and abs(offset) <= OFF * motion:
+        return []
+    beyond = "beyond what was set; " if set_already else ""
+    return [said + (f" ({beyond}to take it out: {' '.join(cures)})." if cures else ".")]
 
 
 def note(replays: Sequence[Replayed]) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import functools
 import math
+import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -116,6 +117,17 @@ def of_a_log(command: Callable) -> Callable:
     return read_so
 
 
+def each_once(logs: Sequence[str]) -> None:
+    """Refuse a log that is named twice: it would count twice in means and intervals."""
+    seen: dict[Path, str] = {}
+    for log in logs:
+        path = Path(os.path.realpath(log))
+        path = path.parent if path.name == "trajectory.parquet" else path
+        if path in seen:
+            raise InputError(f"{log}: the same log as {seen[path]}" if log != seen[path] else f"{log}: given twice")
+        seen[path] = log
+
+
 def _numbers(texts: dict[str, str], option: str) -> dict[str, float]:
     found = {}
     for role, text in texts.items():
@@ -182,7 +194,7 @@ def replay(
     markdown: bool,
     as_json: bool,
 ) -> None:
-    r"""Replay LOG, CSV or Parquet, through every observer: a table, plots, a rerun recording, all signals as Parquet.
+    """Replay LOG, CSV or Parquet, through every observer: a table, plots, a rerun recording, all signals as Parquet.
 
     \b
       cmg-mj replay LOG.csv --columns time=t_ms,tilt=pitch_deg,rate=gyro_dps
@@ -191,7 +203,7 @@ def replay(
     Without a reference the table has the reconstruction error (the tilt integrated from the estimated rate against the
     measured one) and the roughness. Without --model only those observers take part that need none. The recording of a
     run, whose columns are known, replays to the figures of the run. docs/replay.md has the details.
-    """
+    """  # noqa: D301  (click wants the character itself)
     from cmg_mj import log_files, log_report, log_runs
 
     names = names_of(observers)
@@ -202,6 +214,7 @@ def replay(
             raise InputError(f"--set {kind}: is not among --observers {','.join(names)}")
     pendulum = None if model is None else log_runs.model_of(model)
     given = Reading(reading.columns, {**reading.options, **({"windows_s": tuple(spans)} if spans else {})})
+    each_once(logs)
     read = [given.read(path) for path in logs]
     distinct = log_files.distinct([log.name for log in read])
     asked = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -21,7 +22,7 @@ from cmg_mj.cli.arguments import (
     of_observers,
     refuse_given,
 )
-from cmg_mj.cli.logs import READING, Reading, of_a_log
+from cmg_mj.cli.logs import READING, Reading, each_once, of_a_log
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code, where
 from cmg_mj.differences import safe_name
 from cmg_mj.errors import InputError, nearest
@@ -221,6 +222,7 @@ def _tune_on_logs(
     from cmg_mj.runs import file_name
     from cmg_mj.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
     from cmg_mj.tuning.logged import FILES
+    from cmg_mj.tuning.written import plain
 
     if chosen.name:
         raise InputError(f"{chosen.name}: either a scenario or --log, not both")
@@ -234,6 +236,7 @@ def _tune_on_logs(
     if noise and "=" not in noise:
         raise InputError(f"--noise {noise}: densities are for a scenario; of a log write NAME=VALUE,... as in replay")
     noises = noise_numbers(noise)
+    each_once(logs)
     read = [reading.read(path) for path in logs]
     pendulum = None if model is None else model_of(model)
     default = Path("runs") / f"tune-{file_name(observer)}-{safe_name(read[0].name)}"
@@ -254,8 +257,9 @@ def _tune_on_logs(
             )
         show(figures_of_logs(study), logs_table(study), chosen.as_json)
         place = save_log_study(folder, study)
-    said = ",".join(f"{n.parameter}" for n in study.numbers)
-    say_written(folder, place, f"Tuned: {said}; replay it with --set {observer}.NAME=VALUE", chosen.as_json)
+    found = plain({n.parameter: study.level.parameters[n.parameter] for n in study.numbers})
+    settings = " ".join(f"--set '{observer}.{name}={json.dumps(value)}'" for name, value in found.items())
+    say_written(folder, place, f"Replay it tuned: {settings}", chosen.as_json)
 
 
 def _range(text: str) -> tuple[str, tuple[float, float]]:

@@ -192,3 +192,36 @@ def test_a_real_log_has_its_licence_beside_it() -> None:
     assert "Copyright (c) 2020 ssong47" in text
     assert "Permission is hereby granted" in text
     assert LOG.stat().st_size < 300_000
+
+
+def test_of_the_reference_it_says_what_matters() -> None:
+    good = replay("sine.csv", "--columns", PLAIN, "--observers", "linear").out
+    assert "Beside the tilt" not in good
+    late = replay("sine.csv", "--columns", PLAIN, "--observers", "linear", "--delay", "0.01").out
+    assert "(beyond what was set; to take it out: --delay -0.01" in " ".join(late.split())
+    real = " ".join(replay(LOG, "--columns", REAL, "--observers", "linear").out.split())
+    assert "12.09 ms behind; 1.0157 times it plus 0.0007 rad/s fits (to take it out: --delay 0.0121)." in real
+    other = dict(sine(), gyro_rad_s=np.random.default_rng(0).standard_normal(4000))
+    write_csv("other.csv", other)
+    assert "is it the rate of this tilt?\n" in replay("other.csv", "--columns", PLAIN, "--observers", "linear").out
+
+
+def test_the_same_log_twice() -> None:
+    assert replay("sine.csv", "./sine.csv", "--columns", PLAIN).complaint.endswith(
+        "./sine.csv: the same log as sine.csv"
+    )
+    arguments = ("--log", "sine.csv", "--log", "sine.csv", "--columns", PLAIN, "--observer", "linear")
+    assert "sine.csv: given twice" in cmg_mj("tune", *arguments).complaint
+
+
+def test_its_help_has_its_examples_on_lines_of_their_own() -> None:
+    said = replay("--help").out
+    assert "\\b" not in said
+    assert "\n    cmg-mj replay runs/push_recovery-homogeneous-0\n" in said
+
+
+def test_what_was_tuned_can_be_replayed() -> None:
+    arguments = ("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
+    said = " ".join(cmg_mj("tune", *arguments, "--out", "it").err.split())
+    assert "Replay it tuned: --set 'linear.tau=0.004'" in said
+    assert replay("sine.csv", "--columns", PLAIN, "--set", "linear.tau=0.004").status == 0
