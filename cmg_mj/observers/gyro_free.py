@@ -69,6 +69,10 @@ class GyroFree:
     bias_walk: NonNegative = 0.01
     jerk: NonNegative = 0.1
 
+    def __post_init__(self) -> None:
+        if not (self.noise.tilt or self.noise.acceleration or self.bias_walk or self.jerk):
+            raise ValueError("bias_walk = 0 and jerk = 0: with sensors without noise one of them must be positive")
+
     def init(self, y: Measurement) -> State:
         """Start at rest at the measured tilt, with no bias; of the tilt nothing else is known."""
         zero = 0.0 * y.y1

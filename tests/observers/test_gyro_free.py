@@ -152,3 +152,11 @@ def test_the_trap_of_the_offset() -> None:
 def test_without_a_measured_acceleration_it_is_refused() -> None:
     with pytest.raises(cmg_mj.InputError, match="needs the noise of its sensors"):
         cmg_mj.observers.make_observer("gyro_free", DT, ReducedModel(1.0, 0.0, 1.0, 1.0, 1.0))
+
+
+def test_with_nothing_uncertain_it_is_refused() -> None:
+    """Its covariance would fade to zero over zero after some hundred samples."""
+    perfect = TiltNoise(0.0, 0.0, 0.9)
+    gyro_free(perfect, jerk=0.0)
+    with pytest.raises(ValueError, match="one of them must be positive"):
+        gyro_free(perfect, jerk=0.0, bias_walk=0.0)
