@@ -199,11 +199,16 @@ class Accelerometer:
                 return digitise(raw, limit, step)
             n0, n1, n2, n3 = normal
             ix, iz, ox, oz = forces
-            readings = (ix + sigma * n0, iz + sigma * n1, ox + sigma * n2, oz + sigma * n3)
+            a, b, c, d = ix + sigma * n0, iz + sigma * n1, ox + sigma * n2, oz + sigma * n3
             if wander is not None:
-                readings = [reading + more for reading, more in zip(readings, wander, strict=True)]
+                a, b, c, d = (reading + more for reading, more in zip((a, b, c, d), wander, strict=True))
             if self.bandwidth_hz:
-                readings = [filtered(i, reading) for i, reading in enumerate(readings)]
-            return tuple([digitise(reading, limit, step) for reading in readings])
+                a, b, c, d = (filtered(i, reading) for i, reading in enumerate((a, b, c, d)))
+            return (
+                digitise(a, limit, step),
+                digitise(b, limit, step),
+                digitise(c, limit, step),
+                digitise(d, limit, step),
+            )
 
         return measure

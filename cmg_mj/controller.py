@@ -287,8 +287,8 @@ class Controller:
                 sensor.sample(step, ideal)
         if step % self.period:
             return False
-        forces, encoders, fog = (sensor.read(step) for sensor in self._sampled)
-        self.decide(step, forces, encoders, fog, ideal.rate)
+        accelerometers, encoders, fog = self._sampled
+        self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), ideal.rate)
         return True
 
     def decide(

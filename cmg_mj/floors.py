@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +25,7 @@ ROWS_A_TAP = 10
 """So many samples a tap, or there is no fit."""
 
 
+@lru_cache(maxsize=256)
 def acceleration_floor(noise: TiltNoise, dt: float) -> float:
     """The least RMS error of any filter of y1 and its acceleration that must do for whatever motion there is.
 
@@ -100,7 +102,8 @@ class TiltFloor:
         for part, mask in enumerate((counted, pushed)):
             rows = mask.any(axis=1)
             kept = inputs if mask.all() else np.where(mask[rows].T[:, None], inputs[:, :, rows], 0.0)
-            self._products[part] += kept @ np.swapaxes(kept, 1, 2)
+            # Not by @: BLAS would take every core for it, and keep them busy for a while.
+            self._products[part] += np.einsum("wir,wjr->wij", kept, kept)
             self._counts[part] += mask.sum(axis=0)
 
     def errors(self, world: int) -> tuple[float | None, float | None]:

@@ -28,7 +28,7 @@ class Measurement(_Angles):
 
     def __new__(cls, y1: Scalar, y2: Scalar, acceleration: Scalar = math.nan) -> Measurement:
         """The angles [rad], and the angular acceleration if it is measured [rad/s^2]."""
-        y = super().__new__(cls, y1, y2)
+        y = tuple.__new__(cls, (y1, y2))
         y.acceleration = acceleration
         return y
 

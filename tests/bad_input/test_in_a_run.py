@@ -64,7 +64,7 @@ def test_a_file_that_cannot_be_written_keeps_no_other_from_being(
         "summary.json": (runs, "_write_json"),
         "recording.rrd": (runs, "_record"),
     }[name]
-    monkeypatch.setattr(owner, writer, fails if isinstance(owner, ModuleType) else lambda _, path: fails(path))
+    monkeypatch.setattr(owner, writer, fails if isinstance(owner, ModuleType) else lambda _, path, *more: fails(path))
     said = cmg_mj("run", quick, "--out", "it", "--json")
     assert said.status == 2
     assert said.err == f"cmg-mj: it/{name}: cannot be written: Is a directory\n"
