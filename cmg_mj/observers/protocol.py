@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 from cmg_mj.elementwise import Scalar
+from cmg_mj.errors import InputError, nearest
 
 
 class _Angles(NamedTuple):
@@ -91,8 +92,15 @@ def needs(observer: Any) -> tuple[str, ...]:
     """What an observer, or its class, cannot do without beside y1, out of `NEEDS`.
 
     One that does not say counts as needing the model and the gimbals, as the papers' observers do.
+
+    Raises:
+        InputError: It names something else.
     """
-    return tuple(getattr(observer, "needs", ("model", "gimbals")))
+    named = tuple(getattr(observer, "needs", ("model", "gimbals")))
+    for name in named:
+        if name not in NEEDS:
+            raise InputError(f"needs = {named!r}: there is no {name!r}; {nearest(str(name), NEEDS)}")
+    return named
 
 
 def extra_signals(observer: Observer) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.experiment import prepare
-from cmg_mj.papers.beyond.floor import kalman_filter, tilt_noise, velocity_floor
+from cmg_mj.papers.beyond.floor import kalman_filter, velocity_floor
 from cmg_mj.scenario import load_scenario
 from tests.observers.reference import PAPER
 
@@ -51,6 +51,6 @@ def test_tilt_noise_is_the_rigs(noise_ug: float) -> None:
     assert trajectory is not None
     plant = experiment.plant
     noise = trajectory["y1_rad"] - trajectory["x1_rad"] + plant.bias
-    expected = tilt_noise(experiment.scenario.sensors.accelerometer, plant.radial_tilt)
+    expected = plant.facts.noise(experiment.scenario.sensors).tilt
     assert noise.std() == pytest.approx(expected, rel=0.03)
     assert abs(noise.mean()) < 4.0 * expected / math.sqrt(noise.size)

@@ -7,25 +7,7 @@ import math
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from cmg_mj.accelerometer import STANDARD_GRAVITY, Accelerometer
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.tilt import RadialTilt
-
-
-def tilt_noise(accelerometer: Accelerometer, tilt: RadialTilt) -> float:
-    """Standard deviation of y1's noise near the upright [rad]: white noise and rounding of the tangential axes.
-
-    Args:
-        accelerometer: The pair of sensors.
-        tilt: Their places.
-
-    Returns:
-        The standard deviation of one sample [rad].
-    """
-    step = STANDARD_GRAVITY / accelerometer.counts_per_g if accelerometer.counts_per_g else 0.0
-    axis = math.hypot(accelerometer.sigma, step / math.sqrt(12.0))
-    span = tilt.r_outer - tilt.r_inner
-    return axis * math.hypot(tilt.r_outer / span, tilt.r_inner / span) / STANDARD_GRAVITY
 
 
 def kalman_filter(model: ReducedModel, dt: float, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from scipy.stats import binomtest
 from cmg_mj.intervals import known_interval
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers.beyond.character import character, record_motion, update_us
-from cmg_mj.papers.beyond.floor import tilt_noise, velocity_floor
+from cmg_mj.papers.beyond.floor import velocity_floor
 from cmg_mj.papers.beyond.push_recovery import ERROR, on_rigs, push_recovery
 from cmg_mj.papers.claim import OnShare
 from cmg_mj.simulate import Result
@@ -59,7 +59,7 @@ def league(
                 "update_us": update_us(kind, motion),
             }
             experiment = push_recovery(kind, seed, [noise, *settings])
-            sigma = tilt_noise(experiment.scenario.sensors.accelerometer, experiment.plant.radial_tilt)
+            sigma = experiment.plant.facts.noise(experiment.scenario.sensors).tilt
             floor = velocity_floor(experiment.plant.reduced, experiment.law.dt, sigma)
             results = on_rigs(experiment, worlds, "equilibrium_bias_deg", biases_deg)
             for bias_deg, result in zip(biases_deg, results, strict=True):
