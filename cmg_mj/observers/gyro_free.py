@@ -53,8 +53,8 @@ class GyroFree:
         noise: Of tilt and angular acceleration, by the sensors' datasheet.
         rate_start: Standard deviation of the rate at the start, about zero [rad/s]. The default is about what remains
             of it later.
-        bias_start: The same of b [rad/s^2]. On the bundled rig 1.0 is 10 mg on each accelerometer, or the inner one
-            misaligned by 0.8 degrees. Less gains two hundredths without any of these, and loses more with them.
+        bias_start: The same of b [rad/s^2]. On the bundled rig the default is 5 mg between the two accelerometers, or
+            one of them misaligned by 0.3 degrees. For parts mounted worse than that, give what they may be off.
         bias_walk: How fast b may change: standard deviation after a second [rad/s^2].
         jerk: How far alpha is off the straight line between samples: standard deviation of its mean [rad/s^2].
     """
@@ -65,7 +65,7 @@ class GyroFree:
     model: ReducedModel
     noise: TiltNoise
     rate_start: Positive = 0.02
-    bias_start: Positive = 1.0
+    bias_start: Positive = 0.35
     bias_walk: NonNegative = 0.01
     jerk: NonNegative = 0.1
 
