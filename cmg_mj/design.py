@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from cmg_mj.complaint import fields_of, not_allowed
-from cmg_mj.controller import trim_of
 from cmg_mj.errors import InputError
 from cmg_mj.grid import check_times
 from cmg_mj.known_rigs import RigFacts
@@ -21,6 +20,7 @@ from cmg_mj.rehearsal import rehearse
 from cmg_mj.scenario import as_json, located
 from cmg_mj.schema import Scenario
 from cmg_mj.tilt import TiltNoise
+from cmg_mj.trim import trim_of
 
 
 @dataclass(frozen=True)

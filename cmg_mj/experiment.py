@@ -12,7 +12,7 @@ import numpy as np
 import tomli_w
 
 from cmg_mj.board import Board, on_a_board
-from cmg_mj.controller import Controller, Processor
+from cmg_mj.controller import Controller
 from cmg_mj.design import Design, design
 from cmg_mj.differences import differences
 from cmg_mj.errors import InputError, nearest
@@ -20,6 +20,7 @@ from cmg_mj.grid import check_steps, common_period
 from cmg_mj.law import Law
 from cmg_mj.loop_check import hints
 from cmg_mj.plant import Plant, load_plant
+from cmg_mj.processor import Processor
 from cmg_mj.resolved import resolved
 from cmg_mj.resources import folder
 from cmg_mj.scenario import base_of, located

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass as plain_dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from cmg_mj.law import Law
 from cmg_mj.mjcf import compile_model, load_rig, lock_thrust_bearing, parse
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.plant_settings import FINEST_STEP_S, PlantSettings
+from cmg_mj.processor import Processor, WithProcessor
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
 from cmg_mj.rig_check import starts
@@ -211,6 +212,7 @@ class Plant:
         *,
         law: Law | None = None,
         sensors: Sensors | None = None,
+        processor: Processor | None = None,
         **options: Any,
     ) -> Controller:
         """A fresh controller for this rig.
@@ -219,6 +221,7 @@ class Plant:
             observer: An observer, or its name (or package.module:Class).
             law: The law; by default Table 2's gains at 200 Hz.
             sensors: The sensors; by default those of the datasheets.
+            processor: What takes the decisions in the controller's place, if anything does.
             **options: Options of `Controller`, such as seed, feedback and companions; whatever else is given is a
                 parameter of the observer, if that is given by name.
 
@@ -236,9 +239,10 @@ class Plant:
             observer = make_observer(observer, law.dt, self.reduced, noise, **parameters)
         elif parameters:
             name = next(iter(parameters))
-            known = {"law", "sensors", *CONTROLLER_OPTIONS}
+            known = {"law", "sensors", "processor", *CONTROLLER_OPTIONS}
             raise InputError(f"controller({name}=...): no such option; {nearest(name, known)}")
-        return Controller(
+        make = Controller if processor is None else partial(WithProcessor, processor)
+        return make(
             observer,
             law,
             self.radial_tilt,

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.controller import read_only
 from cmg_mj.errors import InputError, raised, shown
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
+from cmg_mj.observing import read_only
 
 
 def rehearse(observer: Observer, worlds: int | None) -> None:

@@ -151,56 +151,61 @@ def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) 
 class SampledSensor:
     """One sensor at work: it samples at its own rate and delivers after its latency.
 
+    Args:
+        sensor: What it is.
+        timestep: Physics step [s].
+        noise: Standard normals, a sample's at a time.
+        where: The scenario's section.
+        measure: What it makes of an ideal reading and a sample's normals; by default that of its datasheet.
+
     Attributes:
         beat: Physics steps between the moments at which it may be due.
     """
 
-    def __init__(self, sensor: Accelerometer | Encoder | Fog, timestep: float, noise: Iterator, where: str) -> None:
+    def __init__(
+        self,
+        sensor: Accelerometer | Encoder | Fog,
+        timestep: float,
+        noise: Iterator,
+        where: str,
+        measure: Callable[[Ideal, Any], Any] | None = None,
+    ) -> None:
         self.period = whole_steps(1.0 / sensor.rate_hz, timestep, f"{where}.rate_hz", f"{sensor.rate_hz:g} Hz")
         self.beat = self.period
         self.latency = steps_until(sensor.latency_s, timestep)
-        self._measure = sensor.meter()
+        self._measure = measure or sensor.meter()
         self._noise = noise
         self._on_the_way: deque = deque()
+        self._newest: Any = None
         self._delivered: Any = None
 
-    def due(self, step: int) -> bool:
-        """Whether it has something to look at in a physics step."""
-        return step % self.period == 0
-
     def sample(self, step: int, ideal: Ideal) -> None:
-        """Take a sample at a physics step at which it is due, or at the first one."""
-        self._deliver(step, self._measure(ideal, next(self._noise)))
-
-    def _deliver(self, step: int, reading: Any) -> None:
-        # Before the start the rig stood still, so the first sample counts as delivered.
-        if self.latency == 0 or self._delivered is None:
-            self._delivered = reading
+        """Take what is due, at a physics step that is a multiple of `beat`, or at the first one."""
+        self._newest = self._measure(ideal, next(self._noise))
         if self.latency:
-            self._on_the_way.append((step + self.latency, reading))
+            self._on_the_way.append((step + self.latency, self._newest))
 
     def read(self, step: int) -> Any:
-        """The newest sample delivered by a physics step."""
-        while self._on_the_way and self._on_the_way[0][0] <= step:
+        """The newest sample delivered by a physics step; before the start the rig stood still."""
+        if not self.latency:
+            return self._newest
+        while self._on_the_way and (self._on_the_way[0][0] <= step or self._delivered is None):
             self._delivered = self._on_the_way.popleft()[1]
         return self._delivered
 
 
-class SampledAccelerometers(SampledSensor):
-    """Both accelerometers at work: each at its own instants, filtering more samples than it delivers.
-
-    Args:
-        sensor: Both.
-        timestep: Physics step [s].
-        noise: Standard normals of the white noise, four a sample.
-        where: The scenario's section.
-        flicker: Standard normals of the 1/f noise, a corner frequency after the other, four each.
-    """
+class UnevenPair(SampledSensor):
+    """Two accelerometers at work that sample each at its own instants, or filter more samples than they deliver."""
 
     def __init__(
-        self, sensor: Accelerometer, timestep: float, noise: Iterator, where: str, flicker: Iterator | None = None
+        self,
+        sensor: Accelerometer,
+        timestep: float,
+        noise: Iterator,
+        where: str,
+        measure: Callable[[Ideal, Any], Any] | None = None,
     ) -> None:
-        super().__init__(sensor, timestep, noise, where)
+        super().__init__(sensor, timestep, noise, where, measure)
         inside = f"{sensor.bandwidth_hz:g} Hz, sampled at {INSIDE_HZ:g} Hz inside the part"
         self._raw = self.period
         if sensor.bandwidth_hz:
@@ -210,16 +215,10 @@ class SampledAccelerometers(SampledSensor):
         # So long a low-pass needs to forget its start, all but 1e-4 of it.
         self._settling = math.ceil(2.0 * INSIDE_HZ / sensor.bandwidth_hz) if sensor.bandwidth_hz else 0
         self._outer: deque = deque()
-        if sensor.bias_instability_ug and flicker is not None:
-            self._measure = sensor.meter(_drift(sensor, flicker))
-
-    def due(self, step: int) -> bool:
-        """Whether one of the two takes a sample in a physics step."""
-        return step % self._raw == 0 or (step + self._skew) % self._raw == 0
 
     def sample(self, step: int, ideal: Ideal) -> None:
         """Take what is due: a sample of the inner one, together with the outer's that is older by the skew."""
-        first = self._delivered is None
+        first = self._newest is None
         if self._skew:
             if first or (step + self._skew) % self._raw == 0:
                 self._outer.append((step, ideal.accelerations))
@@ -234,7 +233,9 @@ class SampledAccelerometers(SampledSensor):
             for _ in range(self._settling):
                 reading = self._measure(ideal, next(self._noise))
         if first or step % self.period == 0:
-            self._deliver(step, reading)
+            self._newest = reading
+            if self.latency:
+                self._on_the_way.append((step + self.latency, reading))
 
 
 def _together(inner: Any, outer: Any) -> Any:
@@ -280,10 +281,10 @@ def at_work(sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence
         return normals(seed, worlds, stream, channels)
 
     pair = sensors.accelerometer
-    flicker = noise(FLICKER, len(CORNERS_HZ) * pair.channels)
-    where = "sensors.accelerometer"
+    drift = _drift(pair, noise(FLICKER, len(CORNERS_HZ) * pair.channels)) if pair.bias_instability_ug else None
+    kind = UnevenPair if pair.skew_s or pair.bandwidth_hz else SampledSensor
     return [
-        SampledAccelerometers(pair, timestep, noise(0, pair.channels), where, flicker),
+        kind(pair, timestep, noise(0, pair.channels), "sensors.accelerometer", pair.meter(drift)),
         SampledSensor(sensors.encoder, timestep, noise(1, sensors.encoder.channels), "sensors.encoder"),
         SampledSensor(sensors.fog, timestep, noise(2, sensors.fog.channels), "sensors.fog"),
     ]

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 from cmg_mj.board.line import Closed, Line
 from cmg_mj.board.tools import EMULATOR
-from cmg_mj.controller import Decision
 from cmg_mj.errors import RunStopped
+from cmg_mj.processor import Decision
 
 PATIENCE_S = 30.0
 """An answer takes a fraction of a millisecond; a machine that is busy with other things may take its time."""

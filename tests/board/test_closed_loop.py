@@ -18,11 +18,11 @@ from cmg_mj.board.image import build
 from cmg_mj.board.tools import available
 from cmg_mj.board.with_controller import exported
 from cmg_mj.board_cost import cost_markdown, cost_of, cost_table
-from cmg_mj.controller import Decision
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.papers.aranovskiy2020 import on_the_board
+from cmg_mj.processor import Decision
 from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
 from tests.board.toy import toy

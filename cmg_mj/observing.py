@@ -1,0 +1,159 @@
+"""Observers at work: started, advanced sample by sample, and a user's one held to its word."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import numpy as np
+
+from cmg_mj.elementwise import Scalar
+from cmg_mj.errors import InputError, RunStopped, raised
+from cmg_mj.observers.protocol import Estimate, Measurement, Observer, extra_signals
+
+
+def read_only(*arrays: np.ndarray) -> None:
+    """What is handed to several observers must not be changed by one of them: `d = y.y1; d -= 0.02` raises."""
+    for array in arrays:
+        array.flags.writeable = False
+
+
+class Observing:
+    """Observers that see the same samples.
+
+    Args:
+        observers: The one in the loop, whose failure stops a run, then those that only ride along.
+        single: Whether on floats (one world) or on arrays (n_worlds,).
+        timestep: Physics step [s].
+
+    Attributes:
+        extra_signals: Names of what each of them estimates beyond x.
+
+    Raises:
+        InputError: An observer's extra signals are not distinct lower-case names.
+    """
+
+    def __init__(self, observers: Sequence[Observer], single: bool, timestep: float) -> None:
+        self.extra_signals = [_extra_signals(observer) for observer in observers]
+        self._widths = [3 + len(names) for names in self.extra_signals]
+        self._given = list(observers)
+        self._single = single
+        self._timestep = timestep
+        self._at_work: list[Observer] = []
+        self._states: list[Any] = []
+
+    def start(self, y: Measurement, step: int) -> list[Sequence[Scalar]]:
+        """The estimates at the first sample.
+
+        Args:
+            y: The measurement.
+            step: Number of the physics step.
+
+        Returns:
+            An estimate an observer: x1, x2, x3, its extra signals.
+
+        Raises:
+            RunStopped: An observer failed.
+        """
+        self._at_work = list(self._given)
+        self._states = [self._first_state(observer, y, step) for observer in self._at_work]
+        zero = 0.0 * y.y1
+        return [named((y.y1, zero, y.y2, *[zero] * (width - 3))) for width in self._widths]
+
+    def advance(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
+        """The estimates at the next sample.
+
+        Args:
+            y: The measurement.
+            u: The gimbal rate held since the last one [rad/s].
+            step: Number of the physics step.
+
+        Returns:
+            An estimate an observer: x1, x2, x3, its extra signals.
+
+        Raises:
+            RunStopped: The observer in the loop failed, or in one world returned a number that is not finite.
+        """
+        states = self._states
+        estimates: list[Sequence[Scalar]] = []
+        for i, observer in enumerate(self._at_work):
+            try:
+                states[i], estimate = observer.step(states[i], y, u)
+                if self._single:
+                    # The sum of floats is a float, of anything else (but for a few integers among them) is not.
+                    if len(estimate) != self._widths[i] or type(sum(estimate)) is not float:
+                        estimate = self._fitted(estimate, self._widths[i], y)
+                elif self._fits(estimate, self._widths[i], y):
+                    # The record keeps a copy: an observer may go on changing its arrays in place.
+                    estimate = named([part.copy() for part in estimate])
+                else:
+                    estimate = self._fitted(estimate, self._widths[i], y)
+            except (Exception, SystemExit) as error:  # a user's observer may fail in any way
+                if i == 0:
+                    self._blame(observer, f"raised {raised(error)}", step, error)
+                # One that only rides along must not end the run: it is NaN from here on.
+                self._at_work[i] = lost = _Lost(self._widths[i])
+                states[i], estimate = lost.step(None, y, u)
+            estimates.append(estimate)
+        # Many worlds are judged one by one, elsewhere. NaN and infinity alike are not zero times themselves.
+        if self._single and 0.0 * sum(estimates[0]) != 0.0:
+            for name, value in zip(("x1", "x2", "x3", *self.extra_signals[0]), estimates[0], strict=True):
+                if not math.isfinite(value):
+                    self._blame(self._at_work[0], f"returned {value} for {name}", step)
+        return estimates
+
+    def _first_state(self, observer: Observer, y: Measurement, step: int) -> Any:
+        try:
+            return observer.init(y)
+        except (Exception, SystemExit) as error:  # a user's observer may fail in any way
+            self._blame(observer, f"raised {raised(error)}", step, error)
+
+    def _fits(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> bool:
+        """Whether an estimate has all its parts, arrays (n_worlds,)."""
+        shape = y.y1.shape
+        return len(estimate) == width and all(
+            getattr(part, "shape", None) == shape and part.dtype == float for part in estimate
+        )
+
+    def _fitted(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> Sequence[Scalar]:
+        """Make a user's estimate, which may be NumPy's numbers or the same for all worlds, consist of these."""
+        if len(estimate) < width:
+            raise ValueError(f"the estimate has {len(estimate)} parts, not {width}: x1, x2, x3 and the extra signals")
+        parts = [np.asarray(part) for part in estimate[:width]]
+        for part in parts:
+            if part.dtype.kind not in "fiub":
+                raise TypeError(f"the estimate has a part of type {part.dtype}, not real numbers")
+        if self._single:
+            return named([float(part) for part in parts])
+        return named([np.broadcast_to(part.astype(float), y.y1.shape) for part in parts])
+
+    def _blame(self, observer: Observer, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
+        name = type(getattr(observer, "stands_for", observer)).__name__
+        raise RunStopped(f"observer {name} {what} at t = {step * self._timestep:g} s") from cause
+
+
+class _Lost:
+    """A companion that raised: nothing is known any more."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+
+    def init(self, y: Measurement) -> None:
+        return None
+
+    def step(self, state: None, y: Measurement, u: Scalar) -> tuple[None, Any]:
+        return None, named((math.nan + 0.0 * y[0],) * self.width)
+
+
+def named(parts: Sequence[Scalar]) -> Sequence[Scalar]:
+    """An estimate of x alone has its parts' names."""
+    return Estimate(*parts) if len(parts) == 3 else tuple(parts)
+
+
+def _extra_signals(observer: Observer) -> tuple[str, ...]:
+    """What an observer estimates beyond x; what is wrong with its names is the user's affair."""
+    try:
+        return extra_signals(observer)
+    except ValueError as error:
+        raise InputError(f"observer {type(observer).__name__}: {error}") from error
