@@ -113,6 +113,12 @@ def test_its_covariance_is_what_its_errors_are() -> None:
     assert low < total < high
 
 
+def test_it_expects_5_mg_between_the_accelerometers_of_the_bundled_rig() -> None:
+    plant = cmg_mj.load_plant()
+    offset = plant.radial_tilt.acceleration(0.0, 5e-3 * plant.gravity)
+    assert gyro_free().bias_start == pytest.approx(offset, rel=0.1)
+
+
 class SteadyGains(GyroFree):
     """The same with the gains that it settles at, from the start."""
 
