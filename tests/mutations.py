@@ -178,9 +178,9 @@ def report_caught_by(mutant: Mutant) -> str:
 PARAMETERS_SAY = (
     "Each parameter multiplied in a copy of the sources, and the first test that then fails; a dash is a survivor.\n"
     "Each is caught by its effect, not by comparing a default with a literal, but for `kalman`: a test says what its\n"
-    "defaults are, since a fifth more or less of any but `torque_white` moves its mean errors in push_recovery, over the\n"
-    "run and in the push window, by less than 0.2 %. By less than 0.3 % it is for `rate_start`, `bias_walk` and `jerk` of\n"
-    "`gyro_free`, the only survivors: a test that saw so little would see rounding."
+    "defaults are, since a fifth more or less of any but `torque_white` moves its mean errors in push_recovery, over\n"
+    "the run and in the push window, by less than 0.2 %. By less than 0.3 % it is for `rate_start`, `bias_walk` and\n"
+    "`jerk` of `gyro_free`, the only survivors: a test that saw so little would see rounding."
 )
 REPORTS_SAY = (
     "Each line of the papers' reports changed as `tests/papers/mutants.py` has it, and the test that then fails;\n"
