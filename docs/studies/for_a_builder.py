@@ -12,7 +12,8 @@ import argparse
 import numpy as np
 from bias_limits import limits
 
-from cmg_mj import board_cost, load_scenario, markdown, prepare
+from cmg_mj import load_scenario, markdown, prepare
+from cmg_mj.board.cost import counted_on, measure
 from cmg_mj.errors import InputError
 from cmg_mj.intervals import mean_interval
 from cmg_mj.observers import OBSERVERS, needs, observer_class
@@ -43,7 +44,7 @@ def bears(observer: str) -> str:
 def instructions() -> dict[str, str]:
     """Of a whole update on the board, by observer."""
     try:
-        figures = board_cost.measure(list(OBSERVERS), lambda share: None)["figures"]
+        figures = measure([prepare(counted_on(name)) for name in OBSERVERS], lambda share: None)["figures"]
     except InputError as error:
         print(f"no board: {error}")
         return {}

@@ -17,15 +17,13 @@ from cmg_mj.board import Board
 from cmg_mj.board.image import build
 from cmg_mj.board.tools import available
 from cmg_mj.board.with_controller import exported
-from cmg_mj.board_cost import cost_markdown, cost_of, cost_table
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import OBSERVERS, Measurement
-from cmg_mj.papers.aranovskiy2020 import on_the_board
 from cmg_mj.processor import Decision
 from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
-from tests.board.toy import toy
+from tests.board.toy import SHORT, short, toy
 from tests.command import cmg_mj
 
 pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
@@ -34,15 +32,10 @@ NO_COUNTS = ("sensors.accelerometer.counts_per_g=0", "sensors.encoder.counts_per
 ARE_PUSHED = ("homogeneous", "kalman", "gyro_free")
 """In lockstep; the others stand there for half a second."""
 PUSHED = ("duration_s=2.5", "push.0.start_s=1.0", "push.0.torque_n_m=2.5")
-SHORT = ("duration_s=0.5", "plant.initial_tilt_deg=0.5", "push=[]")
 
 
 def sets(settings: tuple[str, ...]) -> list[str]:
     return [word for setting in settings for word in ("--set", setting)]
-
-
-def short(observer: str, *settings: str) -> Experiment:
-    return prepare(load_scenario("push_recovery", [*SHORT, *settings], observer))
 
 
 class Recorded:
@@ -200,33 +193,6 @@ def test_a_run_on_the_board_says_so_and_reruns_to_the_same_numbers() -> None:
     assert [Trajectory.load(folder / "trajectory.parquet").metadata.get("driver") for folder in folders] == told
     cmg_mj("run", "push_recovery", "--driver", "board", *sets(SHORT))
     assert len(list(Path("runs").iterdir())) == 2  # the same run again goes to the same folder
-
-
-def test_what_they_cost() -> None:
-    linear, homogeneous = (cost_of(short(name)) for name in ("linear", "homogeneous"))
-    assert linear["step_instructions"] < 0.1 * homogeneous["step_instructions"]
-    for row in (linear, homogeneous):
-        assert row["step_instructions"] < row["update_instructions"] <= row["update_instructions_most"]
-        assert row["update_us_at_216_mhz"] == pytest.approx(row["update_instructions"] / 216.0)
-        assert 40 <= row["stack_bytes"] <= 1000
-        assert 100 <= row["flash_bytes"] <= 20_000
-    # Of the observer tilt, rate and last sample; integrator, last command, and whether it has started.
-    assert linear["state_bytes"] == 6 * 4
-    figures = {"figures": [{"observer": "linear"} | linear]}
-    assert cost_markdown(figures).splitlines()[2].startswith("| linear")
-    assert cost_table(figures).row_count == 1
-
-
-def test_most_of_11_is_powers(tmp_path: Path) -> None:
-    """Why (11) costs more than (10): four powers an update, which are more than half of it."""
-    with exported(short("homogeneous").controller()) as files:
-        powers = (files.folder / "homogeneous.c").read_text().count("powf(")
-    steps = []
-    for more in ("", "extern float powf(float, float); y1 = powf(y1, y2);"):
-        with Board(toy(tmp_path, step=more), counting=True) as board:
-            steps.append(board.step(0.013, 0.85, 0.0, 0.0)[1].instructions)
-    assert powers == 4
-    assert powers * (steps[1] - steps[0]) > 0.5 * json.loads(on_the_board.RECORDED.read_text())["homogeneous"]
 
 
 COMPANION = """

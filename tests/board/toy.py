@@ -1,4 +1,4 @@
-"""A controller written by hand, with the interface of an exported one, that does what a test asks of it."""
+"""What boards are tried with: a controller written by hand that does what a test asks of it, and a short run."""
 
 from __future__ import annotations
 
@@ -8,8 +8,18 @@ import pytest
 
 from cmg_mj.board.image import build
 from cmg_mj.board.tools import missing
+from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.scenario import load_scenario
 
 needs_board = pytest.mark.skipif(bool(missing()), reason=f"not installed: {', '.join(missing())}")
+
+SHORT = ("duration_s=0.5", "plant.initial_tilt_deg=0.5", "push=[]")
+
+
+def short(observer: str, *settings: str) -> Experiment:
+    """Half a second in which the rig comes back."""
+    return prepare(load_scenario("push_recovery", [*SHORT, *settings], observer))
+
 
 HEADER = """
 #define TOY_ESTIMATES 4

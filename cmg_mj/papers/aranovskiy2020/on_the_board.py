@@ -10,8 +10,8 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
+from cmg_mj.board.cost import cost_of
 from cmg_mj.board.tools import available
-from cmg_mj.board_cost import cost_of
 from cmg_mj.experiment import prepare
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain, euler, rk4
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS

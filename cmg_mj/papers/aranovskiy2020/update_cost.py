@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.bench import time_of_update
-from cmg_mj.board_cost import CLOCK_MHZ
+from cmg_mj.board.cost import CLOCK_MHZ
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
 from cmg_mj.papers.aranovskiy2020.on_the_board import PLAIN, instructions

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from rich import box
 from rich.table import Table
 
-from cmg_mj.board import Board, Cost
+from cmg_mj.board.emulated import Board, Cost
 from cmg_mj.board.image import build, flash_of
 from cmg_mj.board.tools import require
 from cmg_mj.board.with_controller import exported
-from cmg_mj.controller import Controller
-from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.controller import Controller, Processor
 from cmg_mj.markdown import table
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
+from cmg_mj.schema import Scenario
+from cmg_mj.trajectory import Trajectory
 
 SECONDS = 2.5
 """Of push_recovery, whose push begins at 2 s: so long the costs are taken down, tick after tick."""
@@ -39,11 +39,47 @@ COLUMNS = {
 """Heading -> the figure and how it is printed."""
 
 
-def measure(observers: Sequence[str], on_progress: Callable[[float], None]) -> dict[str, Any]:
-    """Count what every observer costs, along its own run on the board.
+class Ended(Protocol):
+    """What is needed of a `simulate.Result`, whose room uses MuJoCo and lies below this one."""
+
+    @property
+    def outcomes(self) -> Sequence[Any]:
+        """How each world ended."""
+        ...
+
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """What is kept of it."""
+        ...
+
+
+class Run(Protocol):
+    """What is needed of an `experiment.Experiment`, which closes its loop by a board and so lies below this room."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What it was made from."""
+        ...
+
+    def controller(self) -> Controller:
+        """A fresh controller."""
+        ...
+
+    def run_on(self, processor: Processor, /) -> Ended:
+        """One world, its control decisions taken by a processor."""
+        ...
+
+
+def counted_on(observer: str) -> Scenario:
+    """What an observer's costs are taken down on."""
+    return load_scenario("push_recovery", [f"duration_s={SECONDS}"], observer)
+
+
+def measure(runs: Sequence[Run], on_progress: Callable[[float], None]) -> dict[str, Any]:
+    """Count what observers cost, each along its own run on the board.
 
     Args:
-        observers: Names of the observers.
+        runs: An `Experiment` an observer, such as `prepare(counted_on("linear"))`.
         on_progress: Called with the share done.
 
     Returns:
@@ -53,7 +89,6 @@ def measure(observers: Sequence[str], on_progress: Callable[[float], None]) -> d
         InputError: What is needed is not installed, or an observer cannot be exported.
     """
     require()
-    runs = [prepare(load_scenario("push_recovery", [f"duration_s={SECONDS}"], name)) for name in observers]
     rows = []
     for i, run in enumerate(runs):
         rows.append({"observer": run.scenario.observer.kind} | cost_of(run))
@@ -66,21 +101,21 @@ def measure(observers: Sequence[str], on_progress: Callable[[float], None]) -> d
     }
 
 
-def cost_of(experiment: Experiment, controller: Controller | None = None) -> dict[str, Any]:
+def cost_of(run: Run, controller: Controller | None = None) -> dict[str, Any]:
     """What a controller costs on the board.
 
     Args:
-        experiment: The run on which it is counted, closed by the controller itself; all ticks count.
+        run: An `Experiment`, along which it is counted, closed by the controller itself; all ticks count.
         controller: The controller; by default that of the scenario. Another must estimate the same signals.
 
     Returns:
         Its figures.
     """
-    with exported(controller or experiment.controller()) as files:
+    with exported(controller or run.controller()) as files:
         flash = flash_of(files.observer, files.folder)
         board = Board(build(files.observer, files.folder).path, counting=True)
     with board:
-        result = experiment.run_on(board)
+        result = run.run_on(board)
         updates = board.costs[1:]  # the first only starts the observer
         steps = _steps(board, result)
         sizes = board.sizes
@@ -99,7 +134,7 @@ def cost_of(experiment: Experiment, controller: Controller | None = None) -> dic
     }
 
 
-def _steps(board: Board, result: Result) -> list[Cost]:
+def _steps(board: Board, result: Ended) -> list[Cost]:
     """What the observer alone takes, given what the controller around it has been given."""
     if result.outcomes[0].kind == "interrupted":
         raise KeyboardInterrupt
