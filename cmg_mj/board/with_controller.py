@@ -14,6 +14,7 @@ from cmg_mj.board.tools import require
 from cmg_mj.controller import Controller
 from cmg_mj.errors import InputError
 from cmg_mj.export import export
+from cmg_mj.export.names import name_of
 
 
 class Exported(NamedTuple):
@@ -47,8 +48,16 @@ def exported(controller: Controller) -> Iterator[Exported]:
             "estimate, 'observer'"
         )
     with TemporaryDirectory(prefix="cmg_mj-board-") as folder:
-        header = export(controller, Path(folder), precision="single")[0]
+        header = export(controller, Path(folder), precision="single", name=_name_of(controller))[0]
         yield Exported(header.stem, Path(folder))
+
+
+def _name_of(controller: Controller) -> str:
+    """Its observer's, or any where C cannot spell that: nobody is shown this C."""
+    try:
+        return name_of(controller.observer)
+    except InputError:
+        return "own"
 
 
 @contextmanager

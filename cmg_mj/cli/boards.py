@@ -22,6 +22,12 @@ from cmg_mj.cli.terminal import say, say_hints, say_written, show, users_code
     help="Of every number in the C.",
 )
 @click.option(
+    "--name",
+    "asked",
+    metavar="NAME",
+    help="What files, types and functions begin with; by default OBSERVER's own name.",
+)
+@click.option(
     "--scenario",
     default="push_recovery",
     show_default=True,
@@ -41,6 +47,7 @@ def export(
     observer: str,
     out: str | None,
     precision: Literal["double", "single"],
+    asked: str | None,
     scenario: str,
     settings: tuple[str, ...],
     as_json: bool,
@@ -61,10 +68,10 @@ def export(
     experiment = prepare(Chosen(scenario, settings, None, out, as_json).scenario(observer))
     say_hints(experiment.hints)
     controller = experiment.controller()
-    name = name_of(controller.observer)
+    name = name_of(controller.observer, asked)
     place = Path("runs") / f"export-{name}-{precision}" if out is None else named(out)
     with claim(place, files_of(name)) as folder:
-        made = code(controller, precision)
+        made = code(controller, precision, name)
         files = save(folder, made)
     show(made.figures, export_table(made.figures), as_json)
     if made.figures["compiler"] is None:

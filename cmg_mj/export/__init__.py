@@ -29,7 +29,11 @@ if TYPE_CHECKING:
 
 
 def export(
-    controller: Controller, out: Path | RunFolder, *, precision: Literal["double", "single"] = "double"
+    controller: Controller,
+    out: Path | RunFolder,
+    *,
+    precision: Literal["double", "single"] = "double",
+    name: str | None = None,
 ) -> list[Path]:
     """Write a controller as C, compared with Python.
 
@@ -38,24 +42,24 @@ def export(
             errors, seed and companions do not count.
         out: Folder to write to; made if need be.
         precision: Of every number in C.
+        name: What everything in C begins with; by default the observer's name, or what that of a user's class makes.
 
     Returns:
-        The files: NAME.h, NAME.c, NAME_example.c, NAME_test_vector.h. NAME is the observer's name, or made of that of
-        a user's class.
+        The files: NAME.h, NAME.c, NAME_example.c, NAME_test_vector.h.
 
     Raises:
         InputError: It cannot be exported, C is not what Python runs, CasADi is missing, or the folder holds files of
             the user's that would be written over.
     """
-    return save(out, code(controller, precision))
+    return save(out, code(controller, precision, name))
 
 
-def code(controller: Controller, precision: Literal["double", "single"]) -> Code:
+def code(controller: Controller, precision: Literal["double", "single"], name: str | None = None) -> Code:
     """The same without writing it: the files' texts, and figures of the comparison."""
     check_installed()
     from cmg_mj.export import work
 
-    return work.code(controller, precision)
+    return work.code(controller, precision, name)
 
 
 def save(out: Path | RunFolder, made: Code) -> list[Path]:

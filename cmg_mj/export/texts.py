@@ -12,7 +12,7 @@ from cmg_mj.controller import Controller
 from cmg_mj.export.about import about
 from cmg_mj.export.c_code import Precision, body, literal
 from cmg_mj.export.constants import Constants
-from cmg_mj.export.names import name_of, places_of
+from cmg_mj.export.names import places_of
 from cmg_mj.export.trace import MEASURED, Traced
 
 WIDEST = 110
@@ -30,17 +30,14 @@ class Texts:
         traced: Its formulas.
         constants: Its numbers.
         precision: Of every number in C.
+        name: What everything in C begins with.
     """
 
     controller: Controller
     traced: Traced
     constants: Constants
     precision: Precision
-
-    @cached_property
-    def name(self) -> str:
-        """What everything in C begins with."""
-        return name_of(self.controller.observer)
+    name: str
 
     @cached_property
     def places(self) -> list[str]:

@@ -12,7 +12,8 @@ from cmg_mj.errors import raised
 from cmg_mj.export.constants import Constants
 from cmg_mj.export.place import Refused, raised_at
 from cmg_mj.export.symbol import Symbol, expression
-from cmg_mj.export.tree import form, identifiers, numbers, rebuilt
+from cmg_mj.export.tree import form, numbers, rebuilt
+from cmg_mj.export.words import identifiers
 from cmg_mj.gimbal_angle import GimbalAngle
 from cmg_mj.law import Law
 from cmg_mj.observers.protocol import Measurement, Observer

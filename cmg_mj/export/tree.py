@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,14 +15,6 @@ from cmg_mj.export.place import Refused
 NUMBERS = (Symbolic, bool, int, float, np.bool_, np.integer, np.floating)
 STAY = (type(None), str, type)
 """What a state may hold besides numbers, if it stays the same."""
-
-KEYWORDS = frozenset(
-    """
-    auto break case char const continue default do double else enum extern float for goto if inline int long register
-    restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
-    """.split()  # noqa: SIM905
-)
-"""Words that name nothing in C."""
 
 
 class Leaf(NamedTuple):
@@ -97,15 +88,3 @@ def _parts(tree: Any) -> list[tuple[str, Any]] | None:
     if dataclasses.is_dataclass(tree) and not isinstance(tree, type):
         return [(field.name, getattr(tree, field.name)) for field in dataclasses.fields(tree)]
     return None
-
-
-def identifiers(paths: Sequence[tuple[str, ...]], taken: Collection[str] = ()) -> list[str]:
-    """Names in C, one a path, each once and none that is taken."""
-    names: list[str] = []
-    for path in paths:
-        name = re.sub(r"[^A-Za-z0-9_]", "_", "_".join(part for part in path if part)) or "value"
-        name = name if name[0].isalpha() else f"s{name}"
-        while name in KEYWORDS or name in names or name in taken:
-            name += "_"
-        names.append(name)
-    return names

@@ -14,7 +14,7 @@ from cmg_mj.export import check
 from cmg_mj.export.c_code import Precision, operations
 from cmg_mj.export.constants import constants_of
 from cmg_mj.export.example import example, vector
-from cmg_mj.export.names import files_of
+from cmg_mj.export.names import files_of, name_of
 from cmg_mj.export.texts import Texts
 from cmg_mj.export.trace import trace
 from cmg_mj.rehearsal import rehearse
@@ -33,12 +33,13 @@ class Code(NamedTuple):
     figures: dict[str, Any]
 
 
-def code(controller: Controller, precision: Precision) -> Code:
+def code(controller: Controller, precision: Precision, name: str | None = None) -> Code:
     """Make a controller's C, and compare it with Python.
 
     Args:
         controller: The controller.
         precision: Of every number in C.
+        name: What it is to be called in C.
 
     Returns:
         The code.
@@ -48,12 +49,12 @@ def code(controller: Controller, precision: Precision) -> Code:
     """
     cls = type(controller.observer)
     try:
-        return _code(controller, precision)
+        return _code(controller, precision, name_of(controller.observer, name))
     except InputError as error:
         raise InputError(f"{cls.__module__}:{cls.__qualname__} cannot be exported: {error}") from error
 
 
-def _code(controller: Controller, precision: Precision) -> Code:
+def _code(controller: Controller, precision: Precision, name: str) -> Code:
     if controller.feedback != "observer":
         raise InputError(
             f"controller.feedback = {controller.feedback!r}: what is exported has the observer's rate alone; set "
@@ -68,18 +69,18 @@ def _code(controller: Controller, precision: Precision) -> Code:
     traced = trace(traced_one, constants)
     off = check.check_trace(controller, traced, constants, seeds=(1, 2, 3))
 
-    texts = Texts(controller, traced, constants, precision)
+    texts = Texts(controller, traced, constants, precision, name)
     samples = check.signals(controller, 0, precision)
     expected = check.in_python(controller, samples)
     allowed = check.allowed(controller, samples, expected, precision)
     beside = (
-        example(texts.name, check.columns(controller)),
-        vector(texts.name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
+        example(name, check.columns(controller)),
+        vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
     )
-    files = dict(zip(files_of(texts.name), (texts.header(), texts.source(), *beside), strict=True))
+    files = dict(zip(files_of(name), (texts.header(), texts.source(), *beside), strict=True))
     compile_with = check.compiler()
     figures = {
-        "observer": texts.name,
+        "observer": name,
         "precision": precision,
         "files": list(files),
         "numbers_in_state": len(traced.state),
@@ -93,7 +94,7 @@ def _code(controller: Controller, precision: Precision) -> Code:
         with tempfile.TemporaryDirectory() as folder:
             for file, text in files.items():
                 write_text(Path(folder, file), text)
-            off_by = figures["c_off_by"] = check.check_c(Path(folder), texts.name, compile_with)
+            off_by = figures["c_off_by"] = check.check_c(Path(folder), name, compile_with)
         bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
     return Code(files, figures)

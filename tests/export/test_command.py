@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -65,6 +66,35 @@ def test_a_users_own_observer(tmp_path: Path) -> None:
     assert "http_observer2_d.h" in written("board")
 
 
+@needs_compiler
+@pytest.mark.parametrize(
+    ("cls", "arguments", "name"),
+    [("Größe", [], "grosse"), ("Double", [], "double_observer"), ("观测器", ["--name", "watcher"], "watcher")],
+)
+def test_a_class_with_any_name(cls: str, arguments: list[str], name: str) -> None:
+    """Compiled by the command, and by a user whose compiler looks for headers in the folder."""
+    Path(f"called_{name}.py").write_text(
+        f"class {cls}:\n"
+        "    def __init__(self, dt, model): self.dt = dt\n"
+        "    def init(self, y): return {'abs': y.y1, 'ω': 0.0, '速度': 0.0, 'this': 0.0, 'NAN': 0.0}\n"
+        "    def step(self, state, y, u):\n"
+        "        rate = (y.y1 - state['abs'])/self.dt + 0*(state['速度'] + state['this'] + state['NAN'] + state['ω'])\n"
+        "        return {'abs': y.y1, 'ω': rate, '速度': rate, 'this': u, 'NAN': u}, (y.y1, rate, y.y2)\n",
+        encoding="utf-8",
+    )
+    assert cmg_mj("export", f"called_{name}:{cls}", *arguments, "--out", "board").status == 0
+    assert f"{name}.h" in written("board")
+    code = Path(f"board/{name}.h").read_text() + Path(f"board/{name}.c").read_text()
+    assert f"void {name}_update(" in code
+    assert all(f" {member};" in code for member in ("abs_", "omega", "value", "this_", "NAN_"))
+    assert re.sub(r"/\*.*?\*/", "", code, flags=re.DOTALL).isascii()
+    compile_c("-Iboard", f"board/{name}.c", f"board/{name}_example.c", "-lm", "-o", "example")
+    if arguments:
+        complaint = cmg_mj("export", f"called_{name}:{cls}", "--out", "other").complaint
+        assert complaint.endswith("give one with --name")
+        assert not Path("other").exists()
+
+
 def test_a_rig_with_one_gimbal() -> None:
     assert cmg_mj("export", "linear", "--scenario", "single_gimbal", "--out", "board").status == 0
     assert "#define LINEAR_ENCODERS 1" in Path("board/linear.h").read_text()
@@ -89,6 +119,11 @@ def test_files_of_the_users_stay_and_an_earlier_export_is_replaced() -> None:
         (["nowhere:Class"], "cannot be imported: ModuleNotFoundError"),
         (["linear", "--out", ""], "--out '': name a folder"),
         (["linear", "--out", "file"], "--out file: cannot be written"),
+        (
+            ["linear", "--name", "double"],
+            "--name double: is a word of C or of its library; take another, such as double_",
+        ),
+        (["linear", "--name", "a-b"], "--name 'a-b': must be a name in C"),
         (["linear", "--precision", "half"], "'half' is not one of 'double', 'single'"),
         (["linear", "--scenario", "pish"], "scenario 'pish': no such file"),
         (["linear", "--set", "observer.tau=0"], "observer.tau = 0: must be a number greater than 0"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.export.tree import form, identifiers, numbers, rebuilt
+from cmg_mj.export.tree import form, numbers, rebuilt
 from cmg_mj.observers import Measurement
 from tests.export import own
 from tests.export.compiled import controller
@@ -20,6 +20,8 @@ import casadi  # isort: skip  (skipped above where it is missing)
 
 from cmg_mj.export.symbol import Symbol  # isort: skip
 from cmg_mj.export.trace import _as_written  # isort: skip
+from cmg_mj.export.names import name_of  # isort: skip
+from cmg_mj.export.words import identifiers  # isort: skip
 from cmg_mj.export.work import code  # isort: skip
 
 
@@ -75,9 +77,49 @@ def test_a_state_is_taken_apart_and_put_together() -> None:
 
 
 def test_names_in_c() -> None:
-    paths = [("x", "1"), ("x_1",), ("double",), ("0",), ("π", "a"), (), ("__x",), ("x", "1")]
+    paths = [("x", "1"), ("x_1",), ("double",), ("0",), ("π", "a"), (), ("__x",), ("x", "1"), ("速度",), ("this",)]
     names = identifiers(paths, taken=("value",))
-    assert names == ["x_1", "x_1_", "double_", "s0", "s__a", "value_", "s__x", "x_1__"]
+    assert names == ["x_1", "x_1_2", "double_", "s0", "pi_a", "value_", "s__x", "x_1_3", "value__2", "this_"]
+
+
+@pytest.mark.parametrize(
+    ("name", "in_c"),
+    [
+        ("WithBias", "with_bias"),
+        ("HTTPObserver2D", "http_observer2_d"),
+        ("Größe", "grosse"),
+        ("ÜberÄnderung", "uber_anderung"),
+        ("Łódź", "lodz"),
+        ("ØreÆgir", "ore_aegir"),
+        ("Ωmega", "omegamega"),
+        ("ΔΩ", "delta_omega"),
+        ("ﬁlter", "filter"),
+        ("__Own__", "own"),
+        ("Double", "double_observer"),
+        ("Int", "int_observer"),
+        ("main", "main_observer"),
+        ("ABS", "abs_observer"),
+        ("Math", "math_observer"),
+        ("Complex", "complex_observer"),
+        ("Class", "class_observer"),
+    ],
+)
+def test_a_class_is_called_by_its_name(name: str, in_c: str) -> None:
+    assert name_of(type(name, (own.Plain,), {})(0.005, None)) == in_c
+
+
+@pytest.mark.parametrize("name", ["观测器", "Наблюдатель", "_", "X位置", "A" * 41, "_1"])
+def test_a_name_that_c_cannot_spell_is_asked_for(name: str) -> None:
+    observer = type(name, (own.Plain,), {})(0.005, None)
+    with pytest.raises(InputError, match=r"^the class's name .* give one with --name$"):
+        name_of(observer)
+    assert name_of(observer, "mine_2") == "mine_2"
+
+
+@pytest.mark.parametrize("asked", ["", "2x", "a b", "größe", "../x", "x" * 41, "_x", "double", "main", "Math", "x\n"])
+def test_a_name_asked_for_is_one_of_c(asked: str) -> None:
+    with pytest.raises(InputError, match=r"^--name "):
+        name_of(own.Plain(0.005, None), asked)
 
 
 def test_a_symbol_has_no_value() -> None:
