@@ -85,6 +85,8 @@ NAMED_TWICE = {casadi.OP_FMAX, casadi.OP_FMIN, casadi.OP_SIGN, casadi.OP_SQ, cas
 
 TRUTHS = {casadi.OP_LT, casadi.OP_LE, casadi.OP_EQ, casadi.OP_NE, casadi.OP_AND, casadi.OP_OR, casadi.OP_NOT}
 """Operations that are an int in C."""
+ASKED = {casadi.OP_AND: 2, casadi.OP_OR: 2, casadi.OP_NOT: 1, casadi.OP_IF_ELSE_ZERO: 1, SELECT: 1}
+"""Operations that take truths: how many of their arguments, from the first on."""
 
 
 class Node(NamedTuple):
@@ -123,10 +125,9 @@ def literal(value: float, precision: Precision) -> str:
     A number that is not zero stays one: what stands for "nearly zero" in double precision and would underflow becomes
     the smallest normal number, and what would overflow the largest.
     """
-    if math.isnan(value):
-        return "NAN"
-    if math.isinf(value):
-        return "INFINITY" if value > 0.0 else "-INFINITY"
+    if not math.isfinite(value):  # C's own are floats
+        name = "NAN" if math.isnan(value) else "INFINITY"
+        return f"{'-' if value < 0.0 else ''}{name if precision == 'single' else f'(double){name}'}"
     if precision == "double":
         return repr(float(value))
     kinds = np.finfo(np.float32)
@@ -157,7 +158,11 @@ def body(
     for i, node in enumerate(nodes):
         if not uses[i]:
             continue
-        text = _text(node, [texts[j] for j in node.arguments] if _is_operation(node) else [], inputs, precision)
+        given: list[Text] = []
+        if _is_operation(node):
+            asked = ASKED.get(node.operation, 0)
+            given = [texts[j] if k < asked else _number(nodes[j], texts[j], real) for k, j in enumerate(node.arguments)]
+        text = _text(node, given, inputs, precision)
         named = _is_operation(node) and (
             len(uses[i]) > 1 or any(user in NAMED_TWICE for user in uses[i]) or len(text.text) > WIDEST
         )
@@ -167,7 +172,7 @@ def body(
             text = Text(name)
         texts[i] = text
     reads = re.compile("|".join(re.escape(name) for name in inputs) or r"(?!)")
-    last = [texts[i].text for i in results]
+    last = [_number(nodes[i], texts[i], real).text for i in results]
     for i, text in enumerate(last):
         if reads.search(text) and len(last) > 1:  # nothing is written before all is read
             last[i] = f"n{i}"
@@ -231,6 +236,11 @@ def _uses(nodes: list[Node], results: list[int]) -> list[list[int]]:
     return uses
 
 
+def _number(node: Node, text: Text, real: str) -> Text:
+    """What may be a truth, as a number."""
+    return Text(f"({real}){text.inside(ATOM)}", UNARY) if node.operation in TRUTHS else text
+
+
 def _text(node: Node, given: list[Text], inputs: Sequence[str], precision: Precision) -> Text:
     """One operation on what is there."""
     operation, suffix = node.operation, "" if precision == "double" else "f"
@@ -238,7 +248,7 @@ def _text(node: Node, given: list[Text], inputs: Sequence[str], precision: Preci
         return Text(inputs[node.arguments[0]])
     if operation == casadi.OP_CONST:
         number = literal(node.value, precision)
-        return Text(number, UNARY if number.startswith("-") else ATOM)
+        return Text(number, UNARY if number.startswith(("-", "(")) else ATOM)
     if operation in INFIX:
         sign, binds = INFIX[operation]
         left, right = given

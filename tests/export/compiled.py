@@ -22,13 +22,20 @@ pytest.importorskip("casadi", reason="casadi is not installed: the extra [export
 COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")
 
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-ffp-contract=off")
+WARNINGS = ("-Wall", "-Wextra", "-pedantic", "-Wdouble-promotion", "-Wconversion", "-Wsign-conversion", "-Wshadow")
+STRICT = ("-std=c99", *WARNINGS, "-Werror", "-O2", "-ffp-contract=off")
 TYPES = {"double": np.float64, "single": np.float32}
 
 
 def compile_c(*arguments: object) -> None:
     assert COMPILER is not None
     subprocess.run([COMPILER, *STRICT, *map(str, arguments)], check=True, timeout=300)
+
+
+def read_by_every_compiler(*sources: Path) -> None:
+    """Without a warning; nothing is compiled."""
+    for compiler in filter(None, map(shutil.which, ("gcc", "clang"))):
+        subprocess.run([compiler, *STRICT, "-fsyntax-only", *map(str, sources)], check=True, timeout=300)
 
 
 def controller(kind: str, *settings: str) -> Controller:
@@ -45,10 +52,10 @@ class Compiled:
         self.name = files[0].stem
         self.width = 3 + len(of.extra_signals[0])
         self.header, self.source, self.example, _ = files
-        promotion = ["-Wdouble-promotion"] if precision == "single" else []
+        read_by_every_compiler(self.source, self.example)
         self.library = folder / "export.so"
-        compile_c(*promotion, "-shared", "-fPIC", self.source, "-o", self.library, "-lm")
-        compile_c(*promotion, self.source, self.example, "-o", folder / "example", "-lm")
+        compile_c("-shared", "-fPIC", self.source, "-o", self.library, "-lm")
+        compile_c(self.source, self.example, "-o", folder / "example", "-lm")
         self.said = subprocess.run([folder / "example"], capture_output=True, text=True, check=False).stdout
         self._loaded = ctypes.CDLL(str(self.library))
 
