@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from cmg_mj.errors import InputError, RunStopped
     from cmg_mj.experiment import Experiment, prepare
     from cmg_mj.law import Law, lqr_gains
-    from cmg_mj.log_replay import Replayed, replay_log
     from cmg_mj.logs import Log, read_log
     from cmg_mj.observers import OBSERVERS, Estimate, Measurement, Observer, make_observer
     from cmg_mj.plant import Plant, load_plant
     from cmg_mj.plant_settings import PlantSettings
     from cmg_mj.push import Push
     from cmg_mj.reduced import ReducedModel
+    from cmg_mj.replay.replayed import Replayed, replay_log
     from cmg_mj.scenario import load_scenario, parse_scenario
     from cmg_mj.schema import Scenario
     from cmg_mj.sensors import Accelerometer, Encoder, Fog, Sensors
@@ -38,9 +38,9 @@ _HOMES = {
     "plant_settings": ("PlantSettings",),
     "push": ("Push",),
     "reduced": ("ReducedModel",),
+    "replay.replayed": ("Replayed", "replay_log"),
     "experiment": ("Experiment", "prepare"),
     "law": ("Law", "lqr_gains"),
-    "log_replay": ("Replayed", "replay_log"),
     "logs": ("Log", "read_log"),
     "scenario": ("load_scenario", "parse_scenario"),
     "schema": ("Scenario",),

@@ -25,6 +25,8 @@ ABOVE, BELOW = (
 """The rooms from top to bottom, as docs/architecture.md lists them."""
 ORDER = [*ABOVE, *BELOW]
 
+REAL_LOG = PACKAGE.parent / "examples" / "data" / "stepper_encoder_gyro.csv"
+
 HEAVY = {"rerun": "recording", "matplotlib": "plots", "casadi": "export"}
 """Imported by one room each, because it costs time."""
 
@@ -106,6 +108,17 @@ def test_a_bundled_scenario_is_checked_without_mujoco() -> None:
     code += "from cmg_mj.cli import main; main(['check', 'push_recovery']); print('mujoco' in sys.modules)"
     first, *_, last = in_a_fresh_interpreter(code)
     assert (first, last) == ("False", "False")
+
+
+def test_a_log_is_replayed_without_mujoco() -> None:
+    code = f"""
+import sys
+from cmg_mj import read_log, replay_log
+log = read_log({str(REAL_LOG)!r}, {{"time": "time_s", "tilt": "encoder_rad"}}, between_s=(0.0, 2.0))
+replay_log(log, ["linear"], skip_s=0.5)
+print("mujoco" in sys.modules)
+"""
+    assert in_a_fresh_interpreter(code) == ["False"]
 
 
 def test_every_observer_works_without_mujoco() -> None:

@@ -204,19 +204,19 @@ def replay(
     measured one) and the roughness. Without --model only those observers take part that need none. The recording of a
     run, whose columns are known, replays to the figures of the run. docs/replay.md has the details.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj import log_files, log_report, log_runs
+    from cmg_mj.replay import files, report, told
 
     names = names_of(observers)
     spans = [span(text, "--window") for text in windows]
-    noises, parameters = log_runs.noise_numbers(noise), log_runs.parameters_of(settings)
+    noises, parameters = told.noise_numbers(noise), told.parameters_of(settings)
     for kind in parameters:
         if kind not in names:
             raise InputError(f"--set {kind}: is not among --observers {','.join(names)}")
-    pendulum = None if model is None else log_runs.model_of(model)
+    pendulum = None if model is None else told.model_of(model)
     given = Reading(reading.columns, {**reading.options, **({"windows_s": tuple(spans)} if spans else {})})
     each_once(logs)
     read = [given.read(path) for path in logs]
-    distinct = log_files.distinct([log.name for log in read])
+    distinct = files.distinct([log.name for log in read])
     asked = {
         "observers": names,
         **({"model": model} if model else {}),
@@ -224,22 +224,22 @@ def replay(
         **({"noise": noises} if noises else {}),
         **({"skip_s": skip} if skip is not None else {}),
     }
-    toml = log_files.settings_of(logs, asked, given.given)
-    files = log_files.files_of_replay(distinct)
+    toml = files.settings_of(logs, asked, given.given)
+    written = files.files_of_replay(distinct)
     if out is not None:
-        folder = claim(named(out), files)
+        folder = claim(named(out), written)
     else:
         from cmg_mj.run_folder import unused_folder
 
         more = f"-and-{len(read) - 1}-more" if len(read) > 1 else ""
         name = f"replay-{distinct[0]}{more}"
-        folder = released_at_the_end(unused_folder(Path("runs"), name, files, toml, log_files.SETTINGS))
+        folder = released_at_the_end(unused_folder(Path("runs"), name, written, toml, files.SETTINGS))
     replays = []
     with CtrlC() as ctrl_c:
         try:
             with progress("Replay", float(len(read)), ctrl_c) as on_progress:
                 for i, log in enumerate(read):
-                    done = log_runs.replay_ready(
+                    done = told.replay_ready(
                         log,
                         names,
                         model=pendulum,
@@ -255,10 +255,10 @@ def replay(
                 sys.exit(INTERRUPTED)
         complete = len(replays) == len(read)
         try:
-            place = log_files.save_replay(folder, replays, distinct[: len(replays)], toml, complete=complete)
+            place = files.save_replay(folder, replays, distinct[: len(replays)], toml, complete=complete)
         finally:
-            figures = log_files.finite_throughout(log_report.figures_of(replays))
-            table = log_report.replay_markdown(replays) if markdown else log_report.replay_tables(replays)
+            figures = files.finite_throughout(report.figures_of(replays))
+            table = report.replay_markdown(replays) if markdown else report.replay_tables(replays)
             show(figures, table, as_json)
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", as_json)
     if ctrl_c.noted or not complete:

@@ -17,13 +17,13 @@ from rich.table import Table
 from rich.text import Text
 
 from cmg_mj.errors import InputError
-from cmg_mj.log_replay import NO_MODEL, replay_log
-from cmg_mj.log_runs import Told, told
 from cmg_mj.logs import Log
 from cmg_mj.logs.log import REFERENCE
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.replay import replay
+from cmg_mj.replay.replayed import NO_MODEL, replay_log
+from cmg_mj.replay.told import Told, told
 from cmg_mj.run_folder import RunFolder, claimed, write_text
 from cmg_mj.tilt import TiltNoise
 from cmg_mj.tuning.parameters import Number, narrowed, numbers_of, parameters_of

@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.log_replay import replay_log
 from cmg_mj.logs import read_log
+from cmg_mj.replay.replayed import replay_log
 from tests.bad_input.test_fuzz import GROUP, TEXTS, broken, no_hang
 from tests.logs.motion import sine, tilt, write_csv
 

@@ -12,12 +12,12 @@ from rich.table import Table
 from rich.text import Text
 
 from cmg_mj import markdown
-from cmg_mj.alignment import Alignment
 from cmg_mj.intervals import known_interval
 from cmg_mj.legible import best
-from cmg_mj.log_replay import Replayed, described
-from cmg_mj.log_scores import RECONSTRUCTED_S
 from cmg_mj.references import ZERO
+from cmg_mj.replay.alignment import Alignment
+from cmg_mj.replay.replayed import Replayed, described
+from cmg_mj.replay.scores import RECONSTRUCTED_S
 from cmg_mj.summary_keys import Key
 
 FIGURES = {

@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.accelerometer import STANDARD_GRAVITY, Accelerometer
-from cmg_mj.alignment import Alignment, alignment
 from cmg_mj.errors import InputError, raised
-from cmg_mj.log_scores import noise_gain, scores
 from cmg_mj.logs import Log
 from cmg_mj.logs.log import REFERENCE
 from cmg_mj.observers import OBSERVERS, Observer, make_observer, observer_class
@@ -21,7 +19,9 @@ from cmg_mj.observers.protocol import needs
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.references import ZERO
 from cmg_mj.rehearsal import rehearse
-from cmg_mj.replay import replay_all
+from cmg_mj.replay.alignment import Alignment, alignment
+from cmg_mj.replay.open_loop import replay_all
+from cmg_mj.replay.scores import noise_gain, scores
 from cmg_mj.sensors import Encoder
 from cmg_mj.tilt import TiltNoise
 

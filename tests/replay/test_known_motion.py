@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.alignment import alignment, lag
-from cmg_mj.log_replay import Replayed, replay_log
 from cmg_mj.logs import read_log
 from cmg_mj.observers import make_observer
 from cmg_mj.replay import replay
+from cmg_mj.replay.alignment import alignment, lag
+from cmg_mj.replay.replayed import Replayed, replay_log
 from cmg_mj.trajectory import Trajectory
 from tests.logs.motion import AMPLITUDE, COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
 from tests.observers.reference import PAPER

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
-from cmg_mj.log_replay import NO_MODEL, noise_of, replay_log
-from cmg_mj.log_runs import model_of, noise_numbers, parameters_of, replay_ready
 from cmg_mj.logs import Log, read_log
 from cmg_mj.observers import OBSERVERS, Measurement, make_observer, observer_class
 from cmg_mj.observers.protocol import needs
+from cmg_mj.replay.replayed import NO_MODEL, noise_of, replay_log
+from cmg_mj.replay.told import model_of, noise_numbers, parameters_of, replay_ready
 from cmg_mj.runs import save_run, summary_of
 from cmg_mj.tilt import RadialTilt, TiltNoise
 from cmg_mj.trajectory import Trajectory
@@ -130,11 +130,11 @@ def test_parts_are_replayed_each_from_its_start(tmp_path: Path) -> None:
 
 def test_one_that_is_lost_is_said_and_the_others_go_on(tmp_path: Path) -> None:
     replayed = replay_log(
-        log(tmp_path), ["linear", "tests.logs.test_replayed:Loses", "tests.logs.test_replayed:Raises"]
+        log(tmp_path), ["linear", "tests.replay.test_replayed:Loses", "tests.replay.test_replayed:Raises"]
     )
     assert set(replayed.estimates) == {"linear"}
-    assert "x2_rad_s is not finite from 0.05 s on" in replayed.left_out["tests.logs.test_replayed:Loses"]
-    assert "raised ZeroDivisionError" in replayed.left_out["tests.logs.test_replayed:Raises"]
+    assert "x2_rad_s is not finite from 0.05 s on" in replayed.left_out["tests.replay.test_replayed:Loses"]
+    assert "raised ZeroDivisionError" in replayed.left_out["tests.replay.test_replayed:Raises"]
 
 
 class Loses:

@@ -10,10 +10,10 @@ import numpy as np
 
 from cmg_mj.colours import colours, hexadecimal
 from cmg_mj.legible import shortened
-from cmg_mj.log_replay import Replayed, described
-from cmg_mj.log_report import shown_first, written
 from cmg_mj.logs.log import REFERENCE
 from cmg_mj.plots import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_COLUMNS, SMALL_HEIGHT, fit, pyplot
+from cmg_mj.replay.replayed import Replayed, described
+from cmg_mj.replay.report import shown_first, written
 from cmg_mj.trajectory import whole_file
 
 CLOSE_S = 2.0

@@ -11,10 +11,10 @@ from cmg_mj.design import design
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.experiment import load_rig
 from cmg_mj.known_rigs import RigFacts, known_rig
-from cmg_mj.log_replay import SKIPPED_S, OnShare, Replayed, noise_of, replay_log
 from cmg_mj.logs import Log
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.reduced import ReducedModel
+from cmg_mj.replay.replayed import SKIPPED_S, OnShare, Replayed, noise_of, replay_log
 from cmg_mj.scenario import parse_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.tilt import TiltNoise

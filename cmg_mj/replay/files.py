@@ -11,9 +11,9 @@ import numpy as np
 import tomli_w
 
 from cmg_mj.differences import safe_name
-from cmg_mj.log_plot import plot_replay
-from cmg_mj.log_replay import Replayed
-from cmg_mj.log_report import figures_of
+from cmg_mj.replay.plot import plot_replay
+from cmg_mj.replay.replayed import Replayed
+from cmg_mj.replay.report import figures_of
 from cmg_mj.run_folder import RunFolder, claimed, write_text
 from cmg_mj.summary_keys import finite
 from cmg_mj.trajectory import ESTIMATES, Layout, Trajectory
@@ -105,6 +105,6 @@ def finite_throughout(value: Any) -> Any:
 
 
 def _record(path: Path, replays: Sequence[Replayed], names: Sequence[str], settings_toml: str) -> None:
-    from cmg_mj.recording.logs import write_replay  # 0.4 s of import, needed only here
+    from cmg_mj.replay.recording import write_replay  # 0.4 s of import, needed only here
 
     write_replay(path, replays, names, settings_toml)

@@ -1,0 +1,72 @@
+"""Replays as a rerun recording: what was measured, what the observers say, how far off they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from cmg_mj.colours import YARDSTICKS, colours
+from cmg_mj.legible import shortened
+from cmg_mj.logs.log import REFERENCE
+from cmg_mj.observers.protocol import BIAS
+from cmg_mj.recording.logs import LogSeries, write_logs
+from cmg_mj.recording.signals import CONTROLLER, CUBES, Series, numbered
+from cmg_mj.replay.replayed import Replayed
+from cmg_mj.replay.report import replay_markdown, shown_first
+
+
+def write_replay(path: Path, replays: Sequence[Replayed], names: Sequence[str], settings_toml: str) -> None:
+    """Write the replays of some logs as one recording; whole or not at all.
+
+    Args:
+        path: The file, `recording.rrd`.
+        replays: The replays; each has a branch of its own.
+        names: Their names, no two alike.
+        settings_toml: What was asked for.
+
+    Raises:
+        InputError: The environment turns rerun off.
+        OSError: The file cannot be written.
+    """
+    title = f"Replay: {', '.join(names)}"
+    logs = [
+        LogSeries(name, series(replayed), list(replayed.estimates), shown_first(replayed))
+        for name, replayed in zip(names, replays, strict=True)
+    ]
+    texts = {
+        "Summary": f"# {title}\n\n{replay_markdown(replays)}\n",
+        "Settings": f"# Settings\n\n```toml\n{settings_toml.strip()}\n```\n",
+    }
+    write_logs(path, title, logs, texts)
+
+
+def series(replayed: Replayed) -> list[Series]:
+    """All time series of one log: angles in degrees, rates in rad/s."""
+    log = replayed.log
+
+    def row(path: str, name: str, values: np.ndarray, color: tuple, width: float = 1.5, **more: object) -> Series:
+        return Series(path, name, *log.broken(values), color, width, **more)  # type: ignore[arg-type]
+
+    rows = [row("tilt/measured", "measured", np.degrees(log["y1_rad"]), YARDSTICKS["gyro"])]
+    if "reference" in log.has:
+        rows.append(row("rate/true", "reference", log[REFERENCE], YARDSTICKS["true"], 3.0))
+    labels, names = shortened(list(replayed.estimates)), list(replayed.estimates)
+    for part, (name, color) in zip(numbered(names), colours(names).items(), strict=True):
+        estimates = replayed.estimates[name]
+        rate = estimates["x2_rad_s"]
+        said = {"rate_estimate": rate}
+        if "reference" in log.has:
+            said["rate_error"] = rate - log[REFERENCE]
+        if BIAS in estimates:
+            said["bias"] = np.degrees(estimates[BIAS])
+        for folder, values in said.items():
+            rows.append(row(f"{folder}/{part}", labels[name], values, color, whole=False, observer=name))
+    if "acceleration" in log.has:
+        measured = log["acceleration_rad_s2"]
+        rows.append(row("acceleration/measured", "measured", measured, YARDSTICKS["gyro"], 1.0, whole=False))
+    if "gimbals" in log.has:
+        rows.append(row("command/u", "command", log["u_rad_s"], CONTROLLER))
+        rows.append(row("gimbal/y2", "measured", np.degrees(log["y2_rad"]), CUBES[0]))
+    return rows
