@@ -9,16 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from cmg_mj.errors import InputError
+from cmg_mj.logs.resampling import FEWEST, bridge, resample
+from cmg_mj.logs.stamps import A_GAP, EVEN, is_even, resolution_of, rounded
 from cmg_mj.logs.table import MOST_ROWS
 
-EVEN = 0.02
-"""Stamps this much of a period off an even grid count as on it."""
-A_GAP = 1.5
-"""More than so many periods between two rows is a gap."""
 BRIDGED = 5
 """By default, so many missing rows in a gap are bridged."""
-FEWEST = 20
-"""A part with fewer rows is left out."""
 FEW_REPEATED = 0.05
 """More rows than this share with the stamp of the row before are a mistake, fewer are left out."""
 SAME_TIME = 1e-6
@@ -144,13 +140,13 @@ class Sampler:
                 f"{self.where}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz; a log has "
                 f"{SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz: is the time's unit right? (--units time=ms)"
             )
-        period = _round(period)
+        period = rounded(period)
         longest = BRIDGED * period if self.max_gap_s is None else self.max_gap_s
         ends = np.flatnonzero(steps > max(A_GAP * period, longest + period))
         bounds = [0, *(ends + 1), len(time)]
         stretches = [slice(a, b) for a, b in pairwise(bounds)]
-        resolution = _resolution(time)
-        even = all(_is_even(time[s], period, resolution) for s in stretches)
+        resolution = resolution_of(time)
+        even = all(is_even(time[s], period, resolution) for s in stretches)
         dt = period if self.rate_hz is None else 1.0 / self.rate_hz
         resampled = not even or abs(dt - period) > 1e-6 * dt
         self._say_how(time, steps[steps <= A_GAP * period], period, dt, even, resampled, resolution)
@@ -219,92 +215,12 @@ class Sampler:
             time, places = time[kept], places[kept]
             values = {name: column[kept] for name, column in values.items()}
             own, grid = places * dt, dt * np.arange(places[-1] + 1)
-            filled = {name: _bridge(grid, own, column, name in held) for name, column in values.items()}
+            filled = {name: bridge(grid, own, column, name in held) for name, column in values.items()}
             return Part(time[0] + grid, filled, time, time[0] + own)
         grid = dt * np.arange(int((time[-1] - time[0]) / dt + 1e-6) + 1)
         own = time - time[0]
         sampled = {name: resample(grid, own, column, A_GAP * period, name in held) for name, column in values.items()}
         return Part(time[0] + grid, sampled, time, time)
-
-
-def resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float, held: bool = False) -> np.ndarray:
-    """Values at other times: by a cubic spline, in gaps by straight lines; held ones by the last before.
-
-    Args:
-        grid: Wanted times, (n,), within those there are [s].
-        time: Times there are, growing, (m,) [s].
-        values: (m,).
-        gap: More between two of them is a gap [s].
-        held: Whether a value counts until the next.
-
-    Returns:
-        (n,).
-    """
-    from scipy.interpolate import CubicSpline
-
-    if held:
-        return values[np.clip(np.searchsorted(time, grid + 1e-9, side="right") - 1, 0, len(values) - 1)]
-    after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
-    in_gap = time[after] - time[after - 1] > gap
-    spline = CubicSpline(time, values)(grid)
-    return np.where(in_gap, np.interp(grid, time, values), spline)
-
-
-def sampled_where_known(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """A reference at the samples' times; NaN before, after and in its gaps.
-
-    Args:
-        grid: The samples' times, (n,) [s].
-        time: Its own times, growing, (m,) [s].
-        values: (m,), NaN where it is missing.
-
-    Returns:
-        (n,).
-    """
-    known = np.isfinite(values)
-    time, values = time[known], values[known]
-    if len(time) < FEWEST:
-        return np.full(len(grid), np.nan)
-    gap = A_GAP * float(np.median(np.diff(time)))
-    slack = 1e-6 * gap
-    inside = (grid >= time[0] - slack) & (grid <= time[-1] + slack)
-    after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
-    near = np.minimum(np.abs(grid - time[after - 1]), np.abs(time[after] - grid)) <= slack
-    sampled = resample(np.clip(grid, time[0], time[-1]), time, values, gap)
-    return np.where(inside & ((time[after] - time[after - 1] <= gap) | near), sampled, np.nan)
-
-
-def _bridge(grid: np.ndarray, time: np.ndarray, values: np.ndarray, held: bool) -> np.ndarray:
-    return resample(grid, time, values, 0.0, held) if held else np.interp(grid, time, values)
-
-
-def _round(period: float) -> float:
-    """The period of a rate that is a round number, if this is one to the stamps' accuracy."""
-    rate = float(f"{1.0 / period:.6g}")
-    return 1.0 / rate if abs(period * rate - 1.0) < 1e-9 else period
-
-
-def _resolution(time: np.ndarray) -> float:
-    """The largest of 1, 0.1, 0.01 ... s that all stamps are multiples of, from the first [s]; 0 if none is."""
-    for power in range(0, 8):
-        counts = (time - time[0]) * 10.0**power
-        if np.abs(counts - np.rint(counts)).max() < 1e-3:
-            return 10.0**-power
-    return 0.0
-
-
-def _is_even(time: np.ndarray, period: float, resolution: float) -> bool:
-    """Whether the rows are on an even grid, as far as stamps of this resolution tell."""
-    if len(time) < 3:
-        return True
-    places = np.rint((time - time[0]) / period)
-    slack = max(EVEN * period, 0.75 * resolution if resolution < period else 0.0)
-    if np.ptp(np.diff(time)) < EVEN * period:
-        return True
-    order = np.arange(len(time)) if np.diff(time).max() < A_GAP * period else places
-    fit = np.polynomial.polynomial.polyfit(order, time - time[0], 1)
-    off = time - time[0] - (fit[0] + fit[1] * order)
-    return bool(np.abs(off).max() <= slack and abs(fit[1] / period - 1.0) < 1e-3)
 
 
 def _missing(present: np.ndarray, time: np.ndarray, measured: Mapping[str, np.ndarray]) -> str:
