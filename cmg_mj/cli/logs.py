@@ -205,14 +205,17 @@ def replay(
     run, whose columns are known, replays to the figures of the run. docs/replay.md has the details.
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.replay import files, report, told
+    from cmg_mj.replay.noise import noise_numbers
+    from cmg_mj.replay.options import parameters_of
+    from cmg_mj.replay.pendulum import model_of
 
     names = names_of(observers)
     spans = [span(text, "--window") for text in windows]
-    noises, parameters = told.noise_numbers(noise), told.parameters_of(settings)
+    noises, parameters = noise_numbers(noise), parameters_of(settings)
     for kind in parameters:
         if kind not in names:
             raise InputError(f"--set {kind}: is not among --observers {','.join(names)}")
-    pendulum = None if model is None else told.model_of(model)
+    pendulum = None if model is None else model_of(model)
     given = Reading(reading.columns, {**reading.options, **({"windows_s": tuple(spans)} if spans else {})})
     each_once(logs)
     read = [given.read(path) for path in logs]

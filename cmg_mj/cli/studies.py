@@ -219,7 +219,9 @@ def _tune_on_logs(
     ranges: Mapping[str, tuple[float, float]],
 ) -> None:
     """Tune on a user's logs."""
-    from cmg_mj.replay.told import model_of, noise_numbers, parameters_of
+    from cmg_mj.replay.noise import noise_numbers
+    from cmg_mj.replay.options import parameters_of
+    from cmg_mj.replay.pendulum import model_of
     from cmg_mj.runs import file_name
     from cmg_mj.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
     from cmg_mj.tuning.logged import FILES

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.accelerometer import STANDARD_GRAVITY, Accelerometer
 from cmg_mj.errors import InputError, raised
 from cmg_mj.logs import Log
 from cmg_mj.logs.log import REFERENCE
@@ -20,19 +19,13 @@ from cmg_mj.reduced import ReducedModel
 from cmg_mj.references import ZERO
 from cmg_mj.rehearsal import rehearse
 from cmg_mj.replay.alignment import Alignment, alignment
+from cmg_mj.replay.noise import noise_of
 from cmg_mj.replay.open_loop import replay_all
 from cmg_mj.replay.scores import noise_gain, scores
-from cmg_mj.sensors import Encoder
 from cmg_mj.tilt import TiltNoise
 
 SKIPPED_S = 1.0
 """By default the observers have so long at the start of each part before they are judged [s]."""
-TILT_NOISE_DEG = 0.1
-"""What observers are told of the noise of a tilt of unknown make: standard deviation of one sample [deg]."""
-ACCELERATION_NOISE_RAD_S2 = 1.0
-"""The same of an angular acceleration that does not come from two accelerometers [rad/s^2]."""
-NOISE_DENSITY_UG_RTHZ = 400.0
-"""The same of two accelerometers, the bench's own [ug/sqrt(Hz)]."""
 NO_MODEL = ReducedModel(J1=math.nan, J2=math.nan, J_d=math.nan, omega_d=math.nan, gravity_torque=math.nan)
 """Given to observers that need none: whatever is made of it is no number."""
 IN_WORDS = {
@@ -69,33 +62,6 @@ class Replayed:
     skip_s: float
     noise: TiltNoise
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-
-
-def noise_of(
-    log: Log,
-    *,
-    accelerometer_ug_rthz: float | None = None,
-    tilt_deg: float | None = None,
-    acceleration_rad_s2: float | None = None,
-) -> TiltNoise:
-    """What observers are told of the sensors' noise.
-
-    Args:
-        log: With two accelerometers, both noises follow from theirs.
-        accelerometer_ug_rthz: Noise density of the accelerometers [ug/sqrt(Hz)].
-        tilt_deg: One sample's standard deviation of another tilt [deg].
-        acceleration_rad_s2: One sample's of another angular acceleration [rad/s^2].
-
-    Returns:
-        Both, and their correlation.
-    """
-    if log.tilt is not None:
-        density = NOISE_DENSITY_UG_RTHZ if accelerometer_ug_rthz is None else accelerometer_ug_rthz
-        sensor = Accelerometer(rate_hz=1.0 / log.dt, noise_density_ug_rthz=density)
-        return dataclasses.replace(log.tilt.noise(sensor.sigma, STANDARD_GRAVITY), gimbal=Encoder().deviation)
-    tilt = TILT_NOISE_DEG if tilt_deg is None else tilt_deg
-    acceleration = ACCELERATION_NOISE_RAD_S2 if acceleration_rad_s2 is None else acceleration_rad_s2
-    return TiltNoise(math.radians(tilt), acceleration, 0.0, Encoder().deviation)
 
 
 def replay_log(

@@ -128,7 +128,7 @@ def test_markdown_and_table_say_the_same() -> None:
         (("--columns", PLAIN, "--set", "linear.tau=-1"), "tau = -1: must be a number greater than 0"),
         (("--columns", PLAIN, "--skip", "nan"), "--skip nan"),
         (("--columns", PLAIN, "--noise", "accelerometer=3"), "the tilt is not that of two accelerometers"),
-        (("--columns", PLAIN, "--noise", "tilt=0.05,tilt=0.1"), "--noise: tilt is given twice"),
+        (("--columns", PLAIN, "--noise", "tilt=0.05,tilt=0.1"), "--noise tilt: given twice"),
         (("--columns", "time=t_s,tilt=tilt_rad", "--window", "2:4"), "--window: there is no reference"),
         (
             ("--columns", PLAIN, "--window", "30:40"),

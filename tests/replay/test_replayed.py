@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,11 @@ from cmg_mj import InputError, ReducedModel, load_scenario, prepare
 from cmg_mj.logs import Log, read_log
 from cmg_mj.observers import OBSERVERS, Measurement, make_observer, observer_class
 from cmg_mj.observers.protocol import needs
-from cmg_mj.replay.replayed import NO_MODEL, noise_of, replay_log
-from cmg_mj.replay.told import model_of, noise_numbers, parameters_of, replay_ready
+from cmg_mj.replay.noise import noise_numbers, noise_of
+from cmg_mj.replay.options import parameters_of
+from cmg_mj.replay.pendulum import model_of
+from cmg_mj.replay.replayed import NO_MODEL, replay_log
+from cmg_mj.replay.told import replay_ready, told
 from cmg_mj.runs import save_run, summary_of
 from cmg_mj.tilt import RadialTilt, TiltNoise
 from cmg_mj.trajectory import Trajectory
@@ -156,14 +160,28 @@ class Raises(Loses):
 
 
 def test_noise_of_two_accelerometers_follows_from_theirs(tmp_path: Path) -> None:
+    """White noise and resolution together, as in the bench: at 1 ug/rtHz the resolution is the larger."""
     one = log(tmp_path)
     assert noise_of(one).tilt == pytest.approx(np.radians(0.1))
-    from dataclasses import replace
-
     radial = RadialTilt(0.1, 0.3)
-    found = noise_of(replace(one, tilt=radial), accelerometer_ug_rthz=200.0)
-    sigma = 200e-6 * 9.80665 * np.sqrt(100.0)
-    assert dataclasses.replace(found, gimbal=0.0) == radial.noise(sigma, 9.80665)
+    for density in (1.0, 200.0):
+        found = noise_of(dataclasses.replace(one, tilt=radial), accelerometer_ug_rthz=density)
+        white, step = density * 1e-6 * 9.80665 * np.sqrt(100.0), 9.80665 / 16384.0
+        expected = radial.noise(math.hypot(white, step / math.sqrt(12.0)), 9.80665)
+        assert found.tilt == pytest.approx(expected.tilt, rel=1e-12)
+        assert found.acceleration == pytest.approx(expected.acceleration, rel=1e-12)
+        assert found.correlation == expected.correlation
+
+
+def test_the_noise_of_a_runs_accelerometers_can_be_told(run: Path) -> None:
+    """All else of its sensors stays: told what it had, it is the run's; of its resolution the rest."""
+    recorded, of_the_run = read_log(run), prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]
+    assert told(recorded, noises={"accelerometer": 300.0}).noise == of_the_run
+    more = told(recorded, noises={"accelerometer": 600.0}).noise
+    assert more.tilt == pytest.approx(2.0 * of_the_run.tilt, rel=1e-4)
+    assert more.gimbal == of_the_run.gimbal
+    with pytest.raises(InputError, match="give accelerometer"):
+        told(recorded, noises={"accelerometer": 300.0, "tilt": 0.1})
 
 
 @pytest.mark.parametrize(
@@ -174,7 +192,7 @@ def test_noise_of_two_accelerometers_follows_from_theirs(tmp_path: Path) -> None
         (lambda: model_of("inertia=a,gravity_torque=3"), "--model inertia=a: must be a finite number"),
         (lambda: model_of("mass=2"), "--model mass: no such number; allowed: gimbal_inertia"),
         (lambda: model_of("nothing.xml"), "no such file, nor a bundled one"),
-        (lambda: noise_numbers("tild=3"), "--noise tild: no such noise; did you mean 'tilt'?"),
+        (lambda: noise_numbers("tild=3"), "--noise tild: no such number; did you mean 'tilt'?"),
         (lambda: noise_numbers("tilt=0"), "must be greater than 0"),
         (lambda: parameters_of(["k1=3"]), "write OBSERVER.PARAMETER=VALUE"),
         (lambda: parameters_of(["homogenous.k1=3"]), "did you mean 'homogeneous'?"),
