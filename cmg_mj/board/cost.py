@@ -13,8 +13,9 @@ from cmg_mj.board.emulated import Board, Cost
 from cmg_mj.board.image import build, flash_of
 from cmg_mj.board.tools import require
 from cmg_mj.board.with_controller import exported
-from cmg_mj.controller import Controller, Processor
+from cmg_mj.controller import Controller
 from cmg_mj.markdown import table
+from cmg_mj.processor import Processor
 from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.trajectory import Trajectory
