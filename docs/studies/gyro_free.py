@@ -10,6 +10,8 @@ world by world. Means over the worlds; intervals are of 95 %. The parts:
   accelerometer by its own error without.
 - kalman: `kalman` less (9), (10) and (11), with its defaults and tuned at each noise: the torque's noises that have
   the least error in the loop on seeds of their own, over the whole run and in the push window.
+- start: what `bias_start` is worth: the error by the floor, with parts that are offset or a degree off by its own error
+  without, and the falls at the largest e with 5 mg on the inner accelerometer.
 - limits: the e at which half of 20 worlds fall, in steps of 1/16 degree.
 - model: what a filter could gain that knows the model, the command, the push and e: two floors.
 - taps: the floor of y1 alone by taps and memory, and the same fit with the acceleration beside it.
@@ -43,6 +45,8 @@ ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
 BARS = {200.0: (0.25, 0.12), 400.0: (0.35, 0.18), 800.0: (0.50, 0.25)}
 FLOOR_BAR, OFFSET_BAR = 1.1, 1.25
 OFFSETS = ("[5,0]", "[0,5]")
+STARTS = (0.1, 0.35, 1.0)
+TRUTH = 'controller.feedback="truth"'
 WHITE, WALK = (0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11), (0.003, 0.03)
 STEP_DEG, LARGEST = 1.0 / 16.0, 64
 
@@ -125,6 +129,38 @@ def _mean(result: Result) -> str:
     return f"{result.mean(ERROR):.4f} / {result.mean(PUSH_ERROR):.4f}{fell}"
 
 
+def start(noises: Sequence[float], biases: tuple[float, ...], worlds: int) -> None:
+    """Print what `bias_start` is worth."""
+    fields = [f"sensors.accelerometer.bias_mg={offset}" for offset in OFFSETS]
+    fields.append("sensors.accelerometer.misalignment_deg=[0,1]")
+
+    def falls(observer: str, noise: float, setting: str) -> str:
+        result = cells(observer, noise, (max(biases),), worlds, setting, fields[0])[0]
+        return f"{result.fell.sum()} of {worlds}"
+
+    rows = []
+    for noise in noises:
+        for at in STARTS:
+            setting = f"observer.bias_start={at}"
+            of, *moved = (
+                cells("gyro_free", noise, biases[:1], worlds, setting, *more)[0] for more in _none_and(fields)
+            )
+            row = [f"{noise:g}", f"{at:g}", f"{of.mean(ERROR):.4f}"]
+            row.append(against(ratio(of.values(ERROR), of.values(ERROR, "floor_accel")), FLOOR_BAR))
+            *offset, turned = (ratio(result.values(ERROR), of.values(ERROR)) for result in moved)
+            row += [against(by_none, OFFSET_BAR) for by_none in offset]
+            row.append(f"{turned.mean:.3f} (to {turned.high:.3f})")
+            rows.append([*row, falls("gyro_free", noise, setting)])
+        rows.append([f"{noise:g}", "true feedback", "-", "-", "-", "-", "-", falls("linear", noise, TRUTH)])
+    print(f"\n`gyro_free` by its `bias_start` at e = {biases[0]:g} deg, and the falls at e = {max(biases):g} deg:\n")
+    headings = ["ug/rtHz", "bias_start", "error [rad/s]", "by the floor", "5 mg inner, by none", "5 mg outer, by none"]
+    print(table([*headings, "outer 1 deg off, by none", "fell, 5 mg inner"], rows), flush=True)
+
+
+def _none_and(fields: Sequence[str]) -> list[tuple[str, ...]]:
+    return [(), *((field,) for field in fields)]
+
+
 @cache
 def tuned(noise: float, biases: tuple[float, ...], key: str) -> tuple[str, ...]:
     """The torques' noise of `kalman` that has the least mean error in the loop, over all e, on seeds of its own."""
@@ -176,9 +212,7 @@ def limits(noises: Sequence[float]) -> None:
 
     rows = []
     cases = [(f"`{name}`", name, ()) for name in (*NEW, "adaptive", "high_gain", "linear")]
-    for noise, (label, name, more) in product(
-        noises, [*cases, ("true feedback", "linear", ('controller.feedback="truth"',))]
-    ):
+    for noise, (label, name, more) in product(noises, [*cases, ("true feedback", "linear", (TRUTH,))]):
         of, found = experiment(name, noise, *more), []
         for sign in (-1.0, 1.0):
             stands, fell = -1, LARGEST
@@ -267,11 +301,12 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=100)
     parser.add_argument("--noise", default="200,400,800")
     parser.add_argument("--e", default="0,0.5,1,1.5")
-    parser.add_argument("--parts", default="bars,kalman,limits,model,taps")
+    parser.add_argument("--parts", default="bars,start,kalman,limits,model,taps")
     of = parser.parse_args()
     noises, biases = ([float(part) for part in text.split(",")] for text in (of.noise, of.e))
     parts = {
         "bars": lambda: bars(noises, tuple(biases), of.worlds),
+        "start": lambda: start(noises, tuple(biases), of.worlds),
         "kalman": lambda: kalman(noises, tuple(biases), of.worlds),
         "limits": lambda: limits(noises),
         "model": lambda: model(noises),
