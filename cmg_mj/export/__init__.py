@@ -69,7 +69,8 @@ def save(out: Path | RunFolder, made: Code) -> list[Path]:
 
     with nullcontext(out) if isinstance(out, RunFolder) else RunFolder(out, made.files) as folder:
         place = folder.write(
-            {name: lambda path, text=text: write_text(path, text) for name, text in made.files.items()}
+            {name: lambda path, text=text: write_text(path, text) for name, text in made.files.items()},
+            all_or_none=True,  # the example needs the code, and the code its test vector to be believed
         )
     return [place / name for name in made.files]
 

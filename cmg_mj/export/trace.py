@@ -22,6 +22,9 @@ from cmg_mj.tilt import RadialTilt
 MEASURED = ("y1", "y2", "acceleration")
 """What an observer is given at a sample."""
 
+MOST_NUMBERS = 1000
+"""Of a state: 4 kB on a board in single precision. What takes more is not meant for one, and takes CasADi minutes."""
+
 
 class Traced(NamedTuple):
     """A controller's formulas.
@@ -76,6 +79,8 @@ def _observed(
     first = _symbols(MEASURED)
     state = _called("init(y)", lambda: observer.init(Measurement(*first)))
     leaves = list(numbers(state))
+    if len(leaves) > MOST_NUMBERS:
+        raise Refused(f"its state holds {len(leaves)} numbers; at most {MOST_NUMBERS} can be exported")
     held = _symbols([f"state {i}" for i in range(len(leaves))])
     before, y, (u,) = rebuilt(state, iter(held)), _symbols(MEASURED), _symbols(["u"])
     after, estimate = _called("step(state, y, u)", lambda: observer.step(before, Measurement(*y), u))

@@ -15,6 +15,8 @@ from cmg_mj.export.place import Refused
 NUMBERS = (Symbolic, bool, int, float, np.bool_, np.integer, np.floating)
 STAY = (type(None), str, type)
 """What a state may hold besides numbers, if it stays the same."""
+DEEPEST = 50
+"""Parts within parts; one that holds itself has no end."""
 
 
 class Leaf(NamedTuple):
@@ -30,6 +32,10 @@ def numbers(tree: Any, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
     Raises:
         Refused: It holds something else.
     """
+    if len(path) > DEEPEST:
+        raise Refused(
+            f"its state goes deeper than {DEEPEST} parts within parts, or holds itself: use a tuple of numbers"
+        )
     parts = _parts(tree)
     if parts is not None:
         for name, part in parts:

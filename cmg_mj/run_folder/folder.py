@@ -73,19 +73,20 @@ class RunFolder:
                 "it, or name another folder"
             )
 
-    def write(self, files: Writers, *, complete: bool = True) -> Path:
+    def write(self, files: Writers, *, complete: bool = True, all_or_none: bool = False) -> Path:
         """Write a result: every file that can be written, and then complain of those that cannot.
 
         Args:
             files: What to write.
             complete: Whether the run came to its end.
+            all_or_none: Whether nothing is kept when a file cannot be written.
 
         Returns:
             Where it is: the folder; or one in it, if this result is not complete and that in the folder is, or if a
             user's file would be written over.
 
         Raises:
-            InputError: A file cannot be written. The others are.
+            InputError: A file cannot be written. The others are, unless it is all or none.
         """
         wrong: dict[str, BaseException] = {}
         try:
@@ -100,7 +101,11 @@ class RunFolder:
                 wrong[name] = error
                 if not isinstance(error, Exception):  # Ctrl-C, for the second time
                     break
-        place = self._place(new, complete=complete and not wrong)  # what is done is kept
+        if wrong and all_or_none:
+            shutil.rmtree(new, ignore_errors=True)
+            place = self.path
+        else:
+            place = self._place(new, complete=complete and not wrong)  # what is done is kept
         for error in wrong.values():
             if not isinstance(error, Exception):
                 raise error

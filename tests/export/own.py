@@ -198,6 +198,24 @@ class HoldsADeque(Plain):
         return deque([*state, y.y1], maxlen=3), (y.y1, y.y1 - state[0], y.y2)
 
 
+class HoldsItself(Plain):
+    def init(self, y: Measurement) -> Any:
+        state: list[Any] = [y.y1]
+        state.append(state)
+        return state
+
+    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
+        return state, (y.y1, 0.0, y.y2)
+
+
+class HoldsTooMuch(Plain):
+    def init(self, y: Measurement) -> Any:
+        return np.zeros((40, 40)) + y.y1
+
+    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
+        return state, (y.y1, state[0, 0], y.y2)
+
+
 class Blows(Plain):
     def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
         return (1e3 * state[0] + 1.0, 0.0), (state[0] * state[0], 0.0, y.y2)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 import json
+import os
 import re
 import subprocess
 import sys
@@ -14,6 +16,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.export import check_installed, export
+from cmg_mj.run_folder import folder
 from tests.command import cmg_mj
 from tests.export.compiled import compile_c, controller, needs_compiler
 
@@ -136,6 +139,21 @@ def test_wrong_input_is_one_line(arguments: list[str], words: str) -> None:
     Path("file").write_text("")
     assert words in cmg_mj("export", *arguments).complaint
     assert not Path("runs").exists() or not any(Path("runs").iterdir())
+
+
+def test_a_disk_that_is_full_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    genuine = folder.write_text
+
+    def full(path: Path, text: str) -> None:
+        if path.name == "linear_test_vector.h" and ".cmg-mj" in path.parts:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        genuine(path, text)
+
+    monkeypatch.setattr(folder, "write_text", full)
+    assert cmg_mj("export", "linear", "--out", "board").complaint == (
+        "board/linear_test_vector.h: cannot be written: No space left on device"
+    )
+    assert not Path("board").exists()
 
 
 @pytest.mark.parametrize(

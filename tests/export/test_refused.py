@@ -49,6 +49,8 @@ def test_what_has_no_place_in_a_formula_is_named_with_its_place(name: str, words
         ("Remembers", "remembers something outside of its state"),
         ("Grows", "made otherwise than the one of init"),
         ("HoldsADeque", "its state holds a deque"),
+        ("HoldsItself", "deeper than 50 parts within parts, or holds itself"),
+        ("HoldsTooMuch", "its state holds 1600 numbers; at most 1000 can be exported"),
         ("Blows", "cannot be compared on random signals: observer Blows returned"),
         ("Uncopied", "cannot be copied: RuntimeError: there is only one of me"),
     ],
