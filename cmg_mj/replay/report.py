@@ -223,7 +223,9 @@ def note(replays: Sequence[Replayed]) -> str:
     lines = []
     if "velocity_fit" in keys:
         lines.append("Fit: 1 - RMS error / RMS of the reference; 1 is the reference, 0 an estimate of zero.")
-        lines.append("Lag: how long an estimate comes after the reference, by the peak of their correlation.")
+        lines.append(
+            "Lag: how long an estimate comes after the reference, by the peak of their correlation; -: none is known."
+        )
     if "reconstruction_rms_deg" in keys:
         lines += [
             f"No reference. Reconstruction error: the tilt integrated from the rate, {RECONSTRUCTED_S:g} s at a time,",

@@ -9,7 +9,7 @@ import numpy as np
 from cmg_mj.logs import Log
 from cmg_mj.logs.log import REFERENCE
 from cmg_mj.push import inside
-from cmg_mj.replay.alignment import lag
+from cmg_mj.replay.lag import lag
 
 RECONSTRUCTED_S = 1.0
 """The estimated rate is integrated over so long at a time [s]."""

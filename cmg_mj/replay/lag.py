@@ -1,0 +1,146 @@
+"""How far one signal lags behind another, finer than a sample, and when that cannot be told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+LONGEST_LAG_S = 0.5
+"""Lags are looked for up to this, and no farther than a quarter of what there is [s]."""
+AS_GOOD = 0.98
+"""A periodic motion fits itself every period: of peaks this close to the highest, the one nearest to no lag counts."""
+ALIKE = 0.5
+"""Of an estimate whose correlation peaks lower, less than a quarter of the variance is the reference, however late."""
+STRETCHES = 8
+"""Each of so many stretches is left out in turn: what the lag then changes shows how far it is known."""
+TAPS = 15
+"""The correlation is smoothed over so many lags either way, if there are as many."""
+
+
+def lag(
+    behind: Sequence[np.ndarray],
+    ahead: Sequence[np.ndarray],
+    dt: float,
+    longest_s: float = LONGEST_LAG_S,
+    least: float = ALIKE,
+    sure: bool = True,
+) -> float | None:
+    """How long one signal comes after another: the peak of their correlation coefficient, between the samples too.
+
+    For every whole number of samples the coefficient is that of all pairs there are. Before its peak is sought, all
+    above a quarter of the sampling rate is taken out of it: what was folded down from above half the rate lies there,
+    with its phase turned round, and between samples a curve is least sure of it. A quintic spline through the rest has
+    its peak where a pure delay is, whatever the signals' sizes.
+
+    Args:
+        behind: Its pieces, each (n,); NaN where it is not known.
+        ahead: The pieces of the other at the same times.
+        dt: Sample period [s].
+        longest_s: Longest lag looked for, either way [s].
+        least: A correlation coefficient whose peak is lower shows no lag.
+        sure: Whether the lag must be known: its standard error, by the jackknife over `STRETCHES`, below a sample, or
+            below half of the lag.
+
+    Returns:
+        The lag [s], negative if it comes before; None if there is none: no motion, no likeness, the peak at the end, or
+        a peak that some stretch alone has put where it is.
+    """
+    size = max((len(piece) for piece in behind), default=0)
+    reach = min(math.ceil(longest_s / dt), (size - 1) // 4)
+    if reach < 1:
+        return None
+    each = _sums(behind, ahead, reach)
+    whole = each.sum(axis=0)
+    found = _peak_of(whole, least)
+    if found is None or not sure:
+        return None if found is None else found * dt
+    others = [_peak_of(whole - one, least) for one in each if one[0].any()]
+    known = np.array([other for other in others if other is not None])
+    if len(known) < max(2, len(others)):
+        return None
+    error = math.sqrt((len(known) - 1) * float(np.var(known)))
+    return found * dt if error <= max(1.0, abs(found) / 2.0) else None
+
+
+def _sums(behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], reach: int) -> np.ndarray:
+    """Count, sums, squares and products of the pairs that are known, (stretches, 6, lags)."""
+    from scipy.signal import correlate
+
+    # Numbers of like size: of the products of transforms, what is far smaller than the largest is lost.
+    middle_x, middle_y = _mean(behind), _mean(ahead)
+    sums = np.zeros((STRETCHES, 6, 2 * reach + 1))
+    for stretch, piece, rows in _stretches([len(piece) for piece in behind], 2 * reach):
+        around = slice(max(0, rows.start - reach), rows.stop + reach)
+        x, y = behind[piece][around] - middle_x, ahead[piece][rows] - middle_y
+        known_x, known_y = np.isfinite(x), np.isfinite(y)
+        x, y = np.where(known_x, x, 0.0), np.where(known_y, y, 0.0)
+        ones_x, ones_y = known_x.astype(float), known_y.astype(float)
+        # x's row i is y's row i + around.start - rows.start.
+        middle = len(y) - 1 + rows.start - around.start
+        first, last = max(0, middle - reach), min(len(x) + len(y) - 1, middle + reach + 1)
+        into = slice(first - middle + reach, last - middle + reach)
+        pairs = ((ones_x, ones_y), (x, ones_y), (ones_x, y), (x * x, ones_y), (ones_x, y * y), (x, y))
+        for i, (a, b) in enumerate(pairs):
+            sums[stretch, i, into] += correlate(a, b, mode="full", method="fft")[first:last]
+    sums[:, 0] = np.rint(sums[:, 0])
+    return sums
+
+
+def _mean(pieces: Sequence[np.ndarray]) -> float:
+    known = [piece[np.isfinite(piece)] for piece in pieces]
+    count = sum(map(len, known))
+    return sum(float(piece.sum()) for piece in known) / count if count else 0.0
+
+
+def _stretches(sizes: Sequence[int], least: int) -> Iterator[tuple[int, int, slice]]:
+    """Stretch, piece and rows in it of all pieces longer than the least, cut into `STRETCHES` of equal size."""
+    total, before = sum(size for size in sizes if size > least), 0
+    edges = [round(total * k / STRETCHES) for k in range(STRETCHES + 1)]
+    for piece, size in enumerate(sizes):
+        if size <= least:
+            continue
+        for stretch in range(STRETCHES):
+            start, stop = max(edges[stretch] - before, 0), min(edges[stretch + 1] - before, size)
+            if start < stop:
+                yield stretch, piece, slice(start, stop)
+        before += size
+
+
+def _peak_of(sums: np.ndarray, least: float) -> float | None:
+    """Where the correlation coefficient has its peak, in samples."""
+    n, sx, sy, sxx, syy, sxy = sums
+    with np.errstate(all="ignore"):
+        r = (sxy - sx * sy / n) / np.sqrt((sxx - sx * sx / n) * (syy - sy * sy / n))
+    if not np.isfinite(r).all() or r.max() <= least:
+        return None
+    reach = len(r) // 2
+    taps = min(TAPS, reach // 4)
+    r = np.convolve(r, _half_band(taps), mode="valid")
+    lags = np.arange(-(reach - taps), reach - taps + 1)
+    peaks = [i for i in range(1, len(r) - 1) if r[i - 1] < r[i] >= r[i + 1] and r[i] >= AS_GOOD * r.max()]
+    return _between(lags, r, min(peaks, key=lambda i: abs(lags[i]))) if peaks else None
+
+
+def _half_band(taps: int) -> np.ndarray:
+    """A symmetric low-pass at a quarter of the sampling rate, (2 taps + 1,); of a few taps it is none."""
+    if taps < 3:
+        return np.ones(1)
+    places = np.arange(-taps, taps + 1)
+    weights = np.sinc(places / 2.0) * np.kaiser(2 * taps + 1, 5.0)
+    return weights / weights.sum()
+
+
+def _between(lags: np.ndarray, r: np.ndarray, at: int) -> float:
+    """Where between the samples a curve through them is highest, in samples."""
+    from scipy.interpolate import make_interp_spline
+    from scipy.optimize import minimize_scalar
+
+    around = slice(max(0, at - 8), at + 9)
+    if len(r[around]) < 6:
+        return float(lags[at])
+    curve = make_interp_spline(lags[around], r[around], k=5)
+    ends = (lags[at] - 1, lags[at] + 1)
+    found = minimize_scalar(lambda m: -curve(m), bounds=ends, method="bounded", options={"xatol": 1e-7})
+    return float(found.x)  # pyright: ignore[reportAttributeAccessIssue]
