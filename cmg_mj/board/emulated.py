@@ -79,9 +79,13 @@ class Board:
             command += ["-icount", f"shift={NANOSECONDS_AN_INSTRUCTION.bit_length() - 1}"]
         with its:
             # In a session of its own: a Ctrl-C is ours to act on, between two ticks.
-            self._process = subprocess.Popen(
-                command, stdin=its.fileno(), stdout=its.fileno(), stderr=subprocess.PIPE, start_new_session=True
-            )
+            try:
+                self._process = subprocess.Popen(
+                    command, stdin=its.fileno(), stdout=its.fileno(), stderr=subprocess.PIPE, start_new_session=True
+                )
+            except OSError as error:
+                ours.close()
+                raise RunStopped(f"{EMULATOR} cannot be run: {error.strerror}") from error
         self.close = weakref.finalize(self, _end, self._process, ours)
         self.costs: list[Cost] = []
         self._line = Line(ours, patience_s)
@@ -174,6 +178,8 @@ class Board:
             said = [line.strip() for line in lines if "warning:" not in line]
             if said:
                 return f"{EMULATOR} says {said[-1]!r}"
+            if status < 0:
+                return f"{EMULATOR} was ended by signal {-status}"
             return STATUSES.get(status, f"{EMULATOR} has ended with status {status}")
         return "it has closed the line"
 

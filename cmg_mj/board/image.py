@@ -88,7 +88,10 @@ def flash_of(observer: str, folder: Path) -> int:
 
 
 def _run(command: list[str | Path], observer: str) -> str:
-    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    except OSError as error:
+        raise InputError(f"{observer}: {command[0]} cannot be run: {error.strerror}") from error
     if done.returncode:
         lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
         reason = (lines or done.stderr.splitlines() or [f"status {done.returncode}"])[0]

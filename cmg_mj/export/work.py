@@ -91,10 +91,14 @@ def _code(controller: Controller, precision: Precision, name: str) -> Code:
         "beyond_rounding": [],
     }
     if compile_with is not None:
-        with tempfile.TemporaryDirectory() as folder:
-            for file, text in files.items():
-                write_text(Path(folder, file), text)
-            off_by = figures["c_off_by"] = check.check_c(Path(folder), name, compile_with)
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = Path(temporary)
+            try:
+                for file, text in files.items():
+                    write_text(folder / file, text)
+            except OSError as error:
+                raise InputError(f"temporary folder {folder}: cannot be written: {error.strerror}") from error
+            off_by = figures["c_off_by"] = check.check_c(folder, name, compile_with)
         bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
     return Code(files, figures)

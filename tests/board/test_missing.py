@@ -51,3 +51,18 @@ def test_without_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
     said = cmg_mj("run", "push_recovery", "--driver", "board")
     assert said.complaint == 'export: casadi is not installed: python -m pip install "cmg_mj[export]"'
     assert not Path("runs").exists()
+
+
+@pytest.mark.skipif(bool(missing()), reason=f"not installed: {', '.join(missing())}")
+@pytest.mark.parametrize("program", [COMPILER, EMULATOR])
+def test_a_program_that_is_none(tmp_path: Path, program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = tmp_path / program
+    broken.write_bytes(b"\x7fELF")
+    broken.chmod(0o755)
+    monkeypatch.setattr("cmg_mj.board.tools.missing", list)
+    monkeypatch.setattr("cmg_mj.board.image.COMPILER", str(broken) if program == COMPILER else COMPILER)
+    monkeypatch.setattr("cmg_mj.board.emulated.EMULATOR", str(broken) if program == EMULATOR else EMULATOR)
+    monkeypatch.setattr("cmg_mj.board.emulated._ends_with_us", list)
+    words = f"{broken} cannot be run: Exec format error"
+    assert words in cmg_mj("run", "push_recovery", "--driver", "board").complaint
+    assert not Path("runs").exists()

@@ -156,6 +156,17 @@ def test_a_disk_that_is_full_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> 
     assert not Path("board").exists()
 
 
+@needs_compiler
+def test_a_temporary_folder_that_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path, text: str) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("cmg_mj.export.work.write_text", full)
+    complaint = cmg_mj("export", "linear", "--out", "board").complaint
+    assert re.search(r"temporary folder \S+: cannot be written: No space left on device$", complaint)
+    assert not Path("board").exists()
+
+
 @pytest.mark.parametrize(
     ("cc", "words"),
     [
