@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cmg_mj.floors import acceleration_floor
 from cmg_mj.intervals import Interval
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.papers.beyond.all_observers import order_claim
@@ -79,6 +80,15 @@ def test_noise_gain_is_that_of_the_impulse_response(kind: str, motion: Motion) -
     assert character(kind, motion).noise_gain_per_s == pytest.approx(expected, rel=0.05)
     if kind == "finite_difference":
         assert expected == pytest.approx(math.sqrt(2.0) / DT)
+
+
+def test_one_that_is_shown_the_acceleration_has_it_in_both(motion: Motion) -> None:
+    """A push is at once in the acceleration; of the noise, that of the acceleration is what the rate has most of."""
+    noise = motion.experiment.design.given[2]
+    found = character("gyro_free", motion)
+    assert found.lag_s is not None
+    assert abs(found.lag_s) < 1e-4
+    assert 1.0 < found.noise_gain_per_s * noise.tilt / acceleration_floor(noise, DT) < 1.15
 
 
 def test_an_update_takes_time(motion: Motion) -> None:

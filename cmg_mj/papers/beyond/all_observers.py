@@ -131,5 +131,5 @@ def _trade_off(rows: Sequence[Row]) -> Picture:
         Line([1e3 * row["push_lag_s"]], [row["noise_gain_per_s"]], row["observer"], "o", row["observer"])
         for row in shown
     ]
-    panel = Panel("noise gain [1/s]", marks, x_label="lag in a sudden push [ms]", x_scale="log", y_scale="log")
-    return Picture("beyond-trade-off", f"Every observer trades lag for noise ({SHOWN[0]:g} ug/rtHz)", [panel])
+    panel = Panel("noise gain [1/s]", marks, x_label="lag in a sudden push [ms]", y_scale="log")
+    return Picture("beyond-trade-off", f"Lag and noise gain of every observer ({SHOWN[0]:g} ug/rtHz)", [panel])

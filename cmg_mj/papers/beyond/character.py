@@ -36,7 +36,7 @@ def record_motion(noise_ug: float, worlds: int, seed: int) -> Motion:
         seed: Of their noise.
 
     Returns:
-        The motion; the noiseless measurement is the true tilt.
+        The motion; the noiseless measurement is the true tilt, and the true rate's slope.
     """
     settings = [
         "plant.equilibrium_bias_deg=0.0",
@@ -48,7 +48,9 @@ def record_motion(noise_ug: float, worlds: int, seed: int) -> Motion:
     experiment = prepare(load_scenario("observer_tuning", settings))
     noisy = experiment.run_many(worlds).trajectory
     assert noisy is not None
-    return Motion(experiment, noisy, Trajectory({**noisy.columns, "y1_rad": noisy["x1_rad"]}))
+    slope = np.gradient(noisy["x2_rad_s"], experiment.law.dt, axis=0)
+    true = {"y1_rad": noisy["x1_rad"], "acceleration_rad_s2": slope}
+    return Motion(experiment, noisy, Trajectory({**noisy.columns, **true}))
 
 
 class Character(NamedTuple):
@@ -57,7 +59,8 @@ class Character(NamedTuple):
     lag_s: float | None
     """`push_lag` [s]."""
     noise_gain_per_s: float
-    """RMS of what noise adds to the velocity estimate, over RMS of the noise of y1 [1/s]."""
+    """RMS of what noise adds to the velocity estimate, over RMS of the noise of y1 [1/s]. What an observer is shown of
+    the acceleration is as noisy as its sensors make it."""
 
 
 def character(kind: str, motion: Motion) -> Character:
@@ -106,10 +109,12 @@ def push_lag(observer: Observer, model: ReducedModel, dt: float) -> float | None
         return acceleration / pole**2 * (np.cosh(pole * t) - 1.0), acceleration / pole * np.sinh(pole * t)
 
     tilt, rate = (now - later for now, later in zip(pushed(t), pushed(t - PUSH_S), strict=True))
-    state = observer.init(Measurement(float(tilt[0]), 0.0))
+    push = 0.5 * (np.sign(np.round(t / dt, 6)) - np.sign(np.round((t - PUSH_S) / dt, 6)))  # at its edges half of it
+    measured = np.stack([tilt, pole**2 * tilt + acceleration * push], axis=1).tolist()
+    state = observer.init(Measurement(measured[0][0], 0.0, measured[0][1]))
     estimate = [0.0]
-    for y1 in tilt[1:].tolist():
-        state, estimated = observer.step(state, Measurement(y1, 0.0), 0.0)
+    for y1, slope in measured[1:]:
+        state, estimated = observer.step(state, Measurement(y1, 0.0, slope), 0.0)
         estimate.append(estimated[1])
     half = 0.5 * acceleration / pole * math.sinh(pole * PUSH_S)
     true, seen = _first_passing(t, rate, half), _first_passing(t, np.array(estimate), half)
