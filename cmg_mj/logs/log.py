@@ -30,7 +30,7 @@ class Log:
         has: What the log has of "gimbals" (y2 and u), "acceleration" and "reference".
         tilt: Where the two accelerometers are, if the tilt is theirs.
         windows: What is scored on its own as well [s].
-        notes: What was done to the rows that nobody has asked for, a line each.
+        notes: What was done to the rows that nobody has asked for, and what seems mistaken, a line each.
         given: From what it was read, for a file to tell.
         scenario: Of a trajectory the scenario, resolved.
     """

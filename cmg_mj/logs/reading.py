@@ -13,6 +13,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.logs.angle import turned
 from cmg_mj.logs.checks import check_assumed, check_motion, check_sizes, radial, windows_inside
 from cmg_mj.logs.columns import ACCELEROMETERS, Column, columns_of
+from cmg_mj.logs.interchanged import HINT, interchanged
 from cmg_mj.logs.log import REFERENCE, Log
 from cmg_mj.logs.of_a_run import of_trajectory
 from cmg_mj.logs.resampling import sampled_where_known
@@ -117,6 +118,8 @@ def read_log(
         raise InputError("--window: there is no reference to score against; name it, --columns rate=...")
     windows = windows_inside(path, windows_s, joined["time_s"])
     slices = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
+    if tilt is not None and interchanged(joined["y1_rad"], joined["acceleration_rad_s2"], slices, dt, tilt):
+        notes.append(HINT)
     return Log(path.stem, dt, joined, slices, frozenset(has), tilt, windows, tuple(notes), given)
 
 

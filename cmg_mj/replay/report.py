@@ -176,7 +176,7 @@ def _text(line: str) -> Text:
 
 def remarks(replayed: Replayed) -> list[str]:
     """What was done to one log, what its reference is, and who did not take part."""
-    lines = [f"{note[:1].upper()}{note[1:]}." for note in replayed.log.notes]
+    lines = [f"{note[:1].upper()}{note[1:]}{'' if note.endswith('?') else '.'}" for note in replayed.log.notes]
     if replayed.alignment is not None:
         motion = replayed.summaries[ZERO].get("velocity_rms_error_rad_s") or 0.0
         set_already = bool({"delay_s", "scale", "offset"} & replayed.log.given.keys())
