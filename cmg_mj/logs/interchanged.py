@@ -1,12 +1,13 @@
 """Two accelerometers named the wrong way round: the tilt then turns against its own angular acceleration.
 
-With a = (x_outer - x_inner) / (r_outer - r_inner) the angular acceleration and y the tilt, y'' = a. Of interchanged columns a
-has the other sign, and for gravity's tangential part stands g sin y - (r_inner + r_outer) y''. But for the square of the rate
+With a = (x_outer - x_inner) / (r_outer - r_inner) the angular acceleration and y the tilt, y'' = a. Of interchanged
+columns a has the other sign, and for gravity's tangential part g sin y stands g sin y - (r_inner + r_outer) y''. But
+for the square of the rate
 
     a -> -a,    y -> y - asin((r_inner + r_outer) a cos(y) / g)
 
-takes both back. The noise of both is the same either way. Of violent swings (30 degrees at 2 Hz) the square of the rate counts, and nothing is
-said.
+takes both back. The noise of both is the same either way. Of violent swings (30 degrees at 2 Hz) the square of the rate
+counts, and nothing is said.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ class Sampler:
         time, kept = time[present], {name: values[present] for name, values in measured.items()}
         time, kept = self._forward(time, kept)
         if len(time) < FEWEST:
-            raise InputError(f"{self.where}: {len(time)} rows with all that is needed; at least {FEWEST}")
+            raise InputError(f"{self.where}: {_rows(len(time))} with all that is needed; at least {FEWEST}")
         return self._on_a_grid(time, kept, held)
 
     def _forward(self, time: np.ndarray, values: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:

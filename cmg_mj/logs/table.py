@@ -90,11 +90,16 @@ def _of_parquet(path: Path, wanted: Sequence[str], time: str | None, dated: list
 
     with _arrows_complaints(path), path.open("rb") as source:
         file = pq.ParquetFile(source)
-        _check_columns(path, wanted, file.schema_arrow.names)
+        names = file.schema_arrow.names
+        _check_columns(path, wanted, [name.strip() for name in names])
+        spelled = {name.strip(): name for name in names}
         if file.metadata.num_rows > MOST_ROWS:
             raise _too_long(path, file.metadata.num_rows)
-        table = file.read(columns=list(dict.fromkeys(wanted)))
-    return {name: _numbers(path, name, table[name], dated if name == time else None) for name in wanted}
+        table = file.read(columns=list(dict.fromkeys(spelled[name.strip()] for name in wanted)))
+    return {
+        name.strip(): _numbers(path, name, table[spelled[name.strip()]], dated if name == time else None)
+        for name in wanted
+    }
 
 
 def _of_csv(
@@ -139,6 +144,8 @@ def _of_csv(
                 raise
             torn.clear()
             table = _batches(path, pacsv, read, parse, convert(pa.string()))
+    if torn and not len(table):
+        raise InputError(f"{path}: no line has as many cells as the heading; the first, {torn[0]}")
     if torn:
         lines = "line has" if len(torn) == 1 else "lines have"
         notes.append(f"{len(torn)} {lines} another number of cells and were left out; the first, {torn[0]}")
@@ -164,6 +171,8 @@ def _batches(path: Path, pacsv: Any, read: Any, parse: Any, convert: Any) -> pa.
 def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
     """The encoding, how many lines stand above the heading (comments, empty ones), and the heading."""
     encoding = "utf-8"
+    if head.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
+        raise InputError(f"{path}: is written in UTF-32; save it as UTF-8")
     for mark, name in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
         if head.startswith(mark):
             encoding = name
@@ -269,4 +278,6 @@ def _arrows_complaints(path: Path) -> Iterator[None]:
         yield
     except (pa.ArrowException, OSError, UnicodeError, OverflowError) as error:
         text = " ".join(str(getattr(error, "strerror", None) or error).split())
+        if "straddling object" in text:
+            text = "a line is longer than a megabyte"
         raise InputError(f"{os.fspath(path)}: cannot be read: {text[:200]}") from error

@@ -14,8 +14,8 @@ from cmg_mj.tilt import RadialTilt
 from tests.logs.motion import DT, write_csv
 
 PLACES = RadialTilt(0.1, 0.3)
-INNER_FIRST = dict(zip(ACCELEROMETERS, ("a_x", "a_z", "b_x", "b_z"), strict=True))
-OUTER_FIRST = dict(zip(ACCELEROMETERS, ("b_x", "b_z", "a_x", "a_z"), strict=True))
+INNER_FIRST: dict[str, str] = dict(zip(ACCELEROMETERS, ("a_x", "a_z", "b_x", "b_z"), strict=True))
+OUTER_FIRST: dict[str, str] = dict(zip(ACCELEROMETERS, ("b_x", "b_z", "a_x", "a_z"), strict=True))
 
 
 def readings(seed: int, swing: float, noise: float = 0.04, n: int = 2000) -> dict[str, np.ndarray]:
@@ -35,7 +35,7 @@ def readings(seed: int, swing: float, noise: float = 0.04, n: int = 2000) -> dic
 
 
 def notes(path: Path, columns: dict[str, str]) -> list[str]:
-    units = dict.fromkeys(ACCELEROMETERS, "m_s2")
+    units: dict[str, str] = dict.fromkeys(ACCELEROMETERS, "m_s2")
     log = read_log(path, {"time": "t_s", **columns}, units=units, radii_m=(PLACES.r_inner, PLACES.r_outer))
     return list(log.notes)
 

@@ -329,6 +329,13 @@ def test_arguments_that_cannot_be(arguments: dict, says: str, tmp_path: Path) ->
         (b"\x7fELF\0\0\0", "neither CSV nor Parquet"),
         (b"PAR1 and no more", "cannot be read"),
         (b"t_s,tilt_rad,tilt_rad,gyro_rad_s\n0,1,2,3\n", "has the column 'tilt_rad' 2 times"),
+        (
+            b"t_s,tilt_rad,gyro_rad_s\n0,0,0,1,1,2\n",
+            "no line has as many cells as the heading; the first, 6 cells instead of 3",
+        ),
+        (b"t_s,tilt_rad,gyro_rad_s\n0,1,2\n", "1 row with all that is needed; at least 20"),
+        (b"t_s,tilt_rad,gyro_rad_s\n0," + b"9" * 3_000_000 + b",1\n", "a line is longer than a megabyte"),
+        ("t_s,tilt_rad,gyro_rad_s\n0,1,2\n".encode("utf-32"), "is written in UTF-32; save it as UTF-8"),
     ],
 )
 def test_files_that_are_none(content: bytes, says: str, tmp_path: Path) -> None:
@@ -336,6 +343,23 @@ def test_files_that_are_none(content: bytes, says: str, tmp_path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(InputError, match=says):
         read_log(path, COLUMNS)
+
+
+def test_parquet_with_blanks_dots_and_nested_columns(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    t, y = sine()["t_s"], sine()["tilt_rad"]
+    nested = pa.array([{"tilt_rad": one} for one in y])
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table({" t_s": t, "tilt_rad ": y, "imu.tilt_rad": 2.0 * y, "imu": nested}), path)
+    np.testing.assert_array_equal(read_log(path, {"time": "t_s", "tilt": "tilt_rad"})["y1_rad"], y)
+    np.testing.assert_array_equal(read_log(path, {"time": "t_s", "tilt": "imu.tilt_rad"})["y1_rad"], 2.0 * y)
+    with pytest.raises(InputError, match=r"column 'imu' holds struct<tilt_rad: double>, not numbers"):
+        read_log(path, {"time": "t_s", "tilt": "imu"}, units={"tilt": "rad"})
+    pq.write_table(pa.table({"t_s": t, "tilt_rad": y, " tilt_rad": y}), path)
+    with pytest.raises(InputError, match="has the column 'tilt_rad' 2 times"):
+        read_log(path, {"time": "t_s", "tilt": "tilt_rad"})
 
 
 def test_no_file_and_no_regular_file(tmp_path: Path) -> None:
