@@ -116,9 +116,8 @@ def _peak_of(sums: np.ndarray, least: float) -> float | None:
     if not np.isfinite(r).all() or r.max() <= least:
         return None
     reach = len(r) // 2
-    taps = min(TAPS, reach // 4)
-    r = np.convolve(r, _half_band(taps), mode="valid")
-    lags = np.arange(-(reach - taps), reach - taps + 1)
+    r = np.convolve(r, _half_band(min(TAPS, reach // 4)), mode="valid")
+    lags = np.arange(len(r)) - len(r) // 2
     peaks = [i for i in range(1, len(r) - 1) if r[i - 1] < r[i] >= r[i + 1] and r[i] >= AS_GOOD * r.max()]
     return _between(lags, r, min(peaks, key=lambda i: abs(lags[i]))) if peaks else None
 

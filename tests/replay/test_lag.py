@@ -46,6 +46,15 @@ def test_known_delays_in_noise() -> None:
     assert abs(np.mean(errors)) < 3.0 * np.std(errors) / np.sqrt(len(errors))
 
 
+@pytest.mark.parametrize("rows", [9, 20, 37, 60, 100])
+def test_short_logs(rows: int) -> None:
+    """So short that the correlation cannot be smoothed, or hardly: three samples late, or nothing is said."""
+    t = np.arange(rows)
+    found = lag([np.sin(0.5 * (t - 3.0))], [np.sin(0.5 * t)], 1.0, longest_s=100.0)
+    assert found is None or found == pytest.approx(3.0, abs=0.1)
+    assert (found is None) == (rows < 20)
+
+
 def test_in_parts_with_gaps_it_is_the_same() -> None:
     rng = np.random.default_rng(3)
     signal, later = delayed(rng, 0.005, 5.0, 0.0123)
