@@ -75,15 +75,17 @@ class Observing:
         Raises:
             RunStopped: The observer in the loop failed, or in one world returned a number that is not finite.
         """
-        states = self._states
+        states, single = self._states, self._single
         estimates: list[Sequence[Scalar]] = []
+        total = 0.0
         for i, observer in enumerate(self._at_work):
             try:
                 states[i], estimate = observer.step(states[i], y, u)
-                if self._single:
+                if single:
                     # The sum of floats is a float, of anything else (but for a few integers among them) is not.
-                    if len(estimate) != self._widths[i] or type(sum(estimate)) is not float:
+                    if len(estimate) != self._widths[i] or type(total := sum(estimate)) is not float:
                         estimate = self._fitted(estimate, self._widths[i], y)
+                        total = sum(estimate)
                 elif self._fits(estimate, self._widths[i], y):
                     # The record keeps a copy: an observer may go on changing its arrays in place.
                     estimate = named([part.copy() for part in estimate])
@@ -95,12 +97,10 @@ class Observing:
                 # One that only rides along must not end the run: it is NaN from here on.
                 self._at_work[i] = lost = _Lost(self._widths[i])
                 states[i], estimate = lost.step(None, y, u)
+            # Many worlds are judged one by one, elsewhere. NaN and infinity alike are not zero times themselves.
+            if i == 0 and 0.0 * total != 0.0:
+                self._blame_number(observer, estimate, step)
             estimates.append(estimate)
-        # Many worlds are judged one by one, elsewhere. NaN and infinity alike are not zero times themselves.
-        if self._single and 0.0 * sum(estimates[0]) != 0.0:
-            for name, value in zip(("x1", "x2", "x3", *self.extra_signals[0]), estimates[0], strict=True):
-                if not math.isfinite(value):
-                    self._blame(self._at_work[0], f"returned {value} for {name}", step)
         return estimates
 
     def _first_state(self, observer: Observer, y: Measurement, step: int) -> Any:
@@ -127,6 +127,12 @@ class Observing:
         if self._single:
             return named([float(part) for part in parts])
         return named([np.broadcast_to(part.astype(float), y.y1.shape) for part in parts])
+
+    def _blame_number(self, observer: Observer, estimate: Sequence[float], step: int) -> None:
+        """Stop for a number that is not finite, if there is one: a sum may overflow."""
+        for name, value in zip(("x1", "x2", "x3", *self.extra_signals[0]), estimate, strict=True):
+            if not math.isfinite(value):
+                self._blame(observer, f"returned {value} for {name}", step)
 
     def _blame(self, observer: Observer, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
         name = type(getattr(observer, "stands_for", observer)).__name__

@@ -308,11 +308,11 @@ class Plant:
         Returns:
             The ideal readings, of the elements' own type (float, or array (n_worlds,)).
         """
-        if isinstance(sensordata, np.ndarray):
-            forces: Any = sensordata[self._specific_forces]
-        else:
+        if type(sensordata) is list:
             i, j, k, m = self._specific_forces
-            forces = (sensordata[i], sensordata[j], sensordata[k], sensordata[m])
+            forces: Any = (sensordata[i], sensordata[j], sensordata[k], sensordata[m])
+        else:
+            forces = sensordata[self._specific_forces]
         encoders = [sensordata[address] for address in self._encoders]
         return Ideal(forces, encoders, sensordata[self._gyro], qvel[self.tilt])
 

@@ -18,6 +18,9 @@ class _Angles(NamedTuple):
     """Gimbal angle q_c - pi/2, half the difference of the two encoders [rad]."""
 
 
+_new = tuple.__new__
+
+
 class Measurement(_Angles):
     """y of aranovskiy2020 (5), two angles: floats for one world, arrays (n_worlds,) for many.
 
@@ -29,7 +32,7 @@ class Measurement(_Angles):
 
     def __new__(cls, y1: Scalar, y2: Scalar, acceleration: Scalar = math.nan) -> Measurement:
         """The angles [rad], and the angular acceleration if it is measured [rad/s^2]."""
-        y = tuple.__new__(cls, (y1, y2))
+        y = _new(cls, (y1, y2))
         y.acceleration = acceleration
         return y
 
