@@ -15,6 +15,8 @@ import cmg_mj
 class HalfDifference:
     """The tilt's difference quotient, of which each sample takes a part."""
 
+    needs = ()  # but y1: it replays on any log
+
     dt: float
     model: cmg_mj.ReducedModel
     weight: float = 0.5

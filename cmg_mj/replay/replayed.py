@@ -150,9 +150,11 @@ def _ready(
     ready: dict[str, Observer] = {}
     left_out: dict[str, str] = {}
     for name in names:
-        lacks = [what for what in needs(observer_class(name)) if what not in there]
+        cls = observer_class(name)
+        lacks = [what for what in needs(cls) if what not in there]
         if lacks:
-            left_out[name] = "needs " + " and ".join(IN_WORDS[what] for what in lacks)
+            assumed = "" if hasattr(cls, "needs") else ", as a class does that does not say what it needs (needs = ())"
+            left_out[name] = "needs " + " and ".join(IN_WORDS[what] for what in lacks) + assumed
             continue
         try:
             observer = make_observer(name, log.dt, model or NO_MODEL, noise, **parameters.get(name, {}))

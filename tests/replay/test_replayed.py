@@ -12,7 +12,7 @@ import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
 from cmg_mj.logs import Log, read_log
-from cmg_mj.observers import OBSERVERS, Measurement, make_observer, observer_class
+from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
 from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.noise import noise_numbers, noise_of
 from cmg_mj.replay.options import parameters_of
@@ -213,6 +213,24 @@ def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
         replay_log(one, skip_s=20.0)
     with pytest.raises(InputError, match="no observer can take part: ltv needs a model"):
         replay_log(one, ["ltv"])
+
+
+class Silent:
+    """Does not say what it needs."""
+
+    def __init__(self, dt: float, model: object) -> None:
+        pass
+
+    def init(self, y: Measurement) -> None:
+        return None
+
+    def step(self, state: None, y: Measurement, u: float) -> tuple[None, Estimate]:
+        return None, Estimate(y.y1, 0.0, y.y2)
+
+
+def test_a_class_that_does_not_say_what_it_needs_is_told_how_to(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"Silent needs a model .* does not say what it needs \(needs = \(\)\)"):
+        replay_log(log(tmp_path), ["tests.replay.test_replayed:Silent"])
 
 
 def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
