@@ -122,5 +122,23 @@ def in_si(quantity: Quantity, unit: str) -> float:
     return UNITS[quantity][unit]
 
 
+def unit_of_factor(quantity: Quantity, unit: str, factor: float, near: tuple[float, float]) -> str | None:
+    """The unit that makes numbers said to be in another one so many times as large.
+
+    Args:
+        quantity: What is measured.
+        unit: The unit they were said to be in.
+        factor: By what they must be multiplied to be right.
+        near: By how much that may miss, as a factor.
+
+    Returns:
+        The nearest; None if there is none, or it is the same.
+    """
+    size = in_si(quantity, unit)
+    misses = {name: factor * size / other for name, other in UNITS[quantity].items() if other != size}
+    fits = {name: abs(math.log(miss)) for name, miss in misses.items() if near[0] <= miss <= near[1]}
+    return min(fits, key=fits.__getitem__) if fits else None
+
+
 def _an(quantity: str) -> str:
     return f"an {quantity}" if quantity[0] in "aeiou" else f"a {quantity}"

@@ -17,15 +17,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmg_mj.accelerometer import STANDARD_GRAVITY
+from cmg_mj.logs.curvature import beside
 from cmg_mj.tilt import RadialTilt
 
-WIDTH_S = 0.25
-"""Over so long each the tilt's second derivative is taken [s]; over at least `FEWEST_SAMPLES` samples."""
-FEWEST_SAMPLES = 12
 CLEAR = 0.5
 """So far they must agree the other way round, where 1 is equality; as they are named they must oppose each other."""
-FEWEST = 20
-"""So many stretches there must be."""
 HINT = (
     "the tilt turns against the angular acceleration of the two accelerometers, and with it if they change places: are "
     "inner and outer interchanged?"
@@ -51,20 +47,10 @@ def interchanged(
 
 
 def _agreement(tilt: np.ndarray, acceleration: np.ndarray, parts: Sequence[slice], dt: float) -> float | None:
-    """2 sum(a b) / sum(a^2 + b^2) of the acceleration a and the tilt's second derivative b, weighted over stretches.
-
-    The derivative is taken of the weights w = (1 - s^2)^4, which end smoothly: b = sum(y w''), a = sum(a w).
-    """
-    half = max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / dt))
-    s = np.arange(-half, half + 1) / (half + 1.0)
-    weights = (1.0 - s**2) ** 4
-    second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * dt) ** 2
-    second -= second.mean()
-    own, derived = [], []
-    for part in parts:
-        if part.stop - part.start >= len(s):
-            own.append(np.convolve(acceleration[part], weights, mode="valid")[::half])
-            derived.append(np.convolve(tilt[part], second, mode="valid")[::half])
-    a, b = (np.concatenate(rows) if rows else np.zeros(0) for rows in (own, derived))
+    """2 sum(a b) / sum(a^2 + b^2) of the acceleration a and the tilt's second derivative b, weighted over stretches."""
+    found = beside(tilt, acceleration, parts, dt)
+    if found is None:
+        return None
+    a, b = found
     size = float(np.sum(a**2 + b**2))
-    return 2.0 * float(np.sum(a * b)) / size if len(a) >= FEWEST and size > 0.0 else None
+    return 2.0 * float(np.sum(a * b)) / size if size > 0.0 else None

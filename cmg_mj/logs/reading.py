@@ -13,6 +13,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.logs.angle import turned
 from cmg_mj.logs.checks import check_assumed, check_motion, check_sizes, radial, windows_inside
 from cmg_mj.logs.columns import ACCELEROMETERS, Column, columns_of
+from cmg_mj.logs.implausible import beside_the_tilt, of_gravity
 from cmg_mj.logs.interchanged import HINT, interchanged
 from cmg_mj.logs.log import REFERENCE, Log
 from cmg_mj.logs.of_a_run import of_trajectory
@@ -118,8 +119,8 @@ def read_log(
         raise InputError("--window: there is no reference to score against; name it, --columns rate=...")
     windows = windows_inside(path, windows_s, joined["time_s"])
     slices = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
-    if tilt is not None and interchanged(joined["y1_rad"], joined["acceleration_rad_s2"], slices, dt, tilt):
-        notes.append(HINT)
+    if "acceleration" in has:
+        notes += _implausible(found, raw, joined, slices, dt, tilt)
     return Log(path.stem, dt, joined, slices, frozenset(has), tilt, windows, tuple(notes), given)
 
 
@@ -188,6 +189,24 @@ def _joined(
             [sampled_where_known(part.time, part.when(stamps) - delay, reference) for part in parts]
         )
     return columns
+
+
+def _implausible(
+    found: Mapping[str, Column],
+    raw: Mapping[str, np.ndarray],
+    joined: Mapping[str, np.ndarray],
+    parts: Sequence[slice],
+    dt: float,
+    places: RadialTilt | None,
+) -> list[str]:
+    """What the accelerations cannot be; of several mistakes that hang together, the first."""
+    y, a = joined["y1_rad"], joined["acceleration_rad_s2"]
+    if places is not None:
+        said = of_gravity(found, raw, places)
+        if said or interchanged(y, a, parts, dt, places):
+            return [said or HINT]
+    said = beside_the_tilt(y, a, parts, dt, found)
+    return [said] if said else []
 
 
 def _say_halves(found: Mapping[str, Column], has: set[str], notes: list[str]) -> None:
