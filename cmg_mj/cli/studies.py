@@ -224,7 +224,7 @@ def _tune_on_logs(
     from cmg_mj.replay.pendulum import model_of
     from cmg_mj.runs import file_name
     from cmg_mj.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
-    from cmg_mj.tuning.logged import FILES
+    from cmg_mj.tuning.logged_written import FILES
     from cmg_mj.tuning.written import plain
 
     if chosen.name:

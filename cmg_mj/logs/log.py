@@ -33,6 +33,7 @@ class Log:
         notes: What was done to the rows that nobody has asked for, and what seems mistaken, a line each.
         given: From what it was read, for a file to tell.
         scenario: Of a trajectory the scenario, resolved.
+        rows_s: Between the file's own rows, whatever the samples' period [s]; None of a trajectory.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Log:
     notes: Sequence[str] = ()
     given: Mapping[str, Any] = field(default_factory=dict)
     scenario: Mapping[str, Any] | None = None
+    rows_s: float | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]

@@ -121,7 +121,7 @@ def read_log(
     slices = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
     if "acceleration" in has:
         notes += _implausible(found, raw, joined, slices, dt, tilt)
-    return Log(path.stem, dt, joined, slices, frozenset(has), tilt, windows, tuple(notes), given)
+    return Log(path.stem, dt, joined, slices, frozenset(has), tilt, windows, tuple(notes), given, None, sampler.period)
 
 
 def _between(

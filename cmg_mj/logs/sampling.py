@@ -61,12 +61,14 @@ class Sampler:
         rate_hz: The rate of the rows, if they have no times; else that to resample to, or None for the rows' own.
         max_gap_s: Longer gaps part the log; None for `BRIDGED` periods.
         notes: What was done.
+        period: Between the file's own rows, once they have been read [s].
     """
 
     where: str
     rate_hz: float | None
     max_gap_s: float | None
     notes: list[str]
+    period: float | None = None
 
     def parts(
         self, time: np.ndarray | None, measured: Mapping[str, np.ndarray], held: Sequence[str] = ()
@@ -140,7 +142,7 @@ class Sampler:
                 f"{self.where}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz; a log has "
                 f"{SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz: is the time's unit right? (--units time=ms)"
             )
-        period = rounded(period)
+        self.period = period = rounded(period)
         longest = BRIDGED * period if self.max_gap_s is None else self.max_gap_s
         ends = np.flatnonzero(steps > max(A_GAP * period, longest + period))
         bounds = [0, *(ends + 1), len(time)]

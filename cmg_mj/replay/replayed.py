@@ -18,9 +18,10 @@ from cmg_mj.observers.protocol import needs
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.references import ZERO
 from cmg_mj.rehearsal import rehearse
-from cmg_mj.replay.alignment import Alignment, alignment
+from cmg_mj.replay.alignment import Alignment
 from cmg_mj.replay.noise import noise_of
 from cmg_mj.replay.open_loop import replay_all
+from cmg_mj.replay.reference import alignment_of
 from cmg_mj.replay.scores import noise_gain, scores
 from cmg_mj.tilt import TiltNoise
 
@@ -118,7 +119,7 @@ def replay_log(
         )
         summaries[name] = {**scores(log, found["x2_rad_s"], scored), "noise_gain_1_s": gain}
     zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
-    return Replayed(log, estimates, {**summaries, ZERO: zero}, left_out, _alignment(log), skip_s, noise, parameters)
+    return Replayed(log, estimates, {**summaries, ZERO: zero}, left_out, alignment_of(log), skip_s, noise, parameters)
 
 
 def _check_scored(log: Log, scored: np.ndarray, skip_s: float) -> None:
@@ -200,13 +201,6 @@ def _with_noise(log: Log, noise: TiltNoise) -> Log:
     columns = {**log.columns, "y1_rad": log["y1_rad"] + noise.tilt * first}
     columns["acceleration_rad_s2"] = log["acceleration_rad_s2"] + noise.acceleration * second
     return dataclasses.replace(log, columns=columns)
-
-
-def _alignment(log: Log) -> Alignment | None:
-    if "reference" not in log.has or log.scenario is not None:
-        return None
-    tilts, references = ([log[name][part] for part in log.parts] for name in ("y1_rad", REFERENCE))
-    return alignment(tilts, references, log.dt)
 
 
 def described(log: Log) -> str:

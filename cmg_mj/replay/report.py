@@ -15,7 +15,7 @@ from cmg_mj import markdown
 from cmg_mj.intervals import known_interval
 from cmg_mj.legible import best
 from cmg_mj.references import ZERO
-from cmg_mj.replay.alignment import Alignment
+from cmg_mj.replay.reference import remarks_on
 from cmg_mj.replay.replayed import Replayed, described
 from cmg_mj.replay.scores import RECONSTRUCTED_S
 from cmg_mj.summary_keys import Key
@@ -31,11 +31,6 @@ FIGURES = {
     "noise_gain_1_s": Key("noise gain", "1/s", "{:.1f}"),
 }
 """What a table of a replay can show, in this order."""
-
-OFF = 0.05
-"""A reference whose size differs by more from what the tilt shows is worth a word."""
-LATE = 0.1
-"""So is one that is late by more than this much of a sample."""
 
 
 def shown_first(replayed: Replayed) -> list[str]:
@@ -111,14 +106,15 @@ def replay_tables(replays: Sequence[Replayed]) -> Group:
         table = _table(described(replayed.log), keys)
         for name, figures in replayed.summaries.items():
             table.add_row(name, *(written(key, figures.get(key)) for key in keys))
-        parts += [table, *map(_text, remarks(replayed)), Text("")]
+        said = [_text(line) for line in remarks(replayed)]
+        parts += [table, *said, *([Text("")] if said else [])]  # a table ends with an empty line of its own
     if len(replays) > 1:
         keys = _keys(replays)
         table = _table(f"Means over {len(replays)} logs, with 95 % intervals", keys)
         for name, figures in _means(replays).items():
             few = "" if figures["logs"] == len(replays) else f" ({figures['logs']} logs)"
             table.add_row(name + few, *(_mean(key, figures[key]) for key in keys))
-        parts += [table, Text("")]
+        parts.append(table)
     return Group(*parts, _text(note(replays)))
 
 
@@ -176,44 +172,11 @@ def _text(line: str) -> Text:
 
 def remarks(replayed: Replayed) -> list[str]:
     """What was done to one log, what its reference is, and who did not take part."""
-    lines = [f"{note[:1].upper()}{note[1:]}{'' if note.endswith('?') else '.'}" for note in replayed.log.notes]
-    if replayed.alignment is not None:
-        motion = replayed.summaries[ZERO].get("velocity_rms_error_rad_s") or 0.0
-        set_already = bool({"delay_s", "scale", "offset"} & replayed.log.given.keys())
-        lines += _of_the_reference(replayed.alignment, replayed.log.dt, motion, set_already)
+    lines = remarks_on(replayed.log, replayed.alignment)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)
     return [*lines, *(f"Without {', '.join(names)}: {reason}." for reason, names in reasons.items())]
-
-
-def _of_the_reference(found: Alignment, dt: float, motion: float, set_already: bool) -> list[str]:
-    """The reference's lag, size and offset in words if they matter, and what would take them out.
-
-    Args:
-        found: What the reference is to the tilt.
-        dt: Sample period [s].
-        motion: RMS of the reference [rad/s].
-        set_already: Whether something was taken out.
-
-    Returns:
-        No line, or one.
-    """
-    lag, scale, offset, correlation = found
-    if scale is None or offset is None or correlation is None:
-        return ["The reference cannot be compared with the tilt: too little motion, or too short."]
-    if correlation < 0.5:
-        turned = "it counts the other way: --scale rate=-1." if correlation < -0.5 else "is it the rate of this tilt?"
-        return [f"The reference does not go with the tilt (correlation {correlation:.2f}): {turned}"]
-    late = "an unknown time" if lag is None else f"{abs(lag) * 1e3:.2f} ms {'behind' if lag >= 0.0 else 'before'}"
-    sign = "plus" if offset >= 0.0 else "less"
-    said = f"Beside the tilt the reference comes {late}; {scale:.4f} times it {sign} {abs(offset):.4f} rad/s fits"
-    cures = [f"--delay {lag:.4f}"] if lag is not None and abs(lag) > LATE * dt else []
-    cures += [f"--scale rate={scale:.4g}"] if abs(scale - 1.0) > OFF else []
-    if not cures and lag is not None and abs(offset) <= OFF * motion:
-        return []
-    beyond = "beyond what was set; " if set_already else ""
-    return [said + (f" ({beyond}to take it out: {' '.join(cures)})." if cures else ".")]
 
 
 def note(replays: Sequence[Replayed]) -> str:

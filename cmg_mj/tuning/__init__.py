@@ -4,7 +4,8 @@ The loop is closed on the gyro, what was measured and commanded is replayed thro
 are fitted on one set of worlds and scored on another.
 """
 
-from cmg_mj.tuning.logged import LogStudy, figures_of_logs, logs_table, save_log_study, tune_on_logs
+from cmg_mj.tuning.logged import LogStudy, tune_on_logs
+from cmg_mj.tuning.logged_written import figures_of_logs, logs_table, save_log_study
 from cmg_mj.tuning.recorded import Recorded, record
 from cmg_mj.tuning.study import BestNoise, Level, Study, best_noise, tune, tuned_scenario
 from cmg_mj.tuning.written import figures_of, files_of_study, save_study, tuning_table

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich import box
-from rich.console import Group
-from rich.table import Table
-from rich.text import Text
 
 from cmg_mj.errors import InputError
 from cmg_mj.logs import Log
@@ -22,18 +16,19 @@ from cmg_mj.logs.log import REFERENCE
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.replay import replay
+from cmg_mj.replay.alignment import Alignment
+from cmg_mj.replay.reference import alignment_of, remarks_on
 from cmg_mj.replay.replayed import NO_MODEL, replay_log
 from cmg_mj.replay.told import Told, told
-from cmg_mj.run_folder import RunFolder, claimed, write_text
 from cmg_mj.tilt import TiltNoise
 from cmg_mj.tuning.parameters import Number, narrowed, numbers_of, parameters_of
 from cmg_mj.tuning.search import evaluations
 from cmg_mj.tuning.study import Fitter, Level, OnShare, level_of, names_of
-from cmg_mj.tuning.written import level_figures, plain, spread
 
 BLOCKS = 10
 """So many stretches of each log's part are scored on their own, for an interval."""
-FILES = ("tuned.json",)
+SHORTEST_S = 0.5
+"""Of shorter stretches there is no interval [s]."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +48,11 @@ class Logged:
     def worlds(self) -> int:
         """How many stretches."""
         return sum(len(self._stretches(log)) for log in self.logs)
+
+    @property
+    def shortest_s(self) -> float:
+        """How long the shortest stretch is [s]."""
+        return min(len(rows) * log.dt for log in self.logs for rows in self._stretches(log))
 
     @property
     def zero_rms(self) -> float:
@@ -98,6 +98,9 @@ class LogStudy:
         split: The share of each log that was fitted; the rest is scored.
         level: What came out.
         noises: Log by log what the observer was told of the sensors.
+        alignments: Log by log what the reference is to the tilt.
+        remarks: Log by log what is said of it, as in a replay.
+        stretch_s: The shortest of the stretches that are scored [s].
     """
 
     kind: str
@@ -108,6 +111,14 @@ class LogStudy:
     split: float
     level: Level
     noises: Sequence[TiltNoise]
+    alignments: Sequence[Alignment | None]
+    remarks: Sequence[Sequence[str]]
+    stretch_s: float
+
+    @property
+    def tells(self) -> bool:
+        """Whether the stretches are long enough for an interval: shorter ones are not independent of each other."""
+        return self.stretch_s >= SHORTEST_S
 
 
 def tune_on_logs(
@@ -178,7 +189,20 @@ def tune_on_logs(
     fitter.expected = evaluations(len(numbers))
     level = level_of(0.0, fitter, numbers, held_out, starts)
     names, noises_told = [log.name for log in logs], [what.noise for what in each]
-    return LogStudy(kind, values, numbers, [n.name for n in still], names, split, level, noises_told)
+    alignments = [alignment_of(log) for log in logs]
+    return LogStudy(
+        kind,
+        values,
+        numbers,
+        [n.name for n in still],
+        names,
+        split,
+        level,
+        noises_told,
+        alignments,
+        [remarks_on(log, found) for log, found in zip(logs, alignments, strict=True)],
+        held_out.shortest_s,
+    )
 
 
 def _common(kind: str, logs: Sequence[Log], each: Sequence[Told]) -> dict[str, Any]:
@@ -196,67 +220,3 @@ def _common(kind: str, logs: Sequence[Log], each: Sequence[Told]) -> dict[str, A
 def _share(log: Log, split: float, *, first: bool) -> slice:
     middle = round(split * len(log))
     return slice(0, middle) if first else slice(middle, len(log))
-
-
-def figures_of_logs(study: LogStudy) -> dict[str, Any]:
-    """What `cmg-mj tune --log ... --json` prints."""
-    level = level_figures(study.level)
-    left_out = ("noise_density_ug_rthz", "worlds_that_fell", "held_out_worlds")
-    return {
-        "logs": list(study.names),
-        "observer": study.kind,
-        "split": study.split,
-        "given_parameters": plain(study.given),
-        "tuned": [number.name for number in study.numbers],
-        "idle": list(study.idle),
-        "noise": [
-            {"tilt_rad": noise.tilt, "acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}
-            for noise in study.noises
-        ],
-        "held_out_stretches": len(study.level.rms),
-        **{key: value for key, value in level.items() if key not in left_out},
-    }
-
-
-def logs_table(study: LogStudy) -> Group:
-    """The table that `cmg-mj tune --log` prints."""
-    level = study.level
-    share = f"{study.split:.0%}"
-    lines = [
-        f"RMS of the estimated rate less the reference. Fitted on the first {share} of each log, scored on the rest,",
-        f"in {len(level.rms)} stretches. An estimate of zero: {level.zero_rms:.4f} rad/s. Fit {level.fit:.3f} tuned, "
-        f"{level.given_fit:.3f} given.",
-    ]
-    if study.idle:
-        lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.idle)}.")
-    if level.edges:
-        lines.append("* at a limit of its range.")
-    table = Table(title=f"{', '.join(study.names)}: {study.kind}", box=box.SIMPLE_HEAD, title_justify="left")
-    for heading in ("parameter", "given", "tuned"):
-        table.add_column(heading, justify="left" if heading == "parameter" else "right")
-    for number in study.numbers:
-        size = math.copysign(level.sizes[number.name], number.given)
-        table.add_row(number.name, f"{number.given:.4g}", f"{size:.4g}{'*' if number.name in level.edges else ''}")
-    table.add_section()
-    table.add_row("held out [rad/s]", f"{level.given_rms.mean():.4f}", f"{level.rms.mean():.4f}")
-    table.add_row("given / tuned, 95 %", "", spread(level.ratio))
-    table.add_row("tuned is", "", level.verdict)
-    return Group(table, Text("\n".join(lines)))
-
-
-def save_log_study(folder: RunFolder | Path, study: LogStudy) -> Path:
-    """Write tuned.json.
-
-    Args:
-        folder: Where. What is there and was not written by cmg_mj stays.
-        study: What to write.
-
-    Returns:
-        Where it is.
-
-    Raises:
-        InputError: It cannot be written.
-    """
-    text = json.dumps(figures_of_logs(study), indent=2)
-    with claimed(folder) as it:
-        return it.write({FILES[0]: lambda path: write_text(path, text)})

@@ -53,7 +53,7 @@ def test_a_scale_where_no_unit_fits(tmp_path: Path) -> None:
     """Counts of 16384 a g, taken as m/s^2, of sensors that are mounted the other way round."""
     raw = {name: values * (1.0 if name == "t_s" else -16384.0 / 9.80665) for name, values in readings(1, 0.1).items()}
     path = write_csv(tmp_path / "log.csv", raw)
-    turned = dict.fromkeys(ACCELEROMETERS, -1.0)
+    turned: dict[str, float] = dict.fromkeys(ACCELEROMETERS, -1.0)
     (wrong,) = of_two(path, {}, scale=turned)
     scales = {role: float(text) for role, _, text in (p.partition("=") for p in wrong.split("--scale ")[1].split(","))}
     assert scales == pytest.approx(dict.fromkeys(ACCELEROMETERS, -9.80665 / 16384.0), rel=0.01)
