@@ -57,6 +57,13 @@ def check_sizes(path: Path, found: Mapping[str, Column], raw: Mapping[str, np.nd
             raise InputError(f"{where}: {values[row]:.3g} in SI units is no {role}; at most {LARGEST:g}")
 
 
+def check_numbers(path: Path, found: Mapping[str, Column], raw: Mapping[str, np.ndarray]) -> None:
+    """Refuse a column without a number."""
+    for role, values in raw.items():
+        if not np.isfinite(values).any():
+            raise InputError(f"{path}: column {found[role].name!r}, the {role}, has no number at all")
+
+
 def check_assumed(path: Path, name: str, time: np.ndarray) -> None:
     """Refuse times whose unit nobody says and that would be slow in seconds: milliseconds of a quick log are."""
     steps = np.abs(np.diff(time[np.isfinite(time)]))

@@ -11,7 +11,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.logs.angle import turned
-from cmg_mj.logs.checks import check_assumed, check_motion, check_sizes, radial, windows_inside
+from cmg_mj.logs.checks import check_assumed, check_motion, check_numbers, check_sizes, radial, windows_inside
 from cmg_mj.logs.columns import ACCELEROMETERS, Column, columns_of
 from cmg_mj.logs.implausible import beside_the_tilt, of_gravity
 from cmg_mj.logs.interchanged import HINT, interchanged
@@ -85,6 +85,7 @@ def read_log(
     with np.errstate(over="ignore"):
         raw = {role: table[column.name.strip()] * column.factor + column.offset for role, column in found.items()}
     check_sizes(path, found, raw)
+    check_numbers(path, found, raw)
     time = raw.pop("time", None)
     if time is not None and not found["time"].told:
         check_assumed(path, found["time"].name, time)

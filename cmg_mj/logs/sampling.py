@@ -93,9 +93,7 @@ class Sampler:
             time = np.arange(n) / self.rate_hz
         present = np.isfinite(time) & np.logical_and.reduce([np.isfinite(values) for values in measured.values()])
         if not present.any():
-            empty = [name for name, values in measured.items() if not np.isfinite(values).any()]
-            what = f"{', '.join(empty)} has no number at all" if empty else "no row has all of " + ", ".join(measured)
-            raise InputError(f"{self.where}: {what}")
+            raise InputError(f"{self.where}: no row has a number in each of its columns")
         if not present.all():
             self.notes.append(_missing(present, time, measured))
         time, kept = time[present], {name: values[present] for name, values in measured.items()}
@@ -169,6 +167,9 @@ class Sampler:
         ]
         if len(parts) < len(stretches):
             self.notes.append(f"{len(stretches) - len(parts)} parts with fewer than {FEWEST} samples left out")
+        if not parts and not len(ends):
+            n, rate = int((time[-1] - time[0]) / dt + 1e-6) + 1, f"{time[-1] - time[0]:.4g} s at {1.0 / dt:g} Hz"
+            raise InputError(f"{self.where}: {rate} are {n} sample{'' if n == 1 else 's'}; at least {FEWEST}")
         if not parts:
             raise InputError(f"{self.where}: no part of {FEWEST} samples without a gap longer than {longest:.3g} s")
         return dt, parts

@@ -147,8 +147,9 @@ def _of_csv(
     if torn and not len(table):
         raise InputError(f"{path}: no line has as many cells as the heading; the first, {torn[0]}")
     if torn:
-        lines = "line has" if len(torn) == 1 else "lines have"
-        notes.append(f"{len(torn)} {lines} another number of cells and were left out; the first, {torn[0]}")
+        one = len(torn) == 1
+        lines = f"{len(torn)} {'line has' if one else 'lines have'} another number of cells"
+        notes.append(f"{lines} and {'was' if one else 'were'} left out; {'' if one else 'the first, '}{torn[0]}")
     return {
         name.strip(): _numbers(path, name, table[name], dated if name == time else None, comma=comma) for name in wanted
     }
@@ -220,12 +221,7 @@ def _numbers(path: Path, name: str, column: Any, dated: list[str] | None, *, com
             raise InputError(f"{path}: column {name!r} holds times, not numbers")
         dated.append(name)
         return _seconds(column)
-    if (
-        pa.types.is_boolean(kind)
-        or pa.types.is_integer(kind)
-        or pa.types.is_floating(kind)
-        or pa.types.is_decimal(kind)
-    ):
+    if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
         values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False).astype(float)
         return np.where(np.isfinite(values), values, np.nan)
     if pa.types.is_null(kind):

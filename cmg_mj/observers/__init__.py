@@ -1,7 +1,7 @@
 """Velocity observers, one a file."""
 
 from cmg_mj.observers.protocol import NEEDS, Estimate, Measurement, Observer, needs
-from cmg_mj.observers.registry import GIVEN, OBSERVERS, make_observer, observer_class
+from cmg_mj.observers.registry import GIVEN, OBSERVERS, check_names, make_observer, observer_class
 
 __all__ = [
     "GIVEN",
@@ -10,6 +10,7 @@ __all__ = [
     "Estimate",
     "Measurement",
     "Observer",
+    "check_names",
     "make_observer",
     "needs",
     "observer_class",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+from collections.abc import Iterable
 from typing import Any
 
 from pydantic import ValidationError
@@ -83,12 +84,8 @@ def make_observer(
         InputError: Unknown observer or parameter, or a parameter that the observer refuses.
     """
     cls = observer_class(kind)
+    check_names(kind, parameters)
     taken = inspect.signature(cls).parameters
-    allowed = [name for name in taken if name not in GIVEN]
-    for name in parameters:
-        if name not in allowed and not _takes_any(cls):
-            what = nearest(name, allowed) if allowed else "it has none"
-            raise InputError(f"observer.{name}: {kind} has no such parameter; {what}")
     given: dict[str, Any] = {"dt": dt, "model": model}
     if "noise" in taken:
         if noise is None and taken["noise"].default is inspect.Parameter.empty:
@@ -101,6 +98,24 @@ def make_observer(
         raise InputError(f"observer.{clause} (observer {kind})") from error
     except (Exception, SystemExit) as error:  # a user's own class may refuse its parameters in its own way
         raise InputError(f"observer {kind}: {raised(error)}") from error
+
+
+def check_names(kind: str, names: Iterable[str]) -> None:
+    """Refuse the names of parameters that an observer does not have.
+
+    Args:
+        kind: A name of `OBSERVERS`, or `package.module:Class`.
+        names: Of its parameters.
+
+    Raises:
+        InputError: Unknown observer or parameter.
+    """
+    cls = observer_class(kind)
+    allowed = [name for name in inspect.signature(cls).parameters if name not in GIVEN]
+    for name in names:
+        if name not in allowed and not _takes_any(cls):
+            what = nearest(name, allowed) if allowed else "it has none"
+            raise InputError(f"observer.{name}: {kind} has no such parameter; {what}")
 
 
 def _takes_any(cls: type) -> bool:

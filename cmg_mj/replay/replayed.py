@@ -13,7 +13,7 @@ import numpy as np
 from cmg_mj.errors import InputError, raised
 from cmg_mj.logs import Log
 from cmg_mj.logs.log import REFERENCE
-from cmg_mj.observers import OBSERVERS, Observer, make_observer, observer_class
+from cmg_mj.observers import OBSERVERS, Observer, check_names, make_observer, observer_class
 from cmg_mj.observers.protocol import needs
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.references import ZERO
@@ -154,6 +154,7 @@ def _ready(
         cls = observer_class(name)
         lacks = [what for what in needs(cls) if what not in there]
         if lacks:
+            check_names(name, parameters.get(name, {}))
             assumed = "" if hasattr(cls, "needs") else ", as a class does that does not say what it needs (needs = ())"
             left_out[name] = "needs " + " and ".join(IN_WORDS[what] for what in lacks) + assumed
             continue

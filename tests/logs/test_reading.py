@@ -266,8 +266,19 @@ def backwards(columns: dict) -> None:
         (lambda c: c.update(t_s=[*c["t_s"][:-1], "now"]), "row 4000, column 't_s': 'now' is not a number or a date"),
         (lambda c: c.update(tilt_rad=np.full(N, 0.3)), "the tilt is 0.3 rad in every row: nothing moves"),
         (lambda c: c.update(gyro_rad_s=np.full(N, 0.3)), "the reference is 0.3 rad/s in every row: leave it out"),
-        (lambda c: c.update(tilt_rad=[None] * N), "y1_rad has no number at all"),
-        (lambda c: c.update(gyro_rad_s=[None] * N), "the reference has no number where the tilt has one"),
+        (lambda c: c.update(tilt_rad=[None] * N), "column 'tilt_rad', the tilt, has no number at all"),
+        (lambda c: c.update(gyro_rad_s=[None] * N), "column 'gyro_rad_s', the rate, has no number at all"),
+        (
+            lambda c: c.update(gyro_rad_s=[None] * (N // 2) + [0.1] * 10 + [None] * (N // 2 - 10)),
+            "the reference has no number where the tilt has one",
+        ),
+        (
+            lambda c: c.update(
+                t_s=[None if i % 2 else t for i, t in enumerate(c["t_s"])],
+                tilt_rad=[y if i % 2 else None for i, y in enumerate(c["tilt_rad"])],
+            ),
+            "no row has a number in each of its columns",
+        ),
         (lambda c: c.update(t_s=np.zeros(N)), "3,999 of 4,000 rows have the same time as the row before"),
         (lambda c: c.update(t_s=c["t_s"] * 1e4), "rows are 50 s apart, which is 0.02 Hz; a log has 0.1 to 1e+06 Hz"),
         (backwards, "time goes back from 2.495 s to 0 s, there alone: cut the log there"),
@@ -360,6 +371,37 @@ def test_parquet_with_blanks_dots_and_nested_columns(tmp_path: Path) -> None:
     pq.write_table(pa.table({"t_s": t, "tilt_rad": y, " tilt_rad": y}), path)
     with pytest.raises(InputError, match="has the column 'tilt_rad' 2 times"):
         read_log(path, {"time": "t_s", "tilt": "tilt_rad"})
+
+
+def test_truth_values_are_no_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table({"t_s": sine()["t_s"], "tilt_rad": sine()["tilt_rad"] > 0.0}), path)
+    with pytest.raises(InputError, match="column 'tilt_rad' holds bool, not numbers"):
+        read_log(path, {"time": "t_s", "tilt": "tilt_rad"})
+
+
+@pytest.mark.parametrize(("rate", "samples"), [(0.1, 2), (0.5, 10)])
+def test_a_rate_that_leaves_too_few_samples(rate: float, samples: int, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", sine())
+    with pytest.raises(InputError, match=f"s at {rate:g} Hz are {samples} samples; at least 20"):
+        read_log(path, COLUMNS, rate_hz=rate)
+    assert len(read_log(path, COLUMNS, rate_hz=1.05)) == 21
+
+
+@pytest.mark.parametrize(
+    ("torn", "says"),
+    [
+        (1, "1 line has another number of cells and was left out; 2 cells instead of 3: "),
+        (2, "2 lines have another number of cells and were left out; the first, 2 cells instead of 3: "),
+    ],
+)
+def test_torn_lines(torn: int, says: str, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", sine())
+    lines = path.read_text().splitlines()
+    for i in range(torn):
+        lines[100 + 500 * i] = "1,2"
+    path.write_text("\n".join(lines))
+    assert read_log(path, COLUMNS).notes[0].startswith(says)
 
 
 def test_no_file_and_no_regular_file(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +127,7 @@ def test_markdown_and_table_say_the_same() -> None:
             ("--columns", PLAIN, "--observers", "linear", "--set", "ltv.Q=1"),
             "--set ltv: is not among --observers linear",
         ),
+        (("--columns", PLAIN, "--set", "ltv.nope=3"), "observer.nope: ltv has no such parameter"),
         (("--columns", PLAIN, "--set", "linear.tau=-1"), "tau = -1: must be a number greater than 0"),
         (("--columns", PLAIN, "--skip", "nan"), "--skip nan"),
         (("--columns", PLAIN, "--noise", "accelerometer=3"), "the tilt is not that of two accelerometers"),
@@ -205,6 +207,16 @@ def test_of_the_reference_it_says_what_matters() -> None:
     other = dict(sine(), gyro_rad_s=np.random.default_rng(0).standard_normal(4000))
     write_csv("other.csv", other)
     assert "is it the rate of this tilt?\n" in replay("other.csv", "--columns", PLAIN, "--observers", "linear").out
+
+
+def test_one_empty_line_at_a_time() -> None:
+    alone = replay("sine.csv", "--columns", PLAIN, "--observers", "linear").out
+    write_csv("other.csv", {name: values[:2000] for name, values in sine().items()})
+    two = replay("sine.csv", "other.csv", "--columns", PLAIN, "--observers", "linear,ltv").out
+    for text in (alone, two):
+        lines = [line.strip() for line in text.strip().splitlines()]
+        assert "" in lines
+        assert all(line or after for line, after in pairwise(lines))
 
 
 def test_the_same_log_twice() -> None:
