@@ -9,10 +9,8 @@ import numpy as np
 
 from cmg_mj.replay.lag import lag
 
-FAINT = 0.1
-"""Enough for a measured tilt's slopes: most of them may be noise, which is white and has no peak of its own."""
 SPAN_S = 0.2
-"""A reference's size is taken from how far it says the tilt has come in so long [s]."""
+"""A reference is compared by how far it says that the tilt has come in so long [s]: slopes are mostly noise."""
 
 
 class Alignment(NamedTuple):
@@ -29,9 +27,9 @@ class Alignment(NamedTuple):
 
 
 def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: float) -> Alignment:
-    """Compare a reference with the tilt's central difference (lag), its integral with the tilt (scale, offset).
+    """Compare how far the tilt comes in `SPAN_S`, at every sample, with how far the reference says so.
 
-    Over `SPAN_S` each, the tilt's increments are fitted by those of the reference's integral, taken back by its lag.
+    The lag is where the two are most alike; the tilt's increments are then fitted by the reference's, taken back by it.
 
     Args:
         tilt: Its pieces, each (n,) [rad].
@@ -41,27 +39,28 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
     Returns:
         The four numbers; None for those that cannot be found.
     """
-    slopes = [np.gradient(piece, dt) for piece in tilt]
-    found = lag(reference, slopes, dt, least=FAINT, sure=False)
     span = max(2, round(SPAN_S / dt))
-    rises, travels = [], []
-    for y, rate in zip(tilt, reference, strict=True):
-        if len(y) <= 2 * span:
-            continue
-        clock = np.arange(len(y)) * dt
-        steps = (rate[1:] + rate[:-1]) * dt / 2.0
-        unknown = np.concatenate([[0], np.cumsum(np.isnan(steps))])
-        travelled = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
-        when = clock + (found or 0.0)
-        travelled, unknown = (np.interp(when, clock, sums, left=np.nan, right=np.nan) for sums in (travelled, unknown))
-        gapless = unknown[span:] == unknown[:-span]
-        rises.append((y[span:] - y[:-span])[gapless])
-        travels.append((travelled[span:] - travelled[:-span])[gapless])
+    pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
+    rises = [y[span:] - y[:-span] for y, _ in pieces]
+    found = lag([_travelled(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
+    travels = [_travelled(rate, span, dt, found or 0.0) for _, rate in pieces]
     if not rises:
         return Alignment(found, None, None, None)
     rise, travel = np.concatenate(rises), np.concatenate(travels)
+    rise, travel = rise[np.isfinite(travel)], travel[np.isfinite(travel)]
     if len(rise) < 3 or not np.ptp(travel) > 0.0 or not np.ptp(rise) > 0.0:
         return Alignment(found, None, None, None)
     correlation = float(np.corrcoef(rise, travel)[0, 1])
     slope, start = np.polynomial.polynomial.polyfit(travel, rise, 1)[::-1]
     return Alignment(found, float(slope), float(start / (span * dt)), correlation)
+
+
+def _travelled(rate: np.ndarray, span: int, dt: float, late_s: float) -> np.ndarray:
+    """How far a rate goes in each span of samples, when it comes so late; NaN over what is not known, (n - span,)."""
+    clock = np.arange(len(rate)) * dt
+    steps = (rate[1:] + rate[:-1]) * dt / 2.0
+    unknown = np.concatenate([[0], np.cumsum(np.isnan(steps))])
+    travelled = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
+    when = clock + late_s
+    travelled, unknown = (np.interp(when, clock, sums, left=np.nan, right=np.nan) for sums in (travelled, unknown))
+    return np.where(unknown[span:] == unknown[:-span], travelled[span:] - travelled[:-span], np.nan)

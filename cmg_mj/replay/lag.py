@@ -24,8 +24,6 @@ def lag(
     ahead: Sequence[np.ndarray],
     dt: float,
     longest_s: float = LONGEST_LAG_S,
-    least: float = ALIKE,
-    sure: bool = True,
 ) -> float | None:
     """How long one signal comes after another: the peak of their correlation coefficient, between the samples too.
 
@@ -39,13 +37,10 @@ def lag(
         ahead: The pieces of the other at the same times.
         dt: Sample period [s].
         longest_s: Longest lag looked for, either way [s].
-        least: A correlation coefficient whose peak is lower shows no lag.
-        sure: Whether the lag must be known: its standard error, by the jackknife over `STRETCHES`, below a sample, or
-            below half of the lag.
 
     Returns:
-        The lag [s], negative if it comes before; None if there is none: no motion, no likeness, the peak at the end, or
-        a peak that some stretch alone has put where it is.
+        The lag [s], negative if it comes before; None if there is none: no motion, no likeness (`ALIKE`), a peak at the
+        end, or a standard error, by the jackknife over `STRETCHES`, above a sample and above half of the lag.
     """
     size = max((len(piece) for piece in behind), default=0)
     reach = min(math.ceil(longest_s / dt), (size - 1) // 4)
@@ -53,10 +48,10 @@ def lag(
         return None
     each = _sums(behind, ahead, reach)
     whole = each.sum(axis=0)
-    found = _peak_of(whole, least)
-    if found is None or not sure:
-        return None if found is None else found * dt
-    others = [_peak_of(whole - one, least) for one in each if one[0].any()]
+    found = _peak_of(whole)
+    if found is None:
+        return None
+    others = [_peak_of(whole - one) for one in each if one[0].any()]
     known = np.array([other for other in others if other is not None])
     if len(known) < max(2, len(others)):
         return None
@@ -108,12 +103,12 @@ def _stretches(sizes: Sequence[int], least: int) -> Iterator[tuple[int, int, sli
         before += size
 
 
-def _peak_of(sums: np.ndarray, least: float) -> float | None:
+def _peak_of(sums: np.ndarray) -> float | None:
     """Where the correlation coefficient has its peak, in samples."""
     n, sx, sy, sxx, syy, sxy = sums
     with np.errstate(all="ignore"):
         r = (sxy - sx * sy / n) / np.sqrt((sxx - sx * sx / n) * (syy - sy * sy / n))
-    if not np.isfinite(r).all() or r.max() <= least:
+    if not np.isfinite(r).all() or r.max() <= ALIKE:
         return None
     reach = len(r) // 2
     r = np.convolve(r, _half_band(min(TAPS, reach // 4)), mode="valid")

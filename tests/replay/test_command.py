@@ -203,7 +203,7 @@ def test_of_the_reference_it_says_what_matters() -> None:
     late = replay("sine.csv", "--columns", PLAIN, "--observers", "linear", "--delay", "0.01").out
     assert "(beyond what was set; to take it out: --delay -0.01" in " ".join(late.split())
     real = " ".join(replay(LOG, "--columns", REAL, "--observers", "linear").out.split())
-    assert "12.09 ms behind; 1.0157 times it plus 0.0007 rad/s fits (to take it out: --delay 0.0121)." in real
+    assert "12.10 ms behind; 1.0157 times it plus 0.0007 rad/s fits (to take it out: --delay 0.0121)." in real
     other = dict(sine(), gyro_rad_s=np.random.default_rng(0).standard_normal(4000))
     write_csv("other.csv", other)
     assert "is it the rate of this tilt?\n" in replay("other.csv", "--columns", PLAIN, "--observers", "linear").out

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmg_mj.replay.alignment import alignment
 from cmg_mj.replay.lag import lag
 
 N = 4000
@@ -82,9 +83,7 @@ def test_a_peak_that_one_stretch_makes_is_none() -> None:
     loud = np.where((np.arange(N) > 500) & (np.arange(N) < 1000), 3.0, 0.0)
     signal, seen = late + loud * early, of_late + loud * of_early
     assert lag([seen], [signal], 0.005) is None
-    unsure = lag([seen], [signal], 0.005, sure=False)
-    assert unsure is not None
-    assert -0.06 < unsure < 0.01
+    assert lag([seen[:500]], [signal[:500]], 0.005) == pytest.approx(0.01, abs=2e-3)
 
 
 def test_an_estimate_that_is_hardly_like_the_reference_has_none() -> None:
@@ -92,3 +91,19 @@ def test_an_estimate_that_is_hardly_like_the_reference_has_none() -> None:
         rng = np.random.default_rng(seed)
         signal, later = delayed(rng, 0.005, 5.0, 0.02)
         assert lag([later + 2.0 * rng.standard_normal(N)], [signal], 0.005) is None
+
+
+def test_a_reference_beside_a_noisy_tilt() -> None:
+    """3 ms behind a tilt of 0.2 rad with noise of 0.02: found to a millisecond, where slopes would say anything."""
+    found = []
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        t = 0.005 * np.arange(N)
+        tilt = 0.2 * np.sin(2.0 * np.pi * t) + 0.06 * np.sin(2.0 * np.pi * 2.3 * t)
+        late = t - 0.003
+        rate = 0.4 * np.pi * np.cos(2.0 * np.pi * late) + 0.276 * np.pi * np.cos(2.0 * np.pi * 2.3 * late)
+        aligned = alignment([tilt + 0.02 * rng.standard_normal(N)], [rate], 0.005)
+        assert aligned.lag_s is not None
+        found.append(aligned.lag_s)
+    assert np.mean(found) == pytest.approx(0.003, abs=5e-4)
+    assert np.std(found) < 1.5e-3
