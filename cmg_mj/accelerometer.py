@@ -146,7 +146,7 @@ class Accelerometer:
         inner, outer = self.bias
         offsets = [inner, 0.0, outer, 0.0]
         if own == [1.0] * 4 and other == [0.0] * 4:
-            column = np.array(offsets)[:, None]
+            column = np.array(np.broadcast_arrays(*offsets)).reshape(4, -1)
 
             def shifted(forces: Any) -> Any:
                 if isinstance(forces, np.ndarray):
@@ -155,7 +155,9 @@ class Accelerometer:
                 return ix + inner, iz, ox + outer, oz
 
             return shifted
-        by_own, by_other, by_one = (np.array(weights)[:, None] for weights in (own, other, offsets))
+        by_own, by_other, by_one = (
+            np.array(np.broadcast_arrays(*weights)).reshape(4, -1) for weights in (own, other, offsets)
+        )
 
         def distorted(forces: Any) -> Any:
             if isinstance(forces, np.ndarray):

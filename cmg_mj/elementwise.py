@@ -84,6 +84,11 @@ def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
     return reduce(add, map(mul, a, b))
 
 
+def radians(degrees: Scalar) -> Scalar:
+    """An angle in rad, elementwise; of a float what `math.radians` says."""
+    return degrees * (math.pi / 180.0)
+
+
 def sign(x: Scalar) -> Scalar:
     """Sign of x, zero at zero, elementwise."""
     return float((x > 0.0) - (x < 0.0)) if type(x) is float else np.sign(x)

@@ -15,15 +15,18 @@ from cmg_mj.board import Board, on_a_board
 from cmg_mj.controller import Controller
 from cmg_mj.design import Design, design
 from cmg_mj.differences import differences
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError
 from cmg_mj.grid import check_steps, common_period
 from cmg_mj.law import Law
 from cmg_mj.loop_check import hints
+from cmg_mj.overrides import assign
 from cmg_mj.plant import Plant, load_plant
+from cmg_mj.pool import differs, pooled, structure
 from cmg_mj.processor import Processor
+from cmg_mj.push import Push
 from cmg_mj.resolved import resolved
 from cmg_mj.resources import folder
-from cmg_mj.scenario import base_of, located
+from cmg_mj.scenario import as_fields, base_of, located, parse_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Driver, Result, simulate
 from cmg_mj.trajectory import whole_file
@@ -60,12 +63,15 @@ class Experiment:
         """The observer in the loop, then the companions."""
         return [self.scenario.observer.kind, *self.scenario.companion_names()]
 
-    def controller(self, worlds: int | Sequence[int] = 0, processor: Processor | None = None) -> Controller:
+    def controller(
+        self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, **others: Any
+    ) -> Controller:
         """A fresh controller.
 
         Args:
             worlds: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
             processor: What takes its decisions in its place.
+            **others: `law` and `sensors` instead of the scenario's.
 
         Returns:
             The controller.
@@ -73,8 +79,7 @@ class Experiment:
         settings = self.scenario.controller
         return self.plant.controller(
             self.design.observer(),
-            law=self.law,
-            sensors=self.scenario.sensors,
+            **{"law": self.law, "sensors": self.scenario.sensors} | others,
             seed=self.scenario.seed,
             worlds=worlds,
             feedback=settings.feedback,
@@ -108,8 +113,8 @@ class Experiment:
         Args:
             worlds: How many, or their numbers: world i has the same noise wherever it stands.
             plants: A plant a world, if they differ.
-            vary: The same by settings: a field of [plant] -> its value in each world, such as
-                {"equilibrium_bias_deg": [0.0, 0.5]}.
+            vary: The same by settings: a field -> its value in each world, such as {"equilibrium_bias_deg": [0.0, 0.5],
+                "push.0.torque_n_m": [1.0, 2.0]}. Only numbers that worlds of one batch may differ in: see `pool.py`.
             **options: Those of `simulate`.
 
         Returns:
@@ -122,57 +127,61 @@ class Experiment:
         if vary is not None and plants is not None:
             raise InputError("run_many: give plants or vary, not both")
         if vary is not None:
-            plants = self.rigs(vary)
+            return run_together(self.varied(vary), numbers, **options)
         rigs = [self.plant] * len(numbers) if plants is None else list(plants)
-        if not numbers or len(rigs) != len(numbers):
-            raise InputError(
-                f"run_many: {len(numbers)} worlds and {len(rigs)} plants; give at least one, and as many of each"
-            )
-        integrators = {int(rig.model.opt.integrator) for rig in set(rigs)}
-        alike = {(rig.model.opt.timestep, *rig.joint_names) for rig in {self.plant, *rigs}}
-        if len(alike) > 1 or len(integrators) > 1:
-            raise InputError(
-                "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"
-            )
+        _require_alike([self.plant, *rigs], len(rigs), len(numbers))
         return self._simulate(rigs, self.controller(numbers), **options)
 
-    def rigs(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Plant]:
-        """The scenario's rig with other settings in each world; equal settings share one rig.
+    def varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
+        """The scenario with other settings in each world; worlds with equal settings share one.
 
         Args:
-            vary: Field of [plant] -> its value in each world.
+            vary: Field -> its value in each world. A field is named as with `--set`; one of [plant] by itself too.
 
         Returns:
-            A rig a world.
+            An experiment a world.
 
         Raises:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
-        given: dict[str, Any] = dataclasses.asdict(self.scenario.plant) | {"timestep_s": self.plant.timestep}
-        for name in vary:
-            if name not in given:
-                raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, given)}")
         lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in vary.values()]
         if not lists or any(isinstance(values, str) or not isinstance(values, Sequence) for values in lists):
             raise InputError('vary: must be lists of values by field, such as {"equilibrium_bias_deg": [0.0, 0.5]}')
         if len({len(values) for values in lists}) > 1:
             raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world")
-        made: dict[str, Plant] = {}  # by what a value looks like: a wrong one may not be hashable
-        rigs = []
+        ours = {field.name for field in dataclasses.fields(self.scenario.plant)}
+        names = [f"plant.{name}" if name in ours else name for name in vary]
+        made: dict[str, Experiment] = {}  # by what a value looks like: a wrong one may not be hashable
+        experiments = []
         for row in zip(*lists, strict=True):
             if repr(row) not in made:
-                made[repr(row)] = load_plant(**given | dict(zip(vary, row, strict=True)))
-            rigs.append(made[repr(row)])
-        return rigs
+                made[repr(row)] = self._with(dict(zip(names, row, strict=True)))
+            experiments.append(made[repr(row)])
+        return experiments
 
-    def _simulate(self, plant: Plant | Sequence[Plant], controller: Controller, **options: Any) -> Result:
+    def _with(self, values: Mapping[str, Any]) -> Experiment:
+        """The same with other values of some fields."""
+        fields = as_fields(self.scenario)
+        for name, value in values.items():
+            assign(fields, name, value, f"vary: {name!r}")
+        settings = ", ".join(f"{name}={value}" for name, value in values.items())
+        scenario = parse_scenario(fields, f"{self.scenario._where} with {settings}".strip())
+        return prepare(scenario, load_rig(scenario, self.plant))
+
+    def _simulate(
+        self,
+        plant: Plant | Sequence[Plant],
+        controller: Controller,
+        pushes: Sequence[Push] | None = None,
+        **options: Any,
+    ) -> Result:
         scenario = self.scenario
         return simulate(
             plant,
             controller,
             scenario.duration_s,
             observers=self.observer_names,
-            pushes=scenario.push,
+            pushes=scenario.push if pushes is None else pushes,
             settings=scenario.metrics,
             **options,
         )
@@ -218,15 +227,70 @@ class Experiment:
             temporary.write_text(self.as_toml(driver), encoding="utf-8")
 
 
-def load_rig(scenario: Scenario) -> Plant:
+def run_together(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Any) -> Result:
+    """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
+
+    Args:
+        experiments: One a world.
+        worlds: Their numbers: world i has the same noise in every experiment.
+        **options: Those of `simulate`.
+
+    Returns:
+        The result of all worlds, each as if it had run alone, bit for bit.
+
+    Raises:
+        InputError: They differ in something that worlds of one batch have in common.
+    """
+    first = experiments[0] if experiments else None
+    if first is None or len(experiments) != len(worlds):
+        raise InputError(
+            f"run_many: {len(worlds)} worlds and {len(experiments)} plants; give at least one, and as many of each"
+        )
+    _require_alike([each.plant for each in experiments], len(experiments), len(worlds))
+    common = structure(first.scenario, first.design)
+    for other in {id(each): each for each in experiments}.values():
+        field = differs(common, structure(other.scenario, other.design))
+        if field:
+            raise InputError(f"run_many: {field} differs, which worlds of one batch must have in common")
+    law, sensors, pushes = pooled(
+        [(each.law, each.scenario.sensors, tuple(each.scenario.push)) for each in experiments]
+    )
+    controller = first.controller(worlds, law=law, sensors=sensors)
+    return first._simulate([each.plant for each in experiments], controller, pushes, **options)
+
+
+def _require_alike(rigs: Sequence[Plant], plants: int, worlds: int) -> None:
+    """What the plants of one batch must have in common."""
+    if not plants or plants != worlds:
+        raise InputError(f"run_many: {worlds} worlds and {plants} plants; give at least one, and as many of each")
+    different = set(rigs)
+    integrators = {int(rig.model.opt.integrator) for rig in different}
+    alike = {(rig.model.opt.timestep, *rig.joint_names) for rig in different}
+    if len(alike) > 1 or len(integrators) > 1:
+        raise InputError(
+            "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"
+        )
+
+
+def load_rig(scenario: Scenario, like: Plant | None = None) -> Plant:
     """Load a scenario's rig.
+
+    Args:
+        scenario: The scenario.
+        like: A rig that may be of the same file, which then is not compiled again.
 
     Raises:
         InputError: `load_plant` refuses it; the scenario is named.
     """
     try:
         period = common_period(scenario) if scenario.plant.timestep_s is None else None
-        plant = load_plant(scenario.plant, period_s=period)
+        settings = scenario.plant
+        same = ("model", "lock_thrust_bearing")
+        if like is not None and all(getattr(like.settings, name) == getattr(settings, name) for name in same):
+            plant = like.changed(settings, period)
+            check_steps(scenario, plant.timestep)
+            return plant
+        plant = load_plant(settings, period_s=period)
         check_steps(scenario, plant.timestep)
         if plant.path.resolve().parent != folder("models").resolve():
             _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it

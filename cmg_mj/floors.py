@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 
@@ -134,19 +134,18 @@ class Floors:
     """Both floors of a run.
 
     Args:
-        noise: Of one sample of y1 and its acceleration.
+        noises: Of one sample of y1 and its acceleration, a world each.
         dt: Sample period [s].
-        n_worlds: How many worlds.
     """
 
-    def __init__(self, noise: TiltNoise, dt: float, n_worlds: int) -> None:
-        self._y1 = TiltFloor(dt, n_worlds)
-        self._acceleration = acceleration_floor(noise, dt)
+    def __init__(self, noises: Sequence[TiltNoise], dt: float) -> None:
+        self._y1 = TiltFloor(dt, len(noises))
+        self._acceleration = [acceleration_floor(noise, dt) for noise in noises]
         self.add = self._y1.add
 
     def errors(self, world: int) -> dict[str, tuple[float | None, float | None]]:
         """Of each floor the RMS error in the whole run and in the push windows of one world [rad/s]."""
-        return {FLOOR_Y1: self._y1.errors(world), FLOOR_ACCELERATION: (self._acceleration, self._acceleration)}
+        return {FLOOR_Y1: self._y1.errors(world), FLOOR_ACCELERATION: (self._acceleration[world],) * 2}
 
 
 def _edges(memory: int) -> list[int]:

@@ -26,7 +26,22 @@ def override(fields: dict[str, Any], setting: str) -> None:
         (value,) = tomllib.loads(f"value = {text}").values()
     except (ValueError, RecursionError):  # TOMLDecodeError is a ValueError
         value = text.strip()  # a bare word is a string
-    *sections, field = parts
+    assign(fields, name.strip(), value, f"--set {setting!r}")
+
+
+def assign(fields: dict[str, Any], name: str, value: Any, said: str) -> None:
+    """Give a field of a scenario a value.
+
+    Args:
+        fields: The TOML file's content, which is changed.
+        name: `section.field`; an element of a list by its number.
+        value: Its value.
+        said: What the user said, for messages.
+
+    Raises:
+        InputError: There is no such place.
+    """
+    *sections, field = name.split(".")
     place: Any = fields
     for i, section in enumerate(sections):
         if isinstance(place, list) and section.isdecimal() and int(section) < len(place):
@@ -36,8 +51,8 @@ def override(fields: dict[str, Any], setting: str) -> None:
             place = place.setdefault(section, [] if following and following[0].isdecimal() else {})
         else:
             there = f"; it has {len(place)} of them, counted from 0" if isinstance(place, list) else ""
-            raise InputError(f"--set {setting!r}: there is no {'.'.join(sections[: i + 1])}{there}")
+            raise InputError(f"{said}: there is no {'.'.join(sections[: i + 1])}{there}")
     if not isinstance(place, dict):
         example = f"{'.'.join(sections)}.0.torque_n_m=2.0" if isinstance(place, list) else "plant.timestep_s=0.0005"
-        raise InputError(f"--set {setting!r}: {'.'.join(sections)} is not a section; write for example {example}")
+        raise InputError(f"{said}: {'.'.join(sections)} is not a section; write for example {example}")
     place[field] = value

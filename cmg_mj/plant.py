@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass as plain_dataclass
 from functools import cached_property, partial
@@ -82,17 +83,41 @@ class Plant:
     """
 
     def __init__(self, settings: PlantSettings, path: Path, period_s: float | None = None) -> None:
-        self.settings = settings
         self.path = path
-        self.bias = math.radians(settings.equilibrium_bias_deg)
         self.model, self.hints = load_rig(path, lock=settings.lock_thrust_bearing)
-        own = float(self.model.opt.timestep)
+        self._as_filed = self.model
         self._resolve()
         self.reduced = self._read_reduced()
+        self._take(settings, period_s)
+
+    def changed(self, settings: PlantSettings, period_s: float | None = None) -> Plant:
+        """The same rig with other settings, without compiling its file again.
+
+        Args:
+            settings: They name the same model file, and take the thrust bearing alike.
+            period_s: Where they leave the physics step open, what whole steps must fill [s].
+
+        Returns:
+            Another plant.
+
+        Raises:
+            InputError: With these settings the physics fails.
+        """
+        other = copy.copy(self)
+        other.__dict__.pop("drawn_model", None)
+        other._take(settings, period_s)
+        return other
+
+    def _take(self, settings: PlantSettings, period_s: float | None) -> None:
+        """Change the model as the settings say, and fit the physics step."""
+        self.settings = settings
+        self.bias = math.radians(settings.equilibrium_bias_deg)
+        self.model = copy.copy(self._as_filed)
+        own = float(self.model.opt.timestep)
         vary(
             self.model,
             settings,
-            path,
+            self.path,
             tilt=self.tilt,
             gimbals=self._gimbals,
             flywheels=[cube.flywheel for cube in self.cubes],

@@ -57,7 +57,7 @@ class Rows:
         self._pieces: list[list[np.ndarray]] = []
 
     def add(
-        self, q: Sequence[Scalar], v: Sequence[Scalar], tick: Tick, torque: float, running: np.ndarray | None
+        self, q: Sequence[Scalar], v: Sequence[Scalar], tick: Tick, torque: Scalar, running: np.ndarray | None
     ) -> None:
         """Take one tick.
 
@@ -81,7 +81,7 @@ class Rows:
         q, v = self._columns(qs), self._columns(vs)
         *signals, estimates = zip(*ticks, strict=True)
         y1, y2, acceleration, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
-        push = np.broadcast_to(np.array(torques)[:, None], u.shape)
+        push = np.array([np.broadcast_to(torque, u.shape[1:]) for torque in torques])
         estimated = [self._columns(estimate) for estimate in zip(*estimates, strict=True)]
         x1 = q[self._rig.tilt] - self._rig.tilt_zero + self._bias
         x2 = v[self._rig.tilt]

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from cmg_mj.complaint import complaint
 from cmg_mj.errors import InputError
@@ -130,6 +130,11 @@ def parse_scenario(fields: Mapping[str, Any], where: str = "") -> Scenario:
         raise InputError(located(where, _clauses(wrong)))
     scenario._where = where
     return scenario
+
+
+def as_fields(scenario: Scenario) -> dict[str, Any]:
+    """A scenario as the content of a TOML file: what `parse_scenario` takes."""
+    return TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
 
 
 def _clauses(wrong: Iterable[str]) -> str:

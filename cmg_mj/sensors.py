@@ -18,7 +18,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.accelerometer import INSIDE_HZ, Accelerometer
-from cmg_mj.elementwise import Scalar, clip, digitise
+from cmg_mj.elementwise import Scalar, clip, digitise, radians
 from cmg_mj.fields import STRICT, Instant, NonNegative, Positive, Rate
 from cmg_mj.flicker import CORNERS_HZ, Flicker
 from cmg_mj.ideal import Ideal
@@ -86,7 +86,7 @@ class Fog:
     @property
     def sigma(self) -> float:
         """Standard deviation of one sample [rad/s]."""
-        return math.radians(self.angle_random_walk_deg_rth) / 60.0 * math.sqrt(self.rate_hz)
+        return radians(self.angle_random_walk_deg_rth) / 60.0 * math.sqrt(self.rate_hz)
 
     def meter(self) -> Callable[[Ideal, Sequence[Scalar]], Scalar]:
         """A function (ideal reading, standard normals) -> tilt rate [rad/s]. It remembers its low-pass."""
@@ -139,13 +139,13 @@ def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) 
         while True:
             yield ()
     single = isinstance(worlds, int)
+    different, places = np.unique([worlds] if single else worlds, return_inverse=True)
     generators = [
-        np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(world, stream)))
-        for world in ([worlds] if single else worlds)
+        np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(world), stream))) for world in different
     ]
     while True:
         drawn = np.stack([g.standard_normal((block, channels)) for g in generators], axis=-1)
-        yield from drawn[:, :, 0].tolist() if single else drawn
+        yield from drawn[:, :, 0].tolist() if single else drawn[:, :, places]
 
 
 class SampledSensor:

@@ -14,6 +14,7 @@ import numpy as np
 
 from cmg_mj.callback import installed
 from cmg_mj.controller import Controller, Tick
+from cmg_mj.elementwise import Scalar, where
 from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError, RunStopped, nearest
 from cmg_mj.floors import Floors
@@ -23,6 +24,7 @@ from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.references import RATES, References
 from cmg_mj.rows import Rows
+from cmg_mj.stacked import of_world
 from cmg_mj.timing import whole_steps
 from cmg_mj.trajectory import Trajectory
 from cmg_mj.worlds import ManyWorlds, OneWorld
@@ -162,18 +164,18 @@ class Result:
         ]
 
 
-def _moments(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, float]]:
-    """The moments at which the loop must look: (step, steps until the next moment, push torque)."""
-    changes = {0: 0.0, steps: 0.0}
+def _moments(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, Scalar]]:
+    """The moments at which the loop must look: (step, steps until the next, push torque, one or a world's each)."""
+    changes: dict[int, Scalar] = {0: 0.0, steps: 0.0}
     for push in pushes:
         for time, torque in ((push.start_s, push.torque_n_m), (push.end_s, -push.torque_n_m)):
             step = whole_steps(time, timestep, "push", f"{time:g} s")
             changes[step] = changes.get(step, 0.0) + torque
     edges = sorted(step for step in changes if step <= steps)
-    torque = 0.0
+    torque: Scalar = 0.0
     for start, end in itertools.pairwise(edges):
-        torque += changes[start]
-        held = torque if abs(torque) > 1e-12 else 0.0
+        torque = torque + changes[start]
+        held = where(abs(torque) > 1e-12, torque, 0.0)
         first = min(-(-start // beat) * beat, end)  # the first beat not before the push's edge
         if first > start:
             yield start, first - start, held
@@ -204,7 +206,7 @@ def simulate(
         controller: A fresh controller, made for one world or for as many as there are plants.
         duration_s: Simulated time [s].
         observers: Names of the controller's observer and companions.
-        pushes: Torques from outside.
+        pushes: Torques from outside; of many worlds a torque may be an array (n_worlds,).
         settings: What counts as settled and fallen.
         driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only).
         keep_trajectory: Whether to keep every tick; without it memory does not grow with the duration.
@@ -227,23 +229,24 @@ def simulate(
     worlds: Any = OneWorld(rig) if single else ManyWorlds(plants)
     fall = np.radians(settings.fall_angle_deg).item()
     dt = controller.law.dt
-    targets = {BIAS: [rig.apparent_bias(controller.sensors.accelerometer) for rig in plants]}
+    sensors = [of_world(controller.sensors, i) for i in range(len(plants))]
+    targets = {BIAS: [plant.apparent_bias(own.accelerometer) for plant, own in zip(plants, sensors, strict=True)]}
     limit = controller.law.rate_limit
-    accelerometer = controller.sensors.accelerometer
-    floors = Floors(rig.facts.noise(controller.sensors), max(dt, 1.0 / accelerometer.rate_hz), len(plants))
+    facts = rig.facts
+    floors = Floors([facts.noise(own) for own in sensors], max(dt, 1.0 / controller.sensors.accelerometer.rate_hz))
     metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, floors)
     beside = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds)
     rows = Rows(plants, observers, controller.extra_signals, metrics, beside, dt, keep=keep_trajectory, single=single)
     ends: list[Outcome | None] = [None] * len(plants)
     native = driver == "native"
-    torque = 0.0
+    torque: Scalar = 0.0
     step = 0
 
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
     try:
         with drive:
             for step, count, held in _moments(steps, controller.beat, pushes, timestep):
-                if held != torque:
+                if held is not torque:
                     torque = held
                     worlds.push(torque)
                 q, v = worlds.state()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from cmg_mj.errors import InputError
 from cmg_mj.law import Law
 from cmg_mj.observers.protocol import BIAS
@@ -33,6 +35,6 @@ def trim_of(trim_s: float, law: Law, extra_signals: Sequence[str]) -> tuple[int,
             f"controller.trim_s = {trim_s:g}: needs an observer in the loop that estimates the bias, "
             "such as adaptive; or set controller.trim_s=0"
         )
-    if k4 == 0.0:
+    if np.any(k4 == 0.0):
         raise InputError(f"controller.trim_s = {trim_s:g}: the gain on the integrator is zero")
     return 3 + list(extra_signals).index(BIAS), k1 / k4

@@ -93,8 +93,8 @@ class ManyWorlds:
         """Set the gimbal rates, each cube in its direction."""
         self._ctrl[:, self._servos] = np.multiply.outer(u, self._directions)
 
-    def push(self, torque: float) -> None:
-        """Set the torque on every frame."""
+    def push(self, torque: Scalar) -> None:
+        """Set the torque on the frames, one for all or (n_worlds,)."""
         self._applied[:, self._tilt] = torque
 
     def stop(self, worlds: np.ndarray) -> None:

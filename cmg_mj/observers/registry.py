@@ -118,6 +118,11 @@ def check_names(kind: str, names: Iterable[str]) -> None:
             raise InputError(f"observer.{name}: {kind} has no such parameter; {what}")
 
 
+def takes_noise(kind: str) -> bool:
+    """Whether an observer is told the noise of its sensors."""
+    return "noise" in inspect.signature(observer_class(kind)).parameters
+
+
 def _takes_any(cls: type) -> bool:
     kinds = [p.kind for p in inspect.signature(cls).parameters.values()]
     return inspect.Parameter.VAR_KEYWORD in kinds

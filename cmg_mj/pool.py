@@ -1,0 +1,84 @@
+"""Which worlds can run in one batch, and what they differ in as arrays (n_worlds,)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cmg_mj.design import Design
+from cmg_mj.law import Law
+from cmg_mj.observers.registry import takes_noise
+from cmg_mj.push import Push
+from cmg_mj.scenario import as_fields
+from cmg_mj.schema import Scenario
+from cmg_mj.sensors import Sensors
+from cmg_mj.stacked import stacked
+
+ARRAYS = frozenset(
+    {
+        "plant.equilibrium_bias_deg",
+        "plant.initial_tilt_deg",
+        "plant.gimbal_armature_kg_m2",
+        "plant.gimbal_friction_n_m",
+        "plant.gimbal_damping_n_m_s",
+        "plant.tilt_friction_n_m",
+        "plant.tilt_damping_n_m_s",
+        "plant.flywheel_imbalance_kg_m",
+        "controller.gains",
+        "controller.lqr",
+        "controller.rate_limit_rad_s",
+        "sensors.accelerometer.noise_density_ug_rthz",
+        "sensors.accelerometer.bias_mg",
+        "sensors.fog.angle_random_walk_deg_rth",
+        "push.torque_n_m",
+    }
+)
+"""Fields that worlds of one batch may differ in. Every other decides what is computed, or when."""
+
+UNUSED = frozenset({"title", "based_on", "versions", "compare"})
+
+
+def structure(scenario: Scenario, design: Design) -> dict[str, str]:
+    """What worlds that run together have in common.
+
+    Args:
+        scenario: The scenario of one world.
+        design: What was made of it.
+
+    Returns:
+        Field -> its value in words; worlds of which all are equal can be pooled.
+    """
+    found = {field: value for field, value in _leaves(as_fields(scenario)) if _structural(field)}
+    _, model, noise = design.given
+    found["the reduced model"] = repr(model)
+    for observer in (scenario.observer.kind, *scenario.companion_names()):
+        if takes_noise(observer):
+            found[f"the sensors' noise, which {observer} is told,"] = repr(noise)
+    return found
+
+
+def differs(a: Mapping[str, str], b: Mapping[str, str]) -> str | None:
+    """The first field in which two structures differ."""
+    return next((field for field in (*a, *b) if a.get(field) != b.get(field)), None)
+
+
+def pooled(
+    worlds: Sequence[tuple[Law, Sensors, tuple[Push, ...]]],
+) -> tuple[Law, Sensors, tuple[Push, ...]]:
+    """Law, sensors and pushes of many worlds as one, with arrays (n_worlds,) where they differ."""
+    laws, sensors, pushes = zip(*worlds, strict=True)
+    return stacked(laws), stacked(sensors), tuple(stacked(each) for each in zip(*pushes, strict=True))
+
+
+def _leaves(fields: Any, at: str = "") -> list[tuple[str, str]]:
+    if isinstance(fields, list) and fields and isinstance(fields[0], Mapping):
+        fields = {str(i): part for i, part in enumerate(fields)}
+    if not isinstance(fields, Mapping):
+        return [(at, repr(fields))]
+    return [leaf for name, value in fields.items() for leaf in _leaves(value, f"{at}.{name}" if at else name)]
+
+
+def _structural(field: str) -> bool:
+    parts = [part for part in field.split(".") if not part.isdecimal()]
+    inside = {".".join(parts[: i + 1]) for i in range(len(parts))}
+    return parts[0] not in UNUSED and not inside & ARRAYS

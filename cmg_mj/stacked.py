@@ -1,0 +1,70 @@
+"""Settings of many worlds as one: an array (n_worlds,) where the worlds differ."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from cmg_mj.errors import InputError
+
+T = TypeVar("T")
+
+
+def stacked(values: Sequence[T]) -> T:
+    """One value that stands for a value a world.
+
+    Args:
+        values: A world each: numbers, or tuples or frozen dataclasses of such.
+
+    Returns:
+        The value itself where all are equal; where numbers differ, an array (n_worlds,). No field is checked anew.
+
+    Raises:
+        InputError: The worlds differ in something that is no number.
+    """
+    first: Any = values[0]
+    if all(value is first or value == first for value in values):
+        return first
+    if dataclasses.is_dataclass(first):
+        made = object.__new__(type(first))
+        for field in dataclasses.fields(first):
+            try:
+                of_all = stacked([getattr(value, field.name) for value in values])
+            except InputError as error:
+                raise InputError(f"{field.name}: {error}") from error
+            object.__setattr__(made, field.name, of_all)
+        return made  # type: ignore[return-value]
+    if isinstance(first, tuple) and {len(value) for value in values} == {len(first)}:  # type: ignore[arg-type]
+        return tuple(map(stacked, zip(*values, strict=True)))  # type: ignore[call-overload,return-value]
+    if not all(type(value) in (int, float) for value in values):
+        raise InputError("must be the same in worlds that run together")
+    return np.array(values, dtype=float)  # type: ignore[return-value]
+
+
+def of_world(value: T, world: int) -> T:
+    """What a stacked value is in one world.
+
+    Args:
+        value: What `stacked` returned.
+        world: The world's index.
+
+    Returns:
+        The value, on floats.
+    """
+    if isinstance(value, np.ndarray):
+        return value[world].item()
+    if isinstance(value, tuple):
+        parts = tuple(of_world(part, world) for part in value)
+        return value if all(a is b for a, b in zip(parts, value, strict=True)) else parts  # type: ignore[return-value]
+    if not dataclasses.is_dataclass(value):
+        return value
+    parts = {field.name: of_world(getattr(value, field.name), world) for field in dataclasses.fields(value)}
+    if all(part is getattr(value, name) for name, part in parts.items()):
+        return value
+    made = object.__new__(type(value))
+    for name, part in parts.items():
+        object.__setattr__(made, name, part)
+    return made  # type: ignore[return-value]
