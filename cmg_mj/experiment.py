@@ -15,7 +15,7 @@ from cmg_mj.board import Board, on_a_board
 from cmg_mj.controller import Controller
 from cmg_mj.design import Design, design
 from cmg_mj.differences import differences
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, nearest
 from cmg_mj.grid import check_steps, common_period
 from cmg_mj.law import Law
 from cmg_mj.loop_check import hints
@@ -150,6 +150,9 @@ class Experiment:
         if len({len(values) for values in lists}) > 1:
             raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world")
         ours = {field.name for field in dataclasses.fields(self.scenario.plant)}
+        for name in vary:
+            if "." not in name and name not in ours and name not in Scenario.model_fields:
+                raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, ours)}")
         names = [f"plant.{name}" if name in ours else name for name in vary]
         made: dict[str, Experiment] = {}  # by what a value looks like: a wrong one may not be hashable
         experiments = []

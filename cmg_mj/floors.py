@@ -145,7 +145,8 @@ class Floors:
 
     def errors(self, world: int) -> dict[str, tuple[float | None, float | None]]:
         """Of each floor the RMS error in the whole run and in the push windows of one world [rad/s]."""
-        return {FLOOR_Y1: self._y1.errors(world), FLOOR_ACCELERATION: (self._acceleration[world],) * 2}
+        of_both = self._acceleration[world]
+        return {FLOOR_Y1: self._y1.errors(world), FLOOR_ACCELERATION: (of_both, of_both)}
 
 
 def _edges(memory: int) -> list[int]:

@@ -104,7 +104,7 @@ def test_varied_rigs_are_those_of_their_own_scenarios() -> None:
 
 
 def test_equal_settings_share_one_rig() -> None:
-    rigs = experiment().rigs({"equilibrium_bias_deg": BIASES})
+    rigs = [each.plant for each in experiment().varied({"equilibrium_bias_deg": BIASES})]
     assert rigs[0] is rigs[1]
     assert rigs[2] is rigs[3] is not rigs[0]
 
@@ -114,6 +114,10 @@ def test_equal_settings_share_one_rig() -> None:
     [
         ({"equilibrium_bias_dg": [0.0, 1.0]}, "'equilibrium_bias_dg': no field of .plant.; did you mean"),
         ({"settings": [1, 2]}, "no field of"),
+        ({"sensors.encodr.latency_s": [0.0, 0.005]}, "sensors.encodr: no such field; did you mean 'encoder'"),
+        ({"push.3.torque_n_m": [0.0, 0.005]}, "there is no push.3; it has 0 of them"),
+        ({"sensors.encoder.latency_s": [0.0, 0.005]}, "sensors.encoder.latency_s differs, which worlds of one batch"),
+        ({"observer.k1": [20.0, 21.0]}, "observer.k1 differs"),
         ({"equilibrium_bias_deg": 1.0}, "must be lists of values by field"),
         ({"equilibrium_bias_deg": "ab"}, "must be lists of values by field"),
         ({}, "must be lists of values by field"),
@@ -121,8 +125,8 @@ def test_equal_settings_share_one_rig() -> None:
         ({"equilibrium_bias_deg": [0.0]}, "2 worlds and 1 plants"),
         ({"equilibrium_bias_deg": [0.0, 90.0]}, "plant.equilibrium_bias_deg = 90.*must be"),
         ({"equilibrium_bias_deg": [[0.0], 1.0]}, "plant.equilibrium_bias_deg = "),
-        ({"timestep_s": [0.0005, 0.0005]}, "must have the scenario's joints and timestep_s"),
-        ({"model": ["single_gimbal.xml"] * 2}, "must have the scenario's joints and timestep_s"),
+        ({"timestep_s": [0.0005, 0.001]}, "must have the scenario's joints and timestep_s"),
+        ({"model": ["scissored_pair.xml", "single_gimbal.xml"]}, "must have the scenario's joints and timestep_s"),
         ({"integrator": ["RK4", "Euler"]}, "one integrator in common"),
     ],
 )

@@ -55,7 +55,8 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
     quiet: dict[str, Result] = {}
     for i, name in enumerate(OBSERVERS):
         prepared = experiment(settings, name)
-        rigs = prepared.rigs({"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds)})
+        biases = np.repeat([*BIASES_DEG, SHOWN_DEG], worlds)
+        rigs = [each.plant for each in prepared.varied({"equilibrium_bias_deg": biases})]
         cases = len(BIASES_DEG) + 1
         gaps = np.repeat([*[0.0] * len(BIASES_DEG), gap_rad()], worlds)
         *own, gap[name] = run_behind_a_gap(prepared, [*range(worlds)] * cases, gaps, rigs).groups(cases)
