@@ -158,12 +158,22 @@ class Experiment:
         experiments = []
         for row in zip(*lists, strict=True):
             if repr(row) not in made:
-                made[repr(row)] = self._with(dict(zip(names, row, strict=True)))
+                made[repr(row)] = self.with_values(dict(zip(names, row, strict=True)))
             experiments.append(made[repr(row)])
         return experiments
 
-    def _with(self, values: Mapping[str, Any]) -> Experiment:
-        """The same with other values of some fields."""
+    def with_values(self, values: Mapping[str, Any]) -> Experiment:
+        """The same with other values of some fields.
+
+        Args:
+            values: By field, named as with `--set`.
+
+        Returns:
+            Another experiment; a model file that stays the same is not compiled again.
+
+        Raises:
+            InputError: There is no such field, or a value is not allowed.
+        """
         fields = as_fields(self.scenario)
         for name, value in values.items():
             assign(fields, name, value, f"vary: {name!r}")

@@ -48,7 +48,11 @@ def structure(scenario: Scenario, design: Design) -> dict[str, str]:
     Returns:
         Field -> its value in words; worlds of which all are equal can be pooled.
     """
-    found = {field: value for field, value in _leaves(as_fields(scenario)) if _structural(field)}
+    found = {
+        field: value
+        for field, value in _leaves(as_fields(scenario))
+        if field.split(".")[0] not in UNUSED and not pools(field)
+    }
     _, model, noise = design.given
     found["the reduced model"] = repr(model)
     for observer in (scenario.observer.kind, *scenario.companion_names()):
@@ -78,7 +82,7 @@ def _leaves(fields: Any, at: str = "") -> list[tuple[str, str]]:
     return [leaf for name, value in fields.items() for leaf in _leaves(value, f"{at}.{name}" if at else name)]
 
 
-def _structural(field: str) -> bool:
+def pools(field: str) -> bool:
+    """Whether worlds of one batch may differ in a field."""
     parts = [part for part in field.split(".") if not part.isdecimal()]
-    inside = {".".join(parts[: i + 1]) for i in range(len(parts))}
-    return parts[0] not in UNUSED and not inside & ARRAYS
+    return any(".".join(parts[: i + 1]) in ARRAYS for i in range(len(parts)))

@@ -1,0 +1,157 @@
+"""What a sweep is to find out: a scenario, what is varied in it and how, the observers, the worlds."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from cmg_mj.errors import InputError
+from cmg_mj.pool import pools
+from cmg_mj.schema import Scenario
+from cmg_mj.sweep.axes import Axis
+
+Design = Literal["grid", "sample", "sobol"]
+MOST_TRIALS = 1_000_000
+"""Beyond it a sweep must be asked for twice (`--yes`)."""
+CHUNK = 1024
+"""Trials that are computed and kept together: so many fill a batch, and take minutes at most."""
+
+Point = dict[str, Any]
+"""Field -> its value."""
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Trials of one observer that are computed and kept together.
+
+    Attributes:
+        number: Its place among all.
+        observer: The observer in the loop.
+        trials: (number of the point, world), each.
+    """
+
+    number: int
+    observer: str
+    trials: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A sweep.
+
+    Attributes:
+        scenario: What every trial starts from.
+        axes: What is varied.
+        observers: Those in the loop.
+        worlds: Trials a point and observer: world i has the same noise at every point, for every observer.
+        design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges. `sobol`: a design for
+            Sobol indices.
+        n: Points of the design; of one for indices that many times the number of axes and two.
+    """
+
+    scenario: Scenario
+    axes: tuple[Axis, ...]
+    observers: tuple[str, ...]
+    worlds: int
+    design: Design = "grid"
+    n: int = 0
+
+    def __post_init__(self) -> None:
+        """See that design and axes fit.
+
+        Raises:
+            InputError: They do not.
+        """
+        if not self.axes:
+            raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
+        fields = [axis.field for axis in self.axes]
+        twice = next((field for i, field in enumerate(fields) if field in fields[:i]), None)
+        if twice is not None:
+            raise InputError(f"--vary {twice}: given twice")
+        for axis in self.axes:
+            if axis.is_range and self.design == "grid":
+                raise InputError(
+                    f"--vary {axis.field}: a range without a count is for --sample and --sobol; write first:last:count"
+                )
+            if not axis.is_range and self.design != "grid":
+                raise InputError(f"--vary {axis.field}: --{self.design} needs a range low:high, not values")
+        if self.design == "sobol" and (self.n < 2 or self.n & (self.n - 1)):
+            raise InputError(f"--sobol {self.n}: must be a power of two, such as {_power_near(self.n)}")
+
+    @cached_property
+    def points(self) -> list[Point]:
+        """What is varied, a point each."""
+        fields = [axis.field for axis in self.axes]
+        if self.design == "grid":
+            rows: Any = itertools.product(*(axis.values for axis in self.axes))
+        else:
+            shares = _sampled(len(fields), self.n, self.scenario.seed, indices=self.design == "sobol")
+            rows = zip(*(axis.at(share) for axis, share in zip(self.axes, shares.T, strict=True)), strict=True)
+        return [dict(zip(fields, row, strict=True)) for row in rows]
+
+    @property
+    def cells(self) -> int:
+        """Points times observers."""
+        if self.design == "grid":
+            points = math.prod(len(axis.values) for axis in self.axes)
+        else:
+            points = self.n * (len(self.axes) + 2 if self.design == "sobol" else 1)
+        return points * len(self.observers)
+
+    @property
+    def trials(self) -> int:
+        """How many runs it takes."""
+        return self.cells * self.worlds
+
+    @property
+    def chunks(self) -> list[Chunk]:
+        """All trials: those that can run in one batch stand together."""
+        apart = [axis.field for axis in self.axes if not pools(axis.field)]
+        order = sorted(range(len(self.points)), key=lambda point: [repr(self.points[point][field]) for field in apart])
+        found: list[Chunk] = []
+        for observer in self.observers:
+            for trials in _in_pieces(((point, world) for point in order for world in range(self.worlds)), CHUNK):
+                found.append(Chunk(len(found), observer, trials))
+        return found
+
+    def as_fields(self, scenario: Mapping[str, Any]) -> dict[str, Any]:
+        """As a study file says it, with the scenario as given."""
+        how: dict[str, Any] = {"observers": list(self.observers), "worlds": self.worlds, "design": self.design}
+        if self.design != "grid":
+            how["n"] = self.n
+        return {"sweep": how, "vary": {axis.field: axis.said() for axis in self.axes}, "scenario": dict(scenario)}
+
+
+def _sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray:
+    """Points in the unit cube, evenly spread, (n_points, dimensions).
+
+    For indices they are those of Saltelli's scheme, as `scipy.stats.sobol_indices` wants them: A, B, then A with each
+    column in turn from B.
+    """
+    from scipy.stats import qmc  # half a second
+
+    if not indices:
+        import warnings
+
+        with warnings.catch_warnings():  # that n is no power of two
+            warnings.simplefilter("ignore", UserWarning)
+            return qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(n)
+    both = qmc.Sobol(2 * dimensions, rng=np.random.default_rng(seed)).random(n)
+    a, b = both[:, :dimensions], both[:, dimensions:]
+    crossed = [np.where(np.arange(dimensions) == i, b, a) for i in range(dimensions)]
+    return np.concatenate([a, b, *crossed])
+
+
+def _in_pieces(trials: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[tuple[int, int], ...]]:
+    while piece := tuple(itertools.islice(trials, size)):
+        yield piece
+
+
+def _power_near(n: int) -> int:
+    return 2 ** max(1, round(math.log2(max(n, 2))))

@@ -1,0 +1,75 @@
+"""Trials as a table: `trials.parquet`, a row a trial."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cmg_mj.summary_keys import KEYS
+from cmg_mj.sweep.study import Study
+from cmg_mj.sweep.work import COLUMNS
+from cmg_mj.trajectory import whole_file
+from cmg_mj.worlds_table import FIRST
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+FIGURES = [*(key for key in KEYS if key not in ("fell_fraction", "stopped_fraction")), "bias_deg"]
+"""Of one trial."""
+
+
+def schema_of(study: Study) -> pa.Schema:
+    """The columns: the point's number, what is varied, who ran and how it ended, the figures."""
+    import pyarrow as pa
+
+    varied = [(axis.field, _type_of([axis.low] if axis.is_range else axis.values)) for axis in study.axes]
+    known = [(name, FIRST[name]) for name in COLUMNS]
+    return pa.schema([("point", "int64"), *varied, *known, *((name, "float64") for name in FIGURES)])
+
+
+def _type_of(values: Sequence[Any]) -> str:
+    if all(isinstance(value, bool) for value in values):
+        return "bool"
+    if all(type(value) is int for value in values):
+        return "int64"
+    if all(type(value) in (int, float) for value in values):
+        return "float64"
+    return "string"
+
+
+def table_of(study: Study, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
+    """Rows as a table; a figure that a trial does not have is null."""
+    import pyarrow as pa
+
+    kept = list(rows)
+    schema = schema_of(study)
+    texts = {field.name for field in schema if str(field.type) == "string"}
+
+    def column(name: str) -> list[Any]:
+        values = [row.get(name) for row in kept]
+        return (
+            [value if value is None or isinstance(value, str) else repr(value) for value in values]
+            if name in texts
+            else values
+        )
+
+    return pa.table({name: column(name) for name in schema.names}, schema=schema)
+
+
+def write_table(path: Path, table: pa.Table) -> None:
+    """Write Parquet, whole or not at all."""
+    import pyarrow.parquet as pq
+
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        pq.write_table(table, file)
+
+
+def merge(parts: Sequence[Path], path: Path) -> None:
+    """Write many files of the same columns as one, a row group each, without holding them all."""
+    import pyarrow.parquet as pq
+
+    with path.open("wb") as file, pq.ParquetWriter(file, pq.read_schema(parts[0])) as writer:
+        for part in parts:
+            writer.write_table(pq.read_table(part))

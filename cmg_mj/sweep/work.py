@@ -1,0 +1,108 @@
+"""One chunk computed: a row a trial."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from cmg_mj.errors import InputError, raised
+from cmg_mj.experiment import Experiment, prepare, run_together
+from cmg_mj.pool import structure
+from cmg_mj.sweep.study import Chunk, Point, Study
+from cmg_mj.worlds_table import FIRST
+
+if TYPE_CHECKING:
+    from cmg_mj.simulate import Result
+
+REFUSED = "refused"
+"""How a trial ends whose values do not fit each other: it never begins."""
+
+
+def compute(study: Study, chunk: Chunk) -> list[dict[str, Any]]:
+    """Run the trials of a chunk.
+
+    What fails is a row with its reason: values that do not fit, a rig whose physics fails, an observer that raises.
+
+    Args:
+        study: The sweep.
+        chunk: Which of its trials.
+
+    Returns:
+        A row a trial, in the chunk's order: its point's number, what is varied, and the figures of its run.
+    """
+    base = prepare(study.scenario.with_observer(chunk.observer).model_copy(update={"companions": []}))
+    found: dict[tuple[int, int], dict[str, Any]] = {}
+    pools: dict[str, list[tuple[int, int]]] = {}
+    experiments: dict[int, Experiment] = {}
+    refused: dict[int, str] = {}
+    for trial in chunk.trials:
+        number = trial[0]
+        if number in refused:
+            continue
+        if number not in experiments:
+            try:
+                experiments[number] = base.with_values(study.points[number])
+            except InputError as error:
+                refused[number] = str(error)
+                continue
+        pools.setdefault(_pool_of(experiments[number]), []).append(trial)
+    for trials in pools.values():
+        for trial, row in zip(trials, _run([experiments[number] for number, _ in trials], trials), strict=True):
+            found[trial] = row
+    for trial in chunk.trials:
+        if trial[0] in refused:
+            found[trial] = _unfinished(REFUSED, refused[trial[0]])
+    return [
+        {"point": number, **_plain(study.points[number]), **_identity(study, chunk, world), **found[number, world]}
+        for number, world in chunk.trials
+    ]
+
+
+def lost(study: Study, chunk: Chunk, reason: str) -> list[dict[str, Any]]:
+    """The rows of a chunk that could not be computed."""
+    return [
+        {
+            "point": number,
+            **_plain(study.points[number]),
+            **_identity(study, chunk, world),
+            **_unfinished("stopped", reason),
+        }
+        for number, world in chunk.trials
+    ]
+
+
+def _run(experiments: Sequence[Experiment], trials: Sequence[tuple[int, int]]) -> Iterable[dict[str, Any]]:
+    worlds = [world for _, world in trials]
+    try:
+        result: Result = run_together(experiments, worlds, keep_trajectory=False)
+    except Exception as error:  # a user's observer may fail in any way
+        return [_unfinished("stopped", raised(error)) for _ in trials]
+    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        raise KeyboardInterrupt
+    taken = {"observer", "rides_along_in", "world", "seed"}
+    return [{key: value for key, value in row.items() if key not in taken} for row in result.rows()]
+
+
+def _pool_of(experiment: Experiment) -> str:
+    """Worlds with the same can run in one batch."""
+    physics = experiment.plant.model.opt
+    return repr((structure(experiment.scenario, experiment.design), physics.timestep, int(physics.integrator)))
+
+
+def _identity(study: Study, chunk: Chunk, world: int) -> dict[str, Any]:
+    return {"observer": chunk.observer, "world": world, "seed": study.scenario.seed}
+
+
+def _unfinished(outcome: str, reason: str) -> dict[str, Any]:
+    return {"outcome": outcome, "stood": False, "end_time_s": 0.0, "reason": reason}
+
+
+def _plain(point: Point) -> Point:
+    """As a table can hold it: a list is its text."""
+    return {
+        field: value if isinstance(value, (int, float, str, bool)) else repr(value) for field, value in point.items()
+    }
+
+
+COLUMNS = [name for name in FIRST if name != "rides_along_in"]
+"""Of a trial, beside what is varied, before its figures."""
