@@ -50,7 +50,7 @@ class Study:
         axes: What is varied.
         observers: Those in the loop.
         worlds: Trials a point and observer: world i has the same noise at every point, for every observer.
-        design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges. `sobol`: a design for
+        design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges. `sobol`: one for
             Sobol indices.
         n: Points of the design; of one for indices that many times the number of axes and two.
     """

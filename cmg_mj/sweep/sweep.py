@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +17,12 @@ from cmg_mj.errors import InputError
 from cmg_mj.experiment import prepare
 from cmg_mj.sweep.study import Chunk, Study
 from cmg_mj.sweep.trials import merge, table_of, write_table
-from cmg_mj.sweep.work import compute, lost
+from cmg_mj.sweep.work import compute
 from cmg_mj.trajectory import whole_file
 
 STUDY, CHUNKS = "study.toml", "chunks"
-ATTEMPTS = 3
-"""A chunk that ends its process so often is given up: its trials are rows with a reason."""
-
-OnProgress = Callable[[int, int], None]
-"""(trials done, trials in all)."""
+TRIALS = "trials.parquet"
+"""Files of a sweep's folder."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class Store:
         """Begin, or go on with what is there.
 
         Returns:
-            How many chunks are finished.
+            How many trials are finished.
 
         Raises:
             InputError: The folder has another study.
@@ -58,55 +56,48 @@ class Store:
             with whole_file(path) as temporary:
                 temporary.write_text(tomli_w.dumps(asked), encoding="utf-8")
         (self.folder / CHUNKS).mkdir(exist_ok=True)
-        return sum(self.path(chunk).exists() for chunk in self.study.chunks)
+        return sum(len(chunk.trials) for chunk in self.study.chunks if self.path(chunk).exists())
 
     def path(self, chunk: Chunk) -> Path:
         """The finished chunk's file."""
         return self.folder / CHUNKS / f"{chunk.number:06d}.parquet"
 
-    def finish(self, chunk: Chunk) -> None:
+    def finish(self, chunk: Chunk, on_progress: Callable[[float], None] | None = None) -> None:
         """Compute a chunk and keep it."""
-        begun = self.folder / CHUNKS / f"{chunk.number:06d}.begun"
-        attempts = begun.stat().st_size if begun.exists() else 0
-        with begun.open("ab") as file:  # a byte an attempt
-            file.write(b".")
-        if attempts >= ATTEMPTS:
-            rows = lost(self.study, chunk, f"its process has ended {attempts} times while these trials ran")
-        else:
-            rows = compute(self.study, chunk)
-        write_table(self.path(chunk), table_of(self.study, rows))
-        begun.unlink()
+        write_table(self.path(chunk), table_of(self.study, compute(self.study, chunk, on_progress)))
+
+    def clear(self) -> None:
+        """Take the chunks away, once all their trials are in one table."""
+        for path in (self.folder / CHUNKS).iterdir():
+            path.unlink()
+        (self.folder / CHUNKS).rmdir()
 
 
-def run(folder: Path, study: Study, on_progress: OnProgress | None = None) -> int:
+def run(store: Store, on_progress: Callable[[float], None] | None = None) -> None:
     """Run what is not finished.
 
     Args:
-        folder: Where the chunks are kept.
-        study: The sweep.
-        on_progress: Called after every chunk; a KeyboardInterrupt ends the sweep, what is finished is kept.
-
-    Returns:
-        How many trials had been finished before.
+        store: The sweep's, opened.
+        on_progress: Called after every tick with the trials done; a KeyboardInterrupt it raises ends the sweep, and what
+            is finished is kept.
     """
-    store = Store(folder, study)
-    store.open()
-    before = done = sum(len(chunk.trials) for chunk in study.chunks if store.path(chunk).exists())
-    for chunk in study.chunks:
-        if on_progress:
-            on_progress(done, study.trials)
+    done = 0
+    for chunk in store.study.chunks:
+        size = len(chunk.trials)
         if not store.path(chunk).exists():
-            store.finish(chunk)
-            done += len(chunk.trials)
-    if on_progress:
-        on_progress(done, study.trials)
-    return before
+            store.finish(chunk, None if on_progress is None else partial(_inside, on_progress, done, size))
+        done += size
+        if on_progress:
+            on_progress(done)
 
 
-def merged(folder: Path, study: Study, path: Path) -> None:
+def _inside(on_progress: Callable[[float], None], done: int, size: int, share: float) -> None:
+    on_progress(done + share * size)
+
+
+def merged(store: Store, path: Path) -> None:
     """Write all trials of a finished sweep as one file."""
-    store = Store(folder, study)
-    merge([store.path(chunk) for chunk in study.chunks], path)
+    merge([store.path(chunk) for chunk in store.study.chunks], path)
 
 
 def sweep(study: Study) -> pa.Table:
@@ -150,6 +141,11 @@ def _flat(fields: Any, at: str = "") -> dict[str, Any]:
     if not isinstance(fields, Mapping) or at == "vary":
         return {at: fields}
     return {name: leaf for key, part in fields.items() for name, leaf in _flat(part, f"{at}.{key}".strip(".")).items()}
+
+
+def read_chunks(store: Store) -> pa.Table:
+    """The trials of a finished sweep whose chunks are not merged."""
+    return pa.concat_tables(pq.read_table(store.path(chunk)) for chunk in store.study.chunks)
 
 
 def read_trials(path: Path) -> pa.Table:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from cmg_mj.errors import InputError, raised
@@ -18,7 +19,7 @@ REFUSED = "refused"
 """How a trial ends whose values do not fit each other: it never begins."""
 
 
-def compute(study: Study, chunk: Chunk) -> list[dict[str, Any]]:
+def compute(study: Study, chunk: Chunk, on_progress: Callable[[float], None] | None = None) -> list[dict[str, Any]]:
     """Run the trials of a chunk.
 
     What fails is a row with its reason: values that do not fit, a rig whose physics fails, an observer that raises.
@@ -26,6 +27,7 @@ def compute(study: Study, chunk: Chunk) -> list[dict[str, Any]]:
     Args:
         study: The sweep.
         chunk: Which of its trials.
+        on_progress: Called after every tick with the share of the chunk that is done.
 
     Returns:
         A row a trial, in the chunk's order: its point's number, what is varied, and the figures of its run.
@@ -47,8 +49,10 @@ def compute(study: Study, chunk: Chunk) -> list[dict[str, Any]]:
                 continue
         pools.setdefault(_pool_of(experiments[number]), []).append(trial)
     for trials in pools.values():
-        for trial, row in zip(trials, _run([experiments[number] for number, _ in trials], trials), strict=True):
-            found[trial] = row
+        done, share = len(found) / len(chunk.trials), len(trials) / len(chunk.trials) / study.scenario.duration_s
+        tick = partial(_inside, on_progress, done, share) if on_progress else None
+        rows = _run([experiments[number] for number, _ in trials], trials, tick)
+        found |= zip(trials, rows, strict=True)
     for trial in chunk.trials:
         if trial[0] in refused:
             found[trial] = _unfinished(REFUSED, refused[trial[0]])
@@ -58,23 +62,16 @@ def compute(study: Study, chunk: Chunk) -> list[dict[str, Any]]:
     ]
 
 
-def lost(study: Study, chunk: Chunk, reason: str) -> list[dict[str, Any]]:
-    """The rows of a chunk that could not be computed."""
-    return [
-        {
-            "point": number,
-            **_plain(study.points[number]),
-            **_identity(study, chunk, world),
-            **_unfinished("stopped", reason),
-        }
-        for number, world in chunk.trials
-    ]
+def _inside(on_progress: Callable[[float], None], done: float, share: float, time: float) -> None:
+    on_progress(done + share * time)
 
 
-def _run(experiments: Sequence[Experiment], trials: Sequence[tuple[int, int]]) -> Iterable[dict[str, Any]]:
+def _run(
+    experiments: Sequence[Experiment], trials: Sequence[tuple[int, int]], tick: Callable[[float], None] | None
+) -> Iterable[dict[str, Any]]:
     worlds = [world for _, world in trials]
     try:
-        result: Result = run_together(experiments, worlds, keep_trajectory=False)
+        result: Result = run_together(experiments, worlds, keep_trajectory=False, on_progress=tick)
     except Exception as error:  # a user's observer may fail in any way
         return [_unfinished("stopped", raised(error)) for _ in trials]
     if any(outcome.kind == "interrupted" for outcome in result.outcomes):

@@ -1,0 +1,137 @@
+"""The command that sweeps: a scenario on many rigs, at many noises, with many observers."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, claim, named, names_of, of_a_run
+from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code
+from cmg_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from cmg_mj.sweep.study import Study
+
+WORLDS = 20
+
+
+@click.command(short_help="Many worlds: fields of a scenario varied, every observer, with intervals.")
+@of_a_run
+@click.option(
+    "--vary",
+    "varied",
+    multiple=True,
+    metavar="FIELD=VALUES",
+    help="A field and its values: a list 0,0.5,1, a range first:last:count, a logarithmic one log:first:last:count; for "
+    "--sample and --sobol low:high. May be given again: every combination is run.",
+)
+@click.option("--observers", metavar="NAMES", help="Names with commas between, or all.  [default: the scenario's own]")
+@click.option("--worlds", type=click.IntRange(1, MOST_WORLDS), metavar="N", help=f"Worlds a cell.  [default: {WORLDS}]")
+@click.option("--sample", type=click.IntRange(1), metavar="N", help="N points of a quasi-random design of the ranges.")
+@click.option("--sobol", type=click.IntRange(1), metavar="N", help="A design for Sobol indices, N a power of two.")
+@click.option("--plan", is_flag=True, help="Say what it would take, and run nothing.")
+@click.option("--yes", is_flag=True, help="Run it even if it is very large.")
+@users_code()
+def sweep(
+    chosen: Chosen,
+    varied: tuple[str, ...],
+    observers: str | None,
+    worlds: int | None,
+    sample: int | None,
+    sobol: int | None,
+    plan: bool,
+    yes: bool,
+) -> None:
+    """Run SCENARIO, or a study file that a sweep has written, in every cell: every point with every observer.
+
+    World i has the same noise in every cell. Writes a folder: trials.parquet (a row a trial), cells.parquet (means with
+    95 % intervals, shares of falls, paired differences to the best), report.md, and study.toml, which reruns. The same
+    command again goes on where it was stopped.
+    """
+    from cmg_mj.sweep.plan import expected
+    from cmg_mj.sweep.report import FILES, save
+    from cmg_mj.sweep.study import MOST_TRIALS
+    from cmg_mj.sweep.sweep import Store, read_chunks, run
+
+    study = _study(chosen, varied, observers, worlds, sample, sobol)
+    if plan:
+        takes = expected(study)
+        show(takes, _plan_text(takes), chosen.as_json)
+        return
+    if study.trials > MOST_TRIALS and not yes:
+        raise InputError(
+            f"{study.cells} cells of {study.worlds} worlds: {study.trials} trials; beyond {MOST_TRIALS} say --yes "
+            "(--plan says what it would take)"
+        )
+    place = Path("runs") / f"sweep-{Path(chosen.name).stem}" if chosen.out is None else named(chosen.out)
+    folder = claim(place, FILES)
+    store = Store(place, study)
+    before = store.open()
+    if before:
+        say(f"{before} of {study.trials} trials are there from before")
+    with CtrlC() as ctrl_c:
+        try:
+            with progress(f"sweep {chosen.name}", study.trials, ctrl_c) as on_progress:
+                run(store, on_progress)
+        except KeyboardInterrupt:
+            say(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
+            sys.exit(INTERRUPTED)
+        at = save(folder, store, read_chunks(store))
+    from cmg_mj.sweep.cells import Trials, cells_of
+    from cmg_mj.sweep.report import cells_markdown
+    from cmg_mj.sweep.sweep import read_trials
+
+    rows = cells_of(Trials(study, read_trials(at / "trials.parquet")))
+    show({"trials": study.trials, "cells": rows}, cells_markdown(study, rows), chosen.as_json)
+    say_written(folder, at, f"Read {at / 'report.md'}", chosen.as_json)
+
+
+def _study(
+    chosen: Chosen,
+    varied: tuple[str, ...],
+    observers: str | None,
+    worlds: int | None,
+    sample: int | None,
+    sobol: int | None,
+) -> Study:
+    from cmg_mj.sweep.axes import parse_axis
+    from cmg_mj.sweep.file import axes_of, design_of, scenario_of, study_file
+    from cmg_mj.sweep.study import Study
+
+    if sample is not None and sobol is not None:
+        raise InputError("--sample and --sobol: one of them")
+    axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
+    fields = study_file(chosen.name)
+    asked: dict[str, Any] = {}
+    if fields is None:
+        scenario = chosen.scenario()
+    else:
+        if chosen.settings:
+            raise InputError("--set: change the study file's [scenario] instead")
+        scenario = scenario_of(chosen.name, fields)
+        if chosen.seed is not None:
+            scenario = scenario.model_copy(update={"seed": chosen.seed})
+        asked = fields.get("sweep", {})
+        axes = axes or axes_of(chosen.name, fields)
+    design, n = design_of(chosen.name, asked)
+    if sample is not None or sobol is not None:
+        design, n = ("sample", sample or 0) if sample is not None else ("sobol", sobol or 0)
+    names = asked.get("observers") or [scenario.observer.kind]
+    if observers is not None:
+        names = names_of(observers)
+    return Study(scenario, tuple(axes), tuple(names), worlds or asked.get("worlds", WORLDS), design, n)
+
+
+def _split(setting: str) -> tuple[str, str]:
+    field, _, values = setting.partition("=")
+    return field.strip(), values
+
+
+def _plan_text(takes: dict[str, Any]) -> str:
+    return (
+        f"{takes['points']} points x {takes['observers']} observers x {takes['worlds']} worlds = {takes['trials']} trials "
+        f"in {takes['chunks']} chunks; about {takes['minutes']:.2g} minutes on this machine, {takes['memory_mb']:.0f} MB"
+    )
