@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from cmg_mj.schema import Scenario
     from cmg_mj.sensors import Accelerometer, Encoder, Fog, Sensors
     from cmg_mj.simulate import Outcome, Result
+    from cmg_mj.sweeps.swept import Swept, sweep
     from cmg_mj.tilt import RadialTilt
     from cmg_mj.trajectory import Trajectory
 
@@ -46,6 +47,7 @@ _HOMES = {
     "schema": ("Scenario",),
     "sensors": ("Accelerometer", "Encoder", "Fog", "Sensors"),
     "simulate": ("Outcome", "Result"),
+    "sweeps.swept": ("Swept", "sweep"),
     "tilt": ("RadialTilt",),
     "trajectory": ("Trajectory",),
 }
@@ -75,6 +77,7 @@ __all__ = [
     "RunStopped",
     "Scenario",
     "Sensors",
+    "Swept",
     "Trajectory",
     "control",
     "installed",
@@ -86,6 +89,7 @@ __all__ = [
     "prepare",
     "read_log",
     "replay_log",
+    "sweep",
 ]
 
 

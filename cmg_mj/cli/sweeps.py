@@ -13,9 +13,7 @@ from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, 
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.sweep.study import Study
-
-WORLDS = 20
+    from cmg_mj.sweeps.study import Study
 
 
 @click.command(short_help="Many worlds: fields of a scenario varied, every observer, with intervals.")
@@ -25,11 +23,11 @@ WORLDS = 20
     "varied",
     multiple=True,
     metavar="FIELD=VALUES",
-    help="A field and its values: a list 0,0.5,1, a range first:last:count, a logarithmic one log:first:last:count; for "
-    "--sample and --sobol low:high. May be given again: every combination is run.",
+    help="A field and its values: a list 0,0.5,1; a range first:last:count, a logarithmic one log:first:last:count; for"
+    " --sample and --sobol low:high. May be given again: every combination is run.",
 )
 @click.option("--observers", metavar="NAMES", help="Names with commas between, or all.  [default: the scenario's own]")
-@click.option("--worlds", type=click.IntRange(1, MOST_WORLDS), metavar="N", help=f"Worlds a cell.  [default: {WORLDS}]")
+@click.option("--worlds", type=click.IntRange(1, MOST_WORLDS), metavar="N", help="Worlds a cell.  [default: 20]")
 @click.option("--sample", type=click.IntRange(1), metavar="N", help="N points of a quasi-random design of the ranges.")
 @click.option("--sobol", type=click.IntRange(1), metavar="N", help="A design for Sobol indices, N a power of two.")
 @click.option("--plan", is_flag=True, help="Say what it would take, and run nothing.")
@@ -51,12 +49,13 @@ def sweep(
     95 % intervals, shares of falls, paired differences to the best), report.md, and study.toml, which reruns. The same
     command again goes on where it was stopped.
     """
-    from cmg_mj.sweep.plan import expected
-    from cmg_mj.sweep.report import FILES, save
-    from cmg_mj.sweep.study import MOST_TRIALS
-    from cmg_mj.sweep.sweep import Store, read_chunks, run
+    from cmg_mj.sweeps.plan import expected
+    from cmg_mj.sweeps.report import FILES, save
+    from cmg_mj.sweeps.store import Store, read_chunks, run
+    from cmg_mj.sweeps.study import MOST_TRIALS, check_values
 
     study = _study(chosen, varied, observers, worlds, sample, sobol)
+    check_values(study)
     if plan:
         takes = expected(study)
         show(takes, _plan_text(takes), chosen.as_json)
@@ -80,9 +79,9 @@ def sweep(
             say(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
             sys.exit(INTERRUPTED)
         at = save(folder, store, read_chunks(store))
-    from cmg_mj.sweep.cells import Trials, cells_of
-    from cmg_mj.sweep.report import cells_markdown
-    from cmg_mj.sweep.sweep import read_trials
+    from cmg_mj.sweeps.cells import Trials, cells_of
+    from cmg_mj.sweeps.report import cells_markdown
+    from cmg_mj.sweeps.store import read_trials
 
     rows = cells_of(Trials(study, read_trials(at / "trials.parquet")))
     show({"trials": study.trials, "cells": rows}, cells_markdown(study, rows), chosen.as_json)
@@ -97,9 +96,10 @@ def _study(
     sample: int | None,
     sobol: int | None,
 ) -> Study:
-    from cmg_mj.sweep.axes import parse_axis
-    from cmg_mj.sweep.file import axes_of, design_of, scenario_of, study_file
-    from cmg_mj.sweep.study import Study
+    from cmg_mj.sweeps.axes import parse_axis
+    from cmg_mj.sweeps.file import axes_of, design_of, scenario_of, study_file
+    from cmg_mj.sweeps.study import Study
+    from cmg_mj.sweeps.swept import WORLDS
 
     if sample is not None and sobol is not None:
         raise InputError("--sample and --sobol: one of them")
@@ -131,7 +131,6 @@ def _split(setting: str) -> tuple[str, str]:
 
 
 def _plan_text(takes: dict[str, Any]) -> str:
-    return (
-        f"{takes['points']} points x {takes['observers']} observers x {takes['worlds']} worlds = {takes['trials']} trials "
-        f"in {takes['chunks']} chunks; about {takes['minutes']:.2g} minutes on this machine, {takes['memory_mb']:.0f} MB"
-    )
+    how_many = f"{takes['points']} points x {takes['observers']} observers x {takes['worlds']} worlds"
+    how_long = f"about {takes['minutes']:.2g} minutes on this machine, {takes['memory_mb']:.0f} MB"
+    return f"{how_many} = {takes['trials']} trials in {takes['chunks']} chunks; {how_long}"

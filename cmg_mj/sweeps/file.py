@@ -10,8 +10,8 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.resources import bundled, find
 from cmg_mj.scenario import load_scenario, parse_scenario
 from cmg_mj.schema import Scenario
-from cmg_mj.sweep.axes import Axis, parse_axis
-from cmg_mj.sweep.study import Design
+from cmg_mj.sweeps.axes import Axis, parse_axis
+from cmg_mj.sweeps.study import Design
 
 SECTIONS = ("sweep", "vary", "scenario")
 ASKED = {"observers": list, "worlds": int, "design": str, "n": int}

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 from cmg_mj.experiment import prepare
-from cmg_mj.sweep.study import CHUNK, Study
+from cmg_mj.sweeps.study import CHUNK, Study
 
 WORLDS, SECONDS = 128, 0.5
 """Of the piece that is timed, for every observer."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.summary_keys import KEYS
-from cmg_mj.sweep.study import Study
+from cmg_mj.sweeps.study import Study
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 from collections.abc import Iterator, Mapping
@@ -12,9 +13,12 @@ from typing import Any, Literal
 import numpy as np
 
 from cmg_mj.errors import InputError
+from cmg_mj.experiment import load_rig, prepare
+from cmg_mj.overrides import assign
 from cmg_mj.pool import pools
-from cmg_mj.schema import Scenario
-from cmg_mj.sweep.axes import Axis
+from cmg_mj.scenario import as_fields, parse_scenario
+from cmg_mj.schema import ObserverSettings, Scenario
+from cmg_mj.sweeps.axes import Axis
 
 Design = Literal["grid", "sample", "sobol"]
 MOST_TRIALS = 1_000_000
@@ -126,6 +130,28 @@ class Study:
         if self.design != "grid":
             how["n"] = self.n
         return {"sweep": how, "vary": {axis.field: axis.said() for axis in self.axes}, "scenario": dict(scenario)}
+
+
+def check_values(study: Study) -> None:
+    """See that every field exists and takes each of its values by itself; an observer's own with every observer.
+
+    What does not fit together is found when it is run, and costs its own trials alone.
+
+    Raises:
+        InputError: One does not.
+    """
+    fields = as_fields(study.scenario)
+    plant = None
+    for axis in study.axes:
+        for value in axis.values or (axis.low, axis.high):
+            changed = copy.deepcopy(fields)
+            assign(changed, axis.field, value, f"--vary {axis.field}")
+            scenario = parse_scenario(changed, f"--vary {axis.field}={value}")
+            if axis.field.startswith("observer."):
+                for observer in study.observers:
+                    given = {"kind": observer, axis.field.partition(".")[2]: value}
+                    plant = plant or load_rig(study.scenario)
+                    prepare(scenario.model_copy(update={"observer": ObserverSettings(**given)}), plant)
 
 
 def _sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from cmg_mj.errors import InputError, raised
 from cmg_mj.experiment import Experiment, prepare, run_together
 from cmg_mj.pool import structure
-from cmg_mj.sweep.study import Chunk, Point, Study
+from cmg_mj.sweeps.study import Chunk, Point, Study
 from cmg_mj.worlds_table import FIRST
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ import tomli_w
 
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import prepare
-from cmg_mj.sweep.study import Chunk, Study
-from cmg_mj.sweep.trials import merge, table_of, write_table
-from cmg_mj.sweep.work import compute
+from cmg_mj.sweeps.study import Chunk, Study
+from cmg_mj.sweeps.trials import merge, table_of, write_table
+from cmg_mj.sweeps.work import compute
 from cmg_mj.trajectory import whole_file
 
 STUDY, CHUNKS = "study.toml", "chunks"
@@ -78,7 +78,7 @@ def run(store: Store, on_progress: Callable[[float], None] | None = None) -> Non
 
     Args:
         store: The sweep's, opened.
-        on_progress: Called after every tick with the trials done; a KeyboardInterrupt it raises ends the sweep, and what
+        on_progress: Called after every tick with the trials done; a KeyboardInterrupt it raises ends the sweep, what
             is finished is kept.
     """
     done = 0
@@ -98,18 +98,6 @@ def _inside(on_progress: Callable[[float], None], done: int, size: int, share: f
 def merged(store: Store, path: Path) -> None:
     """Write all trials of a finished sweep as one file."""
     merge([store.path(chunk) for chunk in store.study.chunks], path)
-
-
-def sweep(study: Study) -> pa.Table:
-    """Run a sweep in this process, keeping nothing on disk.
-
-    Args:
-        study: The sweep.
-
-    Returns:
-        Its trials.
-    """
-    return pa.concat_tables(table_of(study, compute(study, chunk)) for chunk in study.chunks)
 
 
 def resolved(study: Study) -> dict[str, Any]:

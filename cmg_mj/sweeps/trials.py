@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmg_mj.summary_keys import KEYS
-from cmg_mj.sweep.study import Study
-from cmg_mj.sweep.work import COLUMNS
+from cmg_mj.sweeps.study import Study
+from cmg_mj.sweeps.work import COLUMNS
 from cmg_mj.trajectory import whole_file
 from cmg_mj.worlds_table import FIRST
 

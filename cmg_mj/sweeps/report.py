@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from cmg_mj import markdown
 from cmg_mj.run_folder import RunFolder, Writers, write_text
 from cmg_mj.summary_keys import heading, written
-from cmg_mj.sweep.cells import Trials, as_table, cells_of
-from cmg_mj.sweep.study import Study
-from cmg_mj.sweep.sweep import TRIALS, Store, merged
-from cmg_mj.sweep.trials import write_table
+from cmg_mj.sweeps.cells import Trials, as_table, cells_of
+from cmg_mj.sweeps.store import TRIALS, Store, merged
+from cmg_mj.sweeps.study import Study
+from cmg_mj.sweeps.trials import write_table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,13 +36,13 @@ def save(folder: RunFolder, store: Store, trials: pa.Table) -> Path:
     return folder.write(files)
 
 
-def report(study: Study, cells: Sequence[dict[str, Any]]) -> str:
+def report(study: Study, rows: Sequence[dict[str, Any]]) -> str:
     """The report as Markdown."""
     counts = (
         f"{len(study.points)} points, {len(study.observers)} observers, {study.worlds} worlds: {study.trials} trials."
     )
     lines = [f"# {study.scenario.title or 'Sweep'}", "", counts, "", f"Mean {heading(SHOWN)}, with the falls:", ""]
-    return "\n".join([*lines, cells_markdown(study, cells)])
+    return "\n".join([*lines, cells_markdown(study, rows)])
 
 
 def cells_markdown(study: Study, cells: Sequence[dict[str, Any]]) -> str:
@@ -50,9 +50,8 @@ def cells_markdown(study: Study, cells: Sequence[dict[str, Any]]) -> str:
     fields = [axis.field for axis in study.axes]
     rows = []
     for number, point in enumerate(study.points[:MOST_ROWS]):
-        of = {
-            row["observer"]: row for row in cells[number * len(study.observers) : (number + 1) * len(study.observers)]
-        }
+        first = number * len(study.observers)
+        of = {row["observer"]: row for row in cells[first : first + len(study.observers)]}
         rows.append([*(_said(point[field]) for field in fields), *(_cell(of[name]) for name in study.observers)])
     table = markdown.table([*fields, *study.observers], rows, text_columns=0)
     more = len(study.points) - MOST_ROWS

@@ -1,0 +1,83 @@
+"""A sweep from Python, in this process, on one object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from cmg_mj.errors import InputError
+from cmg_mj.scenario import load_scenario
+from cmg_mj.schema import Scenario
+from cmg_mj.sweeps.axes import parse_axis
+from cmg_mj.sweeps.cells import Trials, as_table, cells_of
+from cmg_mj.sweeps.study import Design, Study, check_values
+from cmg_mj.sweeps.trials import table_of
+from cmg_mj.sweeps.work import compute
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+WORLDS = 20
+"""A cell, if nothing else is said."""
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What a sweep has found.
+
+    Attributes:
+        study: What was asked.
+        trials: A row a trial: its point, what is varied, observer, world, outcome, and the figures of its run.
+        cells: A row a point and observer: means with 95 % intervals, the share of falls with Wilson's interval, and the
+            paired difference to the best observer of the point.
+    """
+
+    study: Study
+    trials: pa.Table
+    cells: pa.Table
+
+
+def sweep(
+    scenario: Scenario | str,
+    vary: Mapping[str, Any],
+    observers: Sequence[str] | None = None,
+    worlds: int = WORLDS,
+    sample: int | None = None,
+    sobol: int | None = None,
+) -> Swept:
+    """Run a scenario in every cell: every point of what is varied with every observer.
+
+    Args:
+        scenario: The scenario, or its name.
+        vary: Field, named as with `--set` -> a list of values, or text as `--vary` takes it, such as "-1:1:5".
+        observers: Those in the loop; by default the scenario's own.
+        worlds: Trials a cell: world i has the same noise in every cell.
+        sample: So many points of a quasi-random design of the ranges, instead of every combination.
+        sobol: A design for Sobol indices instead, a power of two.
+
+    Returns:
+        The trials and cells, as tables.
+
+    Raises:
+        InputError: A field or its values are not written so, or do not fit the design.
+    """
+    if sample is not None and sobol is not None:
+        raise InputError("sample and sobol: one of them")
+    design: Design = "sample" if sample is not None else "sobol" if sobol is not None else "grid"
+    of = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    axes = tuple(
+        parse_axis(field, said if isinstance(said, str) else list(said), f"vary: {field!r}")
+        for field, said in vary.items()
+    )
+    study = Study(of, axes, tuple(observers or (of.observer.kind,)), worlds, design, sample or sobol or 0)
+    check_values(study)
+    trials = all_trials(study)
+    return Swept(study, trials, as_table(cells_of(Trials(study, trials))))
+
+
+def all_trials(study: Study) -> pa.Table:
+    """Run a study in this process, keeping nothing on disk."""
+    import pyarrow as pa
+
+    return pa.concat_tables(table_of(study, compute(study, chunk)) for chunk in study.chunks)

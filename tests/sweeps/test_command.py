@@ -1,0 +1,110 @@
+"""`cmg-mj sweep`: its files, going on, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from tests.command import COMMAND, ROOT, cmg_mj
+
+BIAS = "plant.equilibrium_bias_deg"
+SMALL = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--observers", "linear,gyro_free", "--worlds", "3"]
+SHORT = ["--set", "duration_s=0.5", "--set", "push=[]"]
+
+
+def test_the_files_of_a_sweep(tmp_path: Path) -> None:
+    said = cmg_mj(*SMALL, *SHORT, "--out", str(tmp_path / "out"), "--json")
+    assert said.status == 0
+    cells = json.loads(said.out)["cells"]
+    assert [(cell[BIAS], cell["observer"]) for cell in cells] == [
+        (0, "linear"),
+        (0, "gyro_free"),
+        (1, "linear"),
+        (1, "gyro_free"),
+    ]
+    assert {"trials.parquet", "cells.parquet", "report.md", "study.toml"} <= {
+        p.name for p in (tmp_path / "out").iterdir()
+    }
+    assert pq.read_table(tmp_path / "out" / "cells.parquet").to_pylist() == cells
+    trials = pq.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
+    errors = [row["velocity_rms_error_rad_s"] for row in trials if row["observer"] == "linear" and row[BIAS] == 1]
+    assert cells[2]["velocity_rms_error_rad_s"] == pytest.approx(np.mean(errors))
+    assert cells[2]["velocity_rms_error_rad_s_behind_best_low"] > 0.0
+    assert cells[2]["velocity_rms_error_rad_s_best"] == "gyro_free"
+    again = cmg_mj("sweep", str(tmp_path / "out" / "study.toml"), "--out", str(tmp_path / "again"))
+    assert again.status == 0
+    other = pq.read_table(tmp_path / "again" / "trials.parquet")
+    assert other.equals(pq.read_table(tmp_path / "out" / "trials.parquet"))
+    goes_on = cmg_mj(*SMALL, *SHORT, "--out", str(tmp_path / "out"))
+    assert "12 of 12 trials are there from before" in goes_on.err
+
+
+def test_a_plan_runs_nothing(tmp_path: Path) -> None:
+    said = cmg_mj(*SMALL, "--plan", "--out", str(tmp_path / "out"))
+    assert said.out.startswith("2 points x 2 observers x 3 worlds = 12 trials in 2 chunks; about ")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--vary", "plant.equilibrium_bias=0,1"], "plant.equilibrium_bias: no such field; did you mean"),
+        (["--vary", f"{BIAS}=0,90"], f"{BIAS} = 90: must be"),
+        (["--vary", f"{BIAS}=1:1:3"], "an empty range"),
+        (["--vary", f"{BIAS}"], "no values"),
+        ([], "nothing is varied"),
+        (["--vary", "observer.k1=10,20", "--observers", "homogeneous,linear"], "observer.k1"),
+        (["--vary", "observer.k1=10,-20"], "observer.k1"),
+        (["--vary", f"{BIAS}=0:1:1000", "--worlds", "10000"], "10000000 trials; beyond 1000000 say --yes"),
+        (["--vary", f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200: must be a power of two, such as 256"),
+        (["--vary", f"{BIAS}=0:1", "--sobol", "2", "--sample", "3"], "--sample and --sobol: one of them"),
+        (["--vary", f"{BIAS}=0,1", "--observers", "linar"], "no such observer; did you mean 'linear'"),
+    ],
+)
+def test_what_is_refused(tmp_path: Path, arguments: list[str], complaint: str) -> None:
+    said = cmg_mj("sweep", "push_recovery", *arguments, "--out", str(tmp_path / "out"))
+    assert complaint in said.complaint
+    assert not (tmp_path / "out").exists()
+
+
+def test_another_study_is_refused_and_nothing_lost(tmp_path: Path) -> None:
+    out = str(tmp_path / "out")
+    cmg_mj(*SMALL, *SHORT, "--out", out)
+    before = (tmp_path / "out" / "trials.parquet").read_bytes()
+    said = cmg_mj(*SMALL, *SHORT, "--seed", "5", "--out", out)
+    assert "holds another study: scenario.seed = 0 there, 5 here; name another folder" in said.complaint
+    assert (tmp_path / "out" / "trials.parquet").read_bytes() == before
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
+def test_killed_at_random_moments(tmp_path: Path) -> None:
+    """The same command again and again, until it is done: the same trials as in one go."""
+    arguments = [*SMALL[:-1], "40", "--vary", "controller.rate_hz=100,200", "--set", "duration_s=4", "--set", "push=[]"]
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    cmg_mj(*arguments, "--out", str(whole))
+    rng = np.random.default_rng(5)
+    kills = 0
+    while kills < int(os.environ.get("CMG_MJ_KILLS", "3")):
+        process = subprocess.Popen(
+            [*COMMAND, *arguments, "--out", str(killed)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, cwd=ROOT
+        )
+        time.sleep(rng.uniform(0.5, 6.0))
+        if process.poll() is None:
+            process.send_signal(signal.SIGKILL)
+        process.wait()
+        kills += 1
+        chunks = killed / "chunks"
+        if chunks.exists() and kills % 3 == 0:  # all over again, now and then
+            for path in chunks.iterdir():
+                path.unlink()
+    assert cmg_mj(*arguments, "--out", str(killed)).status == 0
+    assert (killed / "trials.parquet").read_bytes() == (whole / "trials.parquet").read_bytes()
+    assert not list(killed.rglob("*.partial"))
