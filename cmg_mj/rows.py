@@ -65,7 +65,7 @@ class Rows:
             q: Joint angles at the tick [rad].
             v: Joint rates at the tick [rad/s].
             tick: What the controller measured and decided.
-            torque: The push [N m].
+            torque: The push, a float, or (n_worlds,) [N m].
             running: Which worlds have not ended, (n_worlds,); None for one world.
         """
         self._waiting.append((q, v, tick, torque, running))
@@ -81,7 +81,7 @@ class Rows:
         q, v = self._columns(qs), self._columns(vs)
         *signals, estimates = zip(*ticks, strict=True)
         y1, y2, acceleration, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
-        push = np.array([np.broadcast_to(torque, u.shape[1:]) for torque in torques])
+        push = np.broadcast_to(self._columns([(torque,) for torque in torques])[0], u.shape)
         estimated = [self._columns(estimate) for estimate in zip(*estimates, strict=True)]
         x1 = q[self._rig.tilt] - self._rig.tilt_zero + self._bias
         x2 = v[self._rig.tilt]

@@ -240,6 +240,7 @@ def simulate(
     ends: list[Outcome | None] = [None] * len(plants)
     native = driver == "native"
     torque: Scalar = 0.0
+    of_each: Scalar = torque if single else np.zeros(len(plants))
     step = 0
 
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
@@ -249,6 +250,7 @@ def simulate(
                 if held is not torque:
                     torque = held
                     worlds.push(torque)
+                    of_each = torque if single else np.broadcast_to(torque, len(plants))
                 q, v = worlds.state()
                 lean = q[rig.tilt] - rig.tilt_zero
                 if single:
@@ -277,7 +279,7 @@ def simulate(
                 if ticked:
                     tick = controller.tick
                     assert tick is not None
-                    rows.add(q, v, tick, torque, None if single else worlds.running.copy())
+                    rows.add(q, v, tick, of_each, None if single else worlds.running.copy())
                     if on_progress:
                         on_progress((step + count) * timestep)
     except RunStopped as error:
