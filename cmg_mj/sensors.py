@@ -140,12 +140,13 @@ def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) 
             yield ()
     single = isinstance(worlds, int)
     different, places = np.unique([worlds] if single else worlds, return_inverse=True)
+    alone = np.array_equal(places, range(len(places)))  # every world once, in order
     generators = [
         np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(world), stream))) for world in different
     ]
     while True:
         drawn = np.stack([g.standard_normal((block, channels)) for g in generators], axis=-1)
-        yield from drawn[:, :, 0].tolist() if single else drawn[:, :, places]
+        yield from drawn[:, :, 0].tolist() if single else drawn if alone else drawn[:, :, places]
 
 
 class SampledSensor:

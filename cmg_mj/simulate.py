@@ -24,7 +24,7 @@ from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.references import RATES, References
 from cmg_mj.rows import Rows
-from cmg_mj.stacked import of_world
+from cmg_mj.stacked import of_worlds
 from cmg_mj.timing import whole_steps
 from cmg_mj.trajectory import Trajectory
 from cmg_mj.worlds import ManyWorlds, OneWorld
@@ -229,7 +229,7 @@ def simulate(
     worlds: Any = OneWorld(rig) if single else ManyWorlds(plants)
     fall = np.radians(settings.fall_angle_deg).item()
     dt = controller.law.dt
-    sensors = [of_world(controller.sensors, i) for i in range(len(plants))]
+    sensors = of_worlds(controller.sensors, len(plants))
     targets = {BIAS: [plant.apparent_bias(own.accelerometer) for plant, own in zip(plants, sensors, strict=True)]}
     limit = controller.law.rate_limit
     facts = rig.facts

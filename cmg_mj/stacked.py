@@ -44,6 +44,12 @@ def stacked(values: Sequence[T]) -> T:
     return np.array(values, dtype=float)  # type: ignore[return-value]
 
 
+def of_worlds(value: T, worlds: int) -> list[T]:
+    """What a value, stacked or not, is in each world."""
+    first = of_world(value, 0)
+    return [first] * worlds if first is value else [of_world(value, world) for world in range(worlds)]
+
+
 def of_world(value: T, world: int) -> T:
     """What a stacked value is in one world.
 
