@@ -160,15 +160,17 @@ def _sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray
     For indices they are those of Saltelli's scheme, as `scipy.stats.sobol_indices` wants them: A, B, then A with each
     column in turn from B.
     """
-    from scipy.stats import qmc  # half a second; its generator is `rng` since 1.15, and `seed` in all versions
+    from scipy.stats import qmc  # half a second
+
+    generator: Any = {"seed": np.random.default_rng(seed)}  # called `rng` since 1.15; this name all versions take
 
     if not indices:
         import warnings
 
         with warnings.catch_warnings():  # that n is no power of two
             warnings.simplefilter("ignore", UserWarning)
-            return qmc.Sobol(dimensions, seed=np.random.default_rng(seed)).random(n)
-    both = qmc.Sobol(2 * dimensions, seed=np.random.default_rng(seed)).random(n)
+            return qmc.Sobol(dimensions, **generator).random(n)
+    both = qmc.Sobol(2 * dimensions, **generator).random(n)
     a, b = both[:, :dimensions], both[:, dimensions:]
     crossed = [np.where(np.arange(dimensions) == i, b, a) for i in range(dimensions)]
     return np.concatenate([a, b, *crossed])
