@@ -49,8 +49,9 @@ def sweep(
     95 % intervals, shares of falls, paired differences to the best), report.md, and study.toml, which reruns. The same
     command again goes on where it was stopped.
     """
+    from cmg_mj.sweeps.cells import Trials, cells_of
     from cmg_mj.sweeps.plan import expected
-    from cmg_mj.sweeps.report import FILES, save
+    from cmg_mj.sweeps.report import FILES, cells_markdown, save
     from cmg_mj.sweeps.store import Store, read_chunks, run
     from cmg_mj.sweeps.study import MOST_TRIALS, check_values
 
@@ -78,12 +79,8 @@ def sweep(
         except KeyboardInterrupt:
             say(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
             sys.exit(INTERRUPTED)
-        at = save(folder, store, read_chunks(store))
-    from cmg_mj.sweeps.cells import Trials, cells_of
-    from cmg_mj.sweeps.report import cells_markdown
-    from cmg_mj.sweeps.store import read_trials
-
-    rows = cells_of(Trials(study, read_trials(at / "trials.parquet")))
+        rows = cells_of(Trials(study, read_chunks(store)))
+        at = save(folder, store, rows)
     show({"trials": study.trials, "cells": rows}, cells_markdown(study, rows), chosen.as_json)
     say_written(folder, at, f"Read {at / 'report.md'}", chosen.as_json)
 

@@ -58,30 +58,6 @@ def fell_interval(fell: int, trials: int) -> Interval:
     return Interval(fell / trials, float(found.low), float(found.high))
 
 
-def order_share(trials: Trials, order: Sequence[str], key: str) -> list[Interval | None]:
-    """In which share of a point's worlds observers stand in an order, each better than the next.
-
-    Args:
-        trials: The trials.
-        order: Observers, the best first.
-        key: The figure that decides, which is better when it is less.
-
-    Returns:
-        A point each, with Wilson's interval; a world in which one of them fell counts only if those before it stood
-        (a fall is worse than any figure). None where two next to each other fell in every world.
-    """
-    places = [trials.study.observers.index(name) for name in order]
-    values = trials.figure(key)[:, places]
-    found: list[Interval | None] = []
-    for of in np.where(np.isnan(values), np.inf, values):
-        both_fell = np.isinf(of[:-1]) & np.isinf(of[1:])
-        counted = ~both_fell.any(axis=0)
-        holds = (of[:-1] < of[1:]).all(axis=0) & counted
-        n = int(counted.sum())
-        found.append(fell_interval(int(holds.sum()), n) if n else None)
-    return found
-
-
 def cells_of(trials: Trials) -> list[dict[str, Any]]:
     """A row a cell: how many stood and fell, every figure's mean with its interval, and how far it is behind the best.
 

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any
 from cmg_mj import markdown
 from cmg_mj.run_folder import RunFolder, Writers, write_text
 from cmg_mj.summary_keys import heading, written
-from cmg_mj.sweeps.cells import Trials, as_table, cells_of
+from cmg_mj.sweeps.cells import as_table
 from cmg_mj.sweeps.store import TRIALS, Store, merged
 from cmg_mj.sweeps.study import Study
 from cmg_mj.sweeps.trials import write_table
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    import pyarrow as pa
 
 CELLS, REPORT = "cells.parquet", "report.md"
 FILES = (TRIALS, CELLS, REPORT)
@@ -25,9 +23,8 @@ MOST_ROWS = 60
 """Of a table on the terminal or in the report; the files have all."""
 
 
-def save(folder: RunFolder, store: Store, trials: pa.Table) -> Path:
-    """Write the tables and the report of a finished sweep."""
-    rows = cells_of(Trials(store.study, trials))
+def save(folder: RunFolder, store: Store, rows: Sequence[dict[str, Any]]) -> Path:
+    """Write the tables and the report of a finished sweep, whose cells these are."""
     files: Writers = {
         TRIALS: lambda path: merged(store, path),
         CELLS: lambda path: write_table(path, as_table(rows)),

@@ -66,12 +66,6 @@ class Store:
         """Compute a chunk and keep it."""
         write_table(self.path(chunk), table_of(self.study, compute(self.study, chunk, on_progress)))
 
-    def clear(self) -> None:
-        """Take the chunks away, once all their trials are in one table."""
-        for path in (self.folder / CHUNKS).iterdir():
-            path.unlink()
-        (self.folder / CHUNKS).rmdir()
-
 
 def run(store: Store, on_progress: Callable[[float], None] | None = None) -> None:
     """Run what is not finished.
@@ -132,10 +126,5 @@ def _flat(fields: Any, at: str = "") -> dict[str, Any]:
 
 
 def read_chunks(store: Store) -> pa.Table:
-    """The trials of a finished sweep whose chunks are not merged."""
+    """The trials of a finished sweep."""
     return pa.concat_tables(pq.read_table(store.path(chunk)) for chunk in store.study.chunks)
-
-
-def read_trials(path: Path) -> pa.Table:
-    """The trials of a sweep that has been written."""
-    return pq.read_table(path)

@@ -36,6 +36,7 @@ def compute(study: Study, chunk: Chunk, on_progress: Callable[[float], None] | N
     found: dict[tuple[int, int], dict[str, Any]] = {}
     pools: dict[str, list[tuple[int, int]]] = {}
     experiments: dict[int, Experiment] = {}
+    pool_of: dict[int, str] = {}
     refused: dict[int, str] = {}
     for trial in chunk.trials:
         number = trial[0]
@@ -44,10 +45,11 @@ def compute(study: Study, chunk: Chunk, on_progress: Callable[[float], None] | N
         if number not in experiments:
             try:
                 experiments[number] = base.with_values(study.points[number])
+                pool_of[number] = _pool_of(experiments[number])
             except InputError as error:
                 refused[number] = str(error)
                 continue
-        pools.setdefault(_pool_of(experiments[number]), []).append(trial)
+        pools.setdefault(pool_of[number], []).append(trial)
     for trials in pools.values():
         done, share = len(found) / len(chunk.trials), len(trials) / len(chunk.trials) / study.scenario.duration_s
         tick = partial(_inside, on_progress, done, share) if on_progress else None
