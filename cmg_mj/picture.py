@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -21,7 +21,9 @@ class Line:
         color: An observer, for the colour that it has everywhere; or the number of a colour of the cycle; None for the
             next.
         width: Line width [points].
-        spread: Half height of a band around y, (n,), such as a confidence interval's.
+        spread: Half height of a band around y, (n,), such as a confidence interval's; or its heights below and above y,
+            (2, n).
+        bars: Whether it is drawn as bars instead.
     """
 
     x: Sequence[float] | np.ndarray
@@ -31,6 +33,36 @@ class Line:
     color: str | int | None = None
     width: float = 1.0
     spread: Sequence[float] | np.ndarray | None = None
+    bars: bool = False
+
+
+@dataclass(frozen=True)
+class Map:
+    """Which of several is the best, over two quantities.
+
+    Attributes:
+        x: Where the cells are, (n_x,), rising.
+        y: The same upward, (n_y,).
+        names: Who might be the best, for the colours.
+        best: The place in `names` of each cell's best, (n_y, n_x); negative for none.
+        sure: Where it is the best beyond chance, (n_y, n_x); elsewhere the cell has a dot.
+        values: The best's, of which contours are drawn, (n_y, n_x); NaN where there is none.
+        levels: Of the contours.
+        boundaries: Name -> what has crossed half beyond a boundary that is drawn, (n_y, n_x).
+        nobody: What a cell without a best is called.
+        boundary: What the boundaries are called.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    names: Sequence[str]
+    best: np.ndarray
+    sure: np.ndarray
+    values: np.ndarray
+    levels: Sequence[float] = ()
+    boundaries: Mapping[str, np.ndarray] = field(default_factory=dict)
+    nobody: str = "none"
+    boundary: str = "half"
 
 
 @dataclass(frozen=True)
@@ -46,6 +78,9 @@ class Panel:
         y_scale: Linear or logarithmic.
         y_range: Limits; None for what the data need.
         shaded: Spans of x to shade, such as pushes.
+        x_ticks: Where to mark x; None for matplotlib's choice.
+        y_ticks: The same of y.
+        map: What is drawn instead of lines.
     """
 
     y_label: str
@@ -56,6 +91,9 @@ class Panel:
     y_scale: Literal["linear", "log"] = "linear"
     y_range: tuple[float, float] | None = None
     shaded: Sequence[tuple[float, float]] = ()
+    x_ticks: Sequence[float] | None = None
+    y_ticks: Sequence[float] | None = None
+    map: Map | None = None
 
 
 @dataclass(frozen=True)
@@ -68,6 +106,7 @@ class Picture:
         panels: From top to bottom.
         share_x: Whether all panels have the same abscissa.
         columns: Panels beside each other.
+        panel_height: Of each [inch].
     """
 
     name: str
@@ -75,3 +114,4 @@ class Picture:
     panels: Sequence[Panel] = field(default_factory=tuple)
     share_x: bool = True
     columns: int = 1
+    panel_height: float = 2.3

@@ -10,6 +10,7 @@ import numpy as np
 
 from cmg_mj.colours import colour, colours, hexadecimal
 from cmg_mj.legible import JUDGED_BY, axis_range, best, by_observer, shortened
+from cmg_mj.map_plot import draw_map
 from cmg_mj.picture import Panel, Picture
 from cmg_mj.summary_keys import written
 from cmg_mj.trajectory import Trajectory, whole_file
@@ -35,7 +36,7 @@ def draw(path: Path, picture: Picture) -> None:
     plt = pyplot()
     columns = picture.columns
     rows = -(-len(picture.panels) // columns)
-    size = (9.0 if columns == 1 else 5.5 * columns, 0.8 + 2.3 * rows)
+    size = (9.0 if columns == 1 else 5.5 * columns, 0.8 + picture.panel_height * rows)
     figure, grid = plt.subplots(
         rows, columns, sharex="col" if picture.share_x else False, figsize=size, layout="constrained", squeeze=False
     )
@@ -57,27 +58,43 @@ def draw(path: Path, picture: Picture) -> None:
 
 
 def _draw_panel(axes: Any, panel: Panel) -> None:
+    palette = colours(line.color for line in panel.lines if isinstance(line.color, str))
     for line in panel.lines:
         style = {"linewidth": line.width, "label": line.label or None}
         if line.color is not None:
-            style["color"] = hexadecimal(colour(line.color)) if isinstance(line.color, str) else f"C{line.color}"
+            style["color"] = hexadecimal(palette[line.color]) if isinstance(line.color, str) else f"C{line.color}"
         (drawn,) = axes.plot(line.x, line.y, line.style, markersize=4, **style)
         if line.spread is not None:
-            low, high = np.subtract(line.y, line.spread), np.add(line.y, line.spread)
-            axes.fill_between(line.x, low, high, color=drawn.get_color(), alpha=0.2, linewidth=0)
+            below, above = np.broadcast_to(line.spread, (2, len(line.y)))
+            low, high = np.subtract(line.y, below), np.add(line.y, above)
+            if line.bars:
+                axes.vlines(line.x, low, high, color=drawn.get_color(), alpha=0.6, linewidth=line.width)
+            else:
+                axes.fill_between(line.x, low, high, color=drawn.get_color(), alpha=0.2, linewidth=0)
     for start, end in panel.shaded:
         axes.axvspan(start, end, color="C3", alpha=0.25, linewidth=0, zorder=0)
     axes.set_xscale(panel.x_scale)
     axes.set_yscale(panel.y_scale)
     axes.set_ylabel(panel.y_label)
     axes.set_title(panel.title, loc="left", fontsize="medium")
+    _mark(axes.xaxis, panel.x_ticks)
+    _mark(axes.yaxis, panel.y_ticks)
+    if panel.map is not None:
+        draw_map(axes, panel.map)
+        return
     axes.grid(alpha=0.3)
     marks_only = all(set(line.style) <= set("o.x+s") for line in panel.lines)
-    axes.margins(x=0.0 if panel.x_scale == "linear" and not marks_only else 0.03)
+    axes.margins(x=0.0 if panel.x_scale == "linear" and not marks_only and panel.x_ticks is None else 0.03)
     if panel.y_range is not None:
         axes.set_ylim(*panel.y_range)
     if any(line.label for line in panel.lines):
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=4, frameon=False, borderpad=0)
+
+
+def _mark(axis: Any, ticks: Sequence[float] | None) -> None:
+    if ticks is not None:
+        axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+        axis.set_ticks([], minor=True)
 
 
 INK = "0.15"

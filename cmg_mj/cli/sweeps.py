@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 @click.option("--worlds", type=click.IntRange(1, MOST_WORLDS), metavar="N", help="Worlds a cell.  [default: 20]")
 @click.option("--sample", type=click.IntRange(1), metavar="N", help="N points of a quasi-random design of the ranges.")
 @click.option("--sobol", type=click.IntRange(1), metavar="N", help="A design for Sobol indices, N a power of two.")
+@click.option("--order", metavar="NAMES", help="Observers, the best first: count how often that holds.")
 @click.option("--plan", is_flag=True, help="Say what it would take, and run nothing.")
 @click.option("--yes", is_flag=True, help="Run it even if it is very large.")
 @users_code()
@@ -40,14 +41,15 @@ def sweep(
     worlds: int | None,
     sample: int | None,
     sobol: int | None,
+    order: str | None,
     plan: bool,
     yes: bool,
 ) -> None:
     """Run SCENARIO, or a study file that a sweep has written, in every cell: every point with every observer.
 
     World i has the same noise in every cell. Writes a folder: trials.parquet (a row a trial), cells.parquet (means with
-    95 % intervals, shares of falls, paired differences to the best), report.md, and study.toml, which reruns. The same
-    command again goes on where it was stopped.
+    95 % intervals, shares of falls, paired differences to the best), report.md with pictures, and study.toml, which
+    reruns. The same command again goes on where it was stopped.
     """
     from cmg_mj.sweeps.cells import Trials, cells_of
     from cmg_mj.sweeps.plan import expected
@@ -55,7 +57,7 @@ def sweep(
     from cmg_mj.sweeps.store import Store, read_chunks, run
     from cmg_mj.sweeps.study import MOST_TRIALS, check_values
 
-    study = _study(chosen, varied, observers, worlds, sample, sobol)
+    study = _study(chosen, varied, observers, worlds, sample, sobol, order)
     check_values(study)
     if plan:
         takes = expected(study)
@@ -79,8 +81,9 @@ def sweep(
         except KeyboardInterrupt:
             say(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
             sys.exit(INTERRUPTED)
-        rows = cells_of(Trials(study, read_chunks(store)))
-        at = save(folder, store, rows)
+        trials = Trials(study, read_chunks(store))
+        rows = cells_of(trials)
+        at = save(folder, store, trials, rows)
     show({"trials": study.trials, "cells": rows}, cells_markdown(study, rows), chosen.as_json)
     say_written(folder, at, f"Read {at / 'report.md'}", chosen.as_json)
 
@@ -92,6 +95,7 @@ def _study(
     worlds: int | None,
     sample: int | None,
     sobol: int | None,
+    order: str | None,
 ) -> Study:
     from cmg_mj.sweeps.axes import parse_axis
     from cmg_mj.sweeps.file import axes_of, design_of, scenario_of, study_file
@@ -119,7 +123,9 @@ def _study(
     names = asked.get("observers") or [scenario.observer.kind]
     if observers is not None:
         names = names_of(observers)
-    return Study(scenario, tuple(axes), tuple(names), worlds or asked.get("worlds", WORLDS), design, n)
+    expected = asked.get("order", []) if order is None else [name.strip() for name in order.split(",")]
+    of_each = worlds or asked.get("worlds", WORLDS)
+    return Study(scenario, tuple(axes), tuple(names), of_each, design, n, tuple(expected))
 
 
 def _split(setting: str) -> tuple[str, str]:

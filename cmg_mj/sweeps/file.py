@@ -14,7 +14,7 @@ from cmg_mj.sweeps.axes import Axis, parse_axis
 from cmg_mj.sweeps.study import Design
 
 SECTIONS = ("sweep", "vary", "scenario")
-ASKED = {"observers": list, "worlds": int, "design": str, "n": int}
+ASKED = {"observers": list, "worlds": int, "design": str, "n": int, "order": list}
 
 
 def study_file(name: str) -> dict[str, Any] | None:

@@ -6,9 +6,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from cmg_mj import markdown
+from cmg_mj.plots import draw
 from cmg_mj.run_folder import RunFolder, Writers, write_text
 from cmg_mj.summary_keys import heading, written
-from cmg_mj.sweeps.cells import as_table
+from cmg_mj.sweeps import report_parts
+from cmg_mj.sweeps.cells import Trials, as_table
+from cmg_mj.sweeps.indices import index_rows
+from cmg_mj.sweeps.order import order_rows
+from cmg_mj.sweeps.pictures import NAMES, pictures_of
 from cmg_mj.sweeps.store import TRIALS, Store, merged
 from cmg_mj.sweeps.study import Study
 from cmg_mj.sweeps.trials import write_table
@@ -16,30 +21,45 @@ from cmg_mj.sweeps.trials import write_table
 if TYPE_CHECKING:
     from pathlib import Path
 
-CELLS, REPORT = "cells.parquet", "report.md"
-FILES = (TRIALS, CELLS, REPORT)
+CELLS, ORDER, INDICES, REPORT = "cells.parquet", "order.parquet", "indices.parquet", "report.md"
+FILES = (TRIALS, CELLS, ORDER, INDICES, REPORT, *NAMES)
+"""Those that may be written."""
 SHOWN = "velocity_rms_error_rad_s"
 MOST_ROWS = 60
 """Of a table on the terminal or in the report; the files have all."""
 
 
-def save(folder: RunFolder, store: Store, rows: Sequence[dict[str, Any]]) -> Path:
-    """Write the tables and the report of a finished sweep, whose cells these are."""
+def save(folder: RunFolder, store: Store, trials: Trials, rows: Sequence[dict[str, Any]]) -> Path:
+    """Write the tables, the pictures and the report of a finished sweep, whose cells these rows are."""
+    study = store.study
+    pictures = pictures_of(trials)
     files: Writers = {
         TRIALS: lambda path: merged(store, path),
         CELLS: lambda path: write_table(path, as_table(rows)),
-        REPORT: lambda path: write_text(path, report(store.study, rows)),
+        **{f"{picture.name}.png": lambda path, picture=picture: draw(path, picture) for picture in pictures},
     }
+    parts = [*report_parts.pictures(trials, pictures)]
+    if study.order:
+        ordered = order_rows(trials)
+        files[ORDER] = lambda path: write_table(path, as_table(ordered))
+        parts += report_parts.order(trials, ordered, MOST_ROWS)
+    if study.design == "sobol":
+        found = index_rows(trials)
+        files[INDICES] = lambda path: write_table(path, as_table(found))
+        parts += report_parts.indices(study, found)
+    files[REPORT] = lambda path: write_text(path, report(study, rows, parts))
     return folder.write(files)
 
 
-def report(study: Study, rows: Sequence[dict[str, Any]]) -> str:
-    """The report as Markdown."""
+def report(study: Study, rows: Sequence[dict[str, Any]], parts: Sequence[str] = ()) -> str:
+    """The report as Markdown, with what stands between its head and the table of the cells."""
     counts = (
         f"{len(study.points)} points, {len(study.observers)} observers, {study.worlds} worlds: {study.trials} trials."
     )
-    lines = [f"# {study.scenario.title or 'Sweep'}", "", counts, "", f"Mean {heading(SHOWN)}, with the falls:", ""]
-    return "\n".join([*lines, cells_markdown(study, rows)])
+    first = [f"# {study.scenario.title or 'Sweep'}", counts]
+    return "\n\n".join(
+        [*first, *parts, "## Cells", f"Mean {heading(SHOWN)}, with the falls:", cells_markdown(study, rows)]
+    )
 
 
 def cells_markdown(study: Study, cells: Sequence[dict[str, Any]]) -> str:

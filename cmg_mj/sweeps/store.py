@@ -23,6 +23,8 @@ from cmg_mj.trajectory import whole_file
 STUDY, CHUNKS = "study.toml", "chunks"
 TRIALS = "trials.parquet"
 """Files of a sweep's folder."""
+ORDER = "order"
+"""What a study file says in [sweep] that no trial depends on: another one is no other study."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,11 @@ class Store:
         asked = resolved(self.study)
         path = self.folder / STUDY
         if path.exists():
-            _require_same(path, asked)
+            there = _require_same(path, asked)
+            if there["sweep"].get(ORDER) != asked["sweep"].get(ORDER):
+                _write(path, there | {"sweep": asked["sweep"]})
         else:
-            with whole_file(path) as temporary:
-                temporary.write_text(tomli_w.dumps(asked), encoding="utf-8")
+            _write(path, asked)
         (self.folder / CHUNKS).mkdir(exist_ok=True)
         return sum(len(chunk.trials) for chunk in self.study.chunks if self.path(chunk).exists())
 
@@ -107,16 +110,22 @@ def resolved(study: Study) -> dict[str, Any]:
     return study.as_fields(fields)
 
 
-def _require_same(path: Path, asked: Mapping[str, Any]) -> None:
+def _write(path: Path, fields: Mapping[str, Any]) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text(tomli_w.dumps(dict(fields)), encoding="utf-8")
+
+
+def _require_same(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
     try:
         there = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: is no study as cmg-mj writes it; name another folder") from error
     a, b = _flat(there), _flat(tomllib.loads(tomli_w.dumps(dict(asked))))
     for field in sorted(a.keys() | b.keys()):
-        if a.get(field) != b.get(field) and not field.startswith("scenario.versions"):
+        if field != f"sweep.{ORDER}" and a.get(field) != b.get(field) and not field.startswith("scenario.versions"):
             said = f"{field} = {a.get(field)} there, {b.get(field)} here"
             raise InputError(f"{path.parent}: holds another study: {said}; name another folder")
+    return there
 
 
 def _flat(fields: Any, at: str = "") -> dict[str, Any]:

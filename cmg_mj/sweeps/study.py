@@ -57,6 +57,8 @@ class Study:
         design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges. `sobol`: one for
             Sobol indices.
         n: Points of the design; of one for indices that many times the number of axes and two.
+        order: Observers, the best first, as someone expects them; how often that holds is counted. No
+            trial depends on it.
     """
 
     scenario: Scenario
@@ -65,6 +67,7 @@ class Study:
     worlds: int
     design: Design = "grid"
     n: int = 0
+    order: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """See that design and axes fit.
@@ -87,6 +90,16 @@ class Study:
                 raise InputError(f"--vary {axis.field}: --{self.design} needs a range low:high, not values")
         if self.design == "sobol" and (self.n < 2 or self.n & (self.n - 1)):
             raise InputError(f"--sobol {self.n}: must be a power of two, such as {_power_near(self.n)}")
+        if self.order:
+            self._check_order()
+
+    def _check_order(self) -> None:
+        said = f"--order {','.join(self.order)}"
+        if len(self.order) < 2 or len(set(self.order)) < len(self.order):
+            raise InputError(f"{said}: write two observers or more, each once, the best first")
+        for name in self.order:
+            if name not in self.observers:
+                raise InputError(f"{said}: {name} does not run here; --observers are {', '.join(self.observers)}")
 
     @cached_property
     def points(self) -> list[Point]:
@@ -129,6 +142,8 @@ class Study:
         how: dict[str, Any] = {"observers": list(self.observers), "worlds": self.worlds, "design": self.design}
         if self.design != "grid":
             how["n"] = self.n
+        if self.order:
+            how["order"] = list(self.order)
         return {"sweep": how, "vary": {axis.field: axis.said() for axis in self.axes}, "scenario": dict(scenario)}
 
 

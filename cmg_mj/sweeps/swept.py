@@ -11,6 +11,8 @@ from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.sweeps.axes import parse_axis
 from cmg_mj.sweeps.cells import Trials, as_table, cells_of
+from cmg_mj.sweeps.indices import index_rows
+from cmg_mj.sweeps.order import order_rows
 from cmg_mj.sweeps.study import Design, Study, check_values
 from cmg_mj.sweeps.trials import table_of
 from cmg_mj.sweeps.work import compute
@@ -31,11 +33,15 @@ class Swept:
         trials: A row a trial: its point, what is varied, observer, world, outcome, and the figures of its run.
         cells: A row a point and observer: means with 95 % intervals, the share of falls with Wilson's interval, and the
             paired difference to the best observer of the point.
+        order: A row a point: in how many worlds the named order of observers held; None without one.
+        indices: A row a figure, observer and field, of a design for Sobol indices; None of another.
     """
 
     study: Study
     trials: pa.Table
     cells: pa.Table
+    order: pa.Table | None = None
+    indices: pa.Table | None = None
 
 
 def sweep(
@@ -45,6 +51,7 @@ def sweep(
     worlds: int = WORLDS,
     sample: int | None = None,
     sobol: int | None = None,
+    order: Sequence[str] = (),
 ) -> Swept:
     """Run a scenario in every cell: every point of what is varied with every observer.
 
@@ -55,6 +62,7 @@ def sweep(
         worlds: Trials a cell: world i has the same noise in every cell.
         sample: So many points of a quasi-random design of the ranges, instead of every combination.
         sobol: A design for Sobol indices instead, a power of two.
+        order: Observers, the best first: how often that holds is counted.
 
     Returns:
         The trials and cells, as tables.
@@ -70,10 +78,17 @@ def sweep(
         parse_axis(field, said if isinstance(said, str) else list(said), f"vary: {field!r}")
         for field, said in vary.items()
     )
-    study = Study(of, axes, tuple(observers or (of.observer.kind,)), worlds, design, sample or sobol or 0)
+    study = Study(of, axes, tuple(observers or (of.observer.kind,)), worlds, design, sample or sobol or 0, tuple(order))
     check_values(study)
-    trials = all_trials(study)
-    return Swept(study, trials, as_table(cells_of(Trials(study, trials))))
+    table = all_trials(study)
+    trials = Trials(study, table)
+    return Swept(
+        study,
+        table,
+        as_table(cells_of(trials)),
+        as_table(order_rows(trials)) if study.order else None,
+        as_table(index_rows(trials)) if design == "sobol" else None,
+    )
 
 
 def all_trials(study: Study) -> pa.Table:

@@ -1,0 +1,116 @@
+"""Sobol indices of a sweep: which of the varied fields an observer's figures depend on. `indices.parquet`."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cmg_mj.intervals import CONFIDENCE
+from cmg_mj.sweeps.cells import FIGURES, Trials
+
+RESAMPLES = 999
+FEWEST = 16
+"""Rows of a design by whose intervals anything is called decisive: those of fewer are too narrow."""
+AT_ONCE = 2_000_000
+"""Values of resamples held together."""
+
+
+class Indices(NamedTuple):
+    """Shares of a variance, with the ends of their 95 % intervals; each (n_fields,).
+
+    Attributes:
+        first: What a field explains by itself.
+        first_low: Its interval's lower end.
+        first_high: Its interval's upper end.
+        total: What it explains with all that it acts together with.
+        total_low: Its interval's lower end.
+        total_high: Its interval's upper end.
+    """
+
+    first: np.ndarray
+    first_low: np.ndarray
+    first_high: np.ndarray
+    total: np.ndarray
+    total_low: np.ndarray
+    total_high: np.ndarray
+
+    @property
+    def decisive(self) -> np.ndarray:
+        """Where the total index's interval lies above that of every other field, (n_fields,)."""
+        others = np.array([np.delete(self.total_high, i).max(initial=-np.inf) for i in range(len(self.total))])
+        return (self.total_low > others) & (len(self.total) > 1)
+
+
+def indices(values: np.ndarray, n: int, seed: int) -> Indices:
+    """First-order and total indices of a function at the points of a design for them.
+
+    S_i = mean(f_B (f_AB_i - f_A)) / var, ST_i = mean((f_A - f_AB_i)^2) / (2 var) (`scipy.stats.sobol_indices`).
+    Intervals: percentiles of resampled rows of the design, by a seed so that they come out the same again.
+
+    Args:
+        values: At A, B, and A with each column in turn from B, (n (n_fields + 2),); finite, and not all the same.
+        n: Rows of the design.
+        seed: Of the resampling.
+
+    Returns:
+        The indices with their intervals.
+    """
+    blocks = values.reshape(-1, n)
+    first, total = _estimated(blocks, np.arange(n)[None])
+    rng = np.random.default_rng(seed)
+    size = max(1, AT_ONCE // len(values))
+    pieces = [min(size, RESAMPLES - done) for done in range(0, RESAMPLES, size)]
+    resampled = [_estimated(blocks, rng.integers(n, size=(piece, n))) for piece in pieces]
+    tail = (1.0 - CONFIDENCE) / 2.0
+    firsts, totals = (np.concatenate(part) for part in zip(*resampled, strict=True))
+    first_low, first_high = np.quantile(firsts, (tail, 1.0 - tail), axis=0)
+    total_low, total_high = np.quantile(totals, (tail, 1.0 - tail), axis=0)
+    return Indices(first[0], first_low, first_high, total[0], total_low, total_high)
+
+
+def _estimated(blocks: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First-order and total indices by some rows of the design, (n_resamples, n) -> (n_resamples, n_fields) each."""
+    from scipy.stats import sobol_indices  # half a second
+
+    taken = blocks[:, rows]
+    found = sobol_indices(func={"f_A": taken[0], "f_B": taken[1], "f_AB": taken[2:]}, n=rows.shape[1])
+    return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)
+
+
+def index_rows(trials: Trials) -> list[dict[str, Any]]:
+    """A row a figure, observer and field; without indices, and with the reason, where they cannot be had.
+
+    What is decomposed is the mean over a point's worlds, whose noise is the same at every point.
+    """
+    study = trials.study
+    fields = [axis.field for axis in study.axes]
+    rows = []
+    for key in FIGURES:
+        means = trials.figure(key).mean(axis=2)
+        if not np.isfinite(means).any() and trials.stood.any():
+            continue  # such as an error in the push window without a push
+        for place, observer in enumerate(study.observers):
+            why = _refused(trials, key, place)
+            found = None if why else indices(means[:, place], study.n, study.scenario.seed)
+            for i, field in enumerate(fields):
+                row: dict[str, Any] = {"figure": key, "observer": observer, "field": field}
+                row |= {name: None if found is None else float(found[j][i]) for j, name in enumerate(Indices._fields)}
+                row["decisive"] = None if found is None else bool(found.decisive[i]) and study.n >= FEWEST
+                rows.append(row | {"refused": why})
+    return rows
+
+
+def _refused(trials: Trials, key: str, place: int) -> str | None:
+    """Why an observer's figure has no indices, with counts."""
+    values = trials.figure(key)[:, place]
+    outcome = trials.outcome[:, place]
+    means = values.mean(axis=1)
+    if np.isfinite(means).all():
+        return None if np.ptp(means) > 0.0 else "the same at every point"
+    fell = int((outcome == "fell").sum())
+    stopped = int(((outcome != "done") & (outcome != "fell")).sum())
+    none = int((~np.isfinite(values) & (outcome == "done")).sum())
+    counts = [f"{n} {what}" for n, what in ((fell, "fell"), (stopped, "stopped"), (none, "have no such figure")) if n]
+    points = f"no value at {int((~np.isfinite(means)).sum())} of {len(means)} points"
+    return f"{points}: of {values.size} trials {', '.join(counts)}"

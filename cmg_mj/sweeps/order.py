@@ -1,0 +1,74 @@
+"""Whether a named order of observers holds: each with a smaller error than the next. `order.parquet`."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cmg_mj.intervals import Interval
+from cmg_mj.sweeps.cells import Trials, fell_interval
+
+JUDGED = "velocity_rms_error_rad_s"
+
+
+class Held(NamedTuple):
+    """How often an order held.
+
+    Attributes:
+        times: So often.
+        of: Of so many that can tell.
+    """
+
+    times: int
+    of: int
+
+    @property
+    def share(self) -> Interval | None:
+        """With Wilson's 95 % interval; None of nothing."""
+        return fell_interval(self.times, self.of) if self.of else None
+
+
+def order_at(trials: Trials, key: str = JUDGED) -> list[Held]:
+    """In how many of each point's worlds the study's order holds.
+
+    Args:
+        trials: The trials.
+        key: The figure that decides, which is better when it is less. A fall or a stop is worse than any.
+
+    Returns:
+        A point each. A world in which two next to each other did not stand cannot tell, unless the others break
+        the order.
+    """
+    return [_held(values) for values in _errors(trials, key)]
+
+
+def order_of_points(trials: Trials, key: str = JUDGED) -> Held:
+    """At how many points it holds for the means over the worlds; one that did not stand in every world has none."""
+    return _held(_errors(trials, key).mean(axis=2).T)
+
+
+def _errors(trials: Trials, key: str) -> np.ndarray:
+    """Of the study's order, (n_points, n_order, n_worlds); infinite where one did not stand."""
+    places = [trials.study.observers.index(name) for name in trials.study.order]
+    values = trials.figure(key)[:, places]
+    return np.where(np.isnan(values), np.inf, values)
+
+
+def _held(errors: np.ndarray) -> Held:
+    """Of errors (n_order, n)."""
+    better, worse = errors[:-1], errors[1:]
+    holds = (better < worse).all(axis=0)
+    broken = ((better >= worse) & np.isfinite(worse)).any(axis=0)
+    return Held(int(holds.sum()), int((holds | broken).sum()))
+
+
+def order_rows(trials: Trials) -> list[dict[str, Any]]:
+    """A row a point: in how many worlds the order held, of how many, and the share with its interval."""
+    rows = []
+    for number, (point, held) in enumerate(zip(trials.study.points, order_at(trials), strict=True)):
+        share = held.share
+        low, high = (None, None) if share is None else (share.low, share.high)
+        row = {"point": number, **point, "order": ",".join(trials.study.order), "held": held.times, "worlds": held.of}
+        rows.append(row | {"share": None if share is None else share.mean, "low": low, "high": high})
+    return rows

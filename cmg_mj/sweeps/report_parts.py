@@ -1,0 +1,108 @@
+"""Parts of a sweep's report: pictures, how often an order holds, Sobol indices. Each a list of paragraphs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from cmg_mj import markdown
+from cmg_mj.picture import Picture
+from cmg_mj.summary_keys import heading
+from cmg_mj.sweeps.cells import Trials
+from cmg_mj.sweeps.drawn import SHOWN
+from cmg_mj.sweeps.indices import FEWEST
+from cmg_mj.sweeps.order import order_of_points
+from cmg_mj.sweeps.study import Study
+
+ABOUT_MAPS = (
+    "A cell's colour is the observer of the smallest mean error among those that stood in every world, the contours "
+    "are its error. A dot: another one's mean difference to it, world by world, is within its 95 % interval. A line in "
+    "an observer's colour: half of its worlds fall beyond it. For falls, a dot says that Wilson's intervals overlap."
+)
+ABOUT_CURVES = (
+    "Bands are 95 % intervals. A cross: some worlds did not stand to the end, and the mean is that of the others, "
+    "which had it easier."
+)
+
+
+def pictures(trials: Trials, drawn: Sequence[Picture]) -> list[str]:
+    """The pictures, with how to read them."""
+    if not drawn:
+        return []
+    is_map = any(panel.map is not None for picture in drawn for panel in picture.panels)
+    falls = [] if (trials.outcome == "fell").any() else ["No world fell."]
+    return [
+        *(f"![{picture.title}]({picture.name}.png)" for picture in drawn),
+        ABOUT_MAPS if is_map else ABOUT_CURVES,
+        *falls,
+    ]
+
+
+def order(trials: Trials, rows: Sequence[dict[str, Any]], most: int) -> list[str]:
+    """How often the named order holds."""
+    study = trials.study
+    by_points = order_of_points(trials)
+    held, worlds = sum(row["held"] for row in rows), sum(row["worlds"] for row in rows)
+    said = f"By the means over the worlds it holds at {by_points.times} of {by_points.of} points"
+    share = by_points.share
+    if share is not None and study.design == "sample":  # points of a grid are no sample of anything
+        said += f" ({_percent(share.mean)}, Wilson's 95 % interval {_percent(share.low)} to {_percent(share.high)})"
+    unknown = len(study.points) - by_points.of
+    if unknown:
+        said += f"; {unknown} points cannot tell"
+    fields = [axis.field for axis in study.axes]
+    table = [
+        [*(_said(row[field]) for field in fields), f"{row['held']} of {row['worlds']}", *_share(row)]
+        for row in rows[:most]
+    ]
+    parts = [
+        f"## The order {' < '.join(study.order)}",
+        f"{said}; world by world in {held} of {worlds}. Counted by the {heading(SHOWN[0])}; a fall is worse than any "
+        "error, and where two next to each other fell nobody can tell.",
+        markdown.table([*fields, "worlds", "share", "95 % interval"], table, text_columns=0),
+    ]
+    more = len(rows) - most
+    return parts if more <= 0 else [*parts, f"{more} points more are in order.parquet."]
+
+
+def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
+    """First-order and total indices of the figures that matter most."""
+    about = (
+        "Shares of the variance of a point's mean over its worlds: first order, what a field explains by itself; "
+        "total, with all that it acts together with. In brackets bootstrap 95 % intervals. Decisive: its total index's "
+        "interval is above all others'. All figures are in indices.parquet."
+    )
+    if study.n < FEWEST:
+        about += f" Of fewer than {FEWEST} rows the intervals are too narrow, and nothing is called decisive."
+    parts = ["## What the errors depend on: Sobol indices", about]
+    for key in SHOWN:
+        of = [row for row in rows if row["figure"] == key]
+        given = [row for row in of if not row["refused"]]
+        if of:
+            parts.append(f"### {heading(key)}")
+        if given:
+            headings = ["observer", "field", "first order", "total", "decisive"]
+            parts.append(markdown.table(headings, [_index_row(row) for row in given], text_columns=2))
+        refused = {row["observer"]: row["refused"] for row in of if row["refused"]}
+        if refused:
+            parts.append("\n".join(["Refused:", "", *(f"- {name}: {why}" for name, why in refused.items())]))
+    return parts
+
+
+def _index_row(row: dict[str, Any]) -> list[str]:
+    cells = [f"{row[name]:.3f} [{row[f'{name}_low']:.3f}, {row[f'{name}_high']:.3f}]" for name in ("first", "total")]
+    return [row["observer"], row["field"], *cells, "yes" if row["decisive"] else ""]
+
+
+def _share(row: dict[str, Any]) -> list[str]:
+    if row["share"] is None:
+        return ["-", "-"]
+    return [_percent(row["share"]), f"{_percent(row['low'])} to {_percent(row['high'])}"]
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
+
+
+def _said(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
