@@ -36,7 +36,7 @@ def ticks_of(values: np.ndarray) -> list[float]:
 
 
 def round_values(values: np.ndarray) -> tuple[float, ...]:
-    """Round numbers between the least and the greatest value, at most seven; none if there is nothing between."""
+    """Round numbers between the least and the greatest value, at most seven; none if they are too alike."""
     known = values[np.isfinite(values) & (values > 0.0)]
     if not len(known) or known.min() == known.max():
         return ()

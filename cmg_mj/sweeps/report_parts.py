@@ -50,17 +50,19 @@ def order(trials: Trials, rows: Sequence[dict[str, Any]], most: int) -> list[str
     unknown = len(study.points) - by_points.of
     if unknown:
         said += f"; {unknown} points cannot tell"
+    parts = [
+        f"## The order {' < '.join(study.order)}",
+        f"{said}; world by world in {held} of {worlds}. Counted by the {heading(SHOWN[0])}; a fall is worse than any "
+        "error, and where two next to each other fell nobody can tell.",
+    ]
+    if study.design != "grid":
+        return [*parts, "Every point is in order.parquet."]
     fields = [axis.field for axis in study.axes]
     table = [
         [*(_said(row[field]) for field in fields), f"{row['held']} of {row['worlds']}", *_share(row)]
         for row in rows[:most]
     ]
-    parts = [
-        f"## The order {' < '.join(study.order)}",
-        f"{said}; world by world in {held} of {worlds}. Counted by the {heading(SHOWN[0])}; a fall is worse than any "
-        "error, and where two next to each other fell nobody can tell.",
-        markdown.table([*fields, "worlds", "share", "95 % interval"], table, text_columns=0),
-    ]
+    parts.append(markdown.table([*fields, "worlds", "share", "95 % interval"], table, text_columns=0))
     more = len(rows) - most
     return parts if more <= 0 else [*parts, f"{more} points more are in order.parquet."]
 

@@ -1,0 +1,79 @@
+"""Sobol indices of known functions, refused where a value is missing, decisive only where intervals part."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmg_mj.sweeps.indices import index_rows, indices
+from cmg_mj.sweeps.study import Study, _sampled
+from tests.sweeps.made_up import BIAS, NOISE, VELOCITY, made_up
+
+
+def ishigami(shares: np.ndarray) -> np.ndarray:
+    x = np.pi * (2.0 * shares - 1.0)
+    return np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+
+
+def test_the_indices_of_a_known_function() -> None:
+    """Ishigami's: 0.314, 0.442, 0 and 0.558, 0.442, 0.244 in closed form."""
+    first, total = np.array([0.3139, 0.4424, 0.0]), np.array([0.5576, 0.4424, 0.2437])
+    n = 1024
+    found = indices(ishigami(_sampled(3, n, 1, indices=True)), n, 0)
+    np.testing.assert_allclose(found.first, first, atol=0.03)
+    np.testing.assert_allclose(found.total, total, atol=0.03)
+    for low, of, high in ((found.first_low, first, found.first_high), (found.total_low, total, found.total_high)):
+        assert (low <= of).all()
+        assert (of <= high).all()
+        assert (high - low < 0.4).all()
+    again = indices(ishigami(_sampled(3, n, 1, indices=True)), n, 0)
+    assert all(np.array_equal(a, b) for a, b in zip(found, again, strict=True))
+
+
+@pytest.mark.parametrize(("weights", "decisive"), [((4.0, 1.0), [True, False]), ((1.0, 1.0), [False, False])])
+def test_decisive_only_where_intervals_part(weights: tuple[float, float], decisive: list[bool]) -> None:
+    n = 256
+    assert indices(_sampled(2, n, 3, indices=True) @ np.array(weights), n, 0).decisive.tolist() == decisive
+
+
+def sobol(error: Any, n: int = 64) -> list[dict[str, Any]]:
+    trials = made_up({BIAS: "0:1", NOISE: "100:200"}, ("linear", "ltv"), 2, error, design="sobol", n=n)
+    assert isinstance(trials.study, Study)
+    return [row for row in index_rows(trials) if row["figure"] == VELOCITY]
+
+
+def test_what_is_decomposed_is_the_mean_over_the_worlds() -> None:
+    """Worlds that pull apart by the noise, and by nothing in their mean."""
+    rows = sobol(lambda point, _, world: point[BIAS] + (2 * world - 1) * point[NOISE])
+    by = {(row["observer"], row["field"]): row for row in rows}
+    assert by["linear", BIAS]["total"] == pytest.approx(1.0, abs=0.1)
+    assert by["linear", NOISE]["total"] == pytest.approx(0.0, abs=1e-9)
+    assert (by["ltv", BIAS]["decisive"], by["ltv", NOISE]["decisive"]) == (True, False)
+
+
+def test_refused_with_counts_where_a_world_fell() -> None:
+    rows = sobol(lambda point, name, world: None if name == "ltv" and world and point[BIAS] > 0.5 else point[BIAS])
+    fell = sum(1 for point in made_up_points() if point[BIAS] > 0.5)
+    for row in rows:
+        if row["observer"] == "ltv":
+            assert row["refused"] == f"no value at {fell} of 256 points: of 512 trials {fell} fell"
+            assert row["total"] is None
+            assert row["decisive"] is None
+        else:
+            assert row["refused"] is None
+    assert 0 < fell < 256
+
+
+def made_up_points() -> list[dict[str, Any]]:
+    trials = made_up({BIAS: "0:1", NOISE: "100:200"}, ("linear",), 1, lambda *_: 1.0, design="sobol", n=64)
+    return trials.study.points
+
+
+def test_the_same_everywhere_depends_on_nothing() -> None:
+    assert {row["refused"] for row in sobol(lambda *_: 0.1)} == {"the same at every point"}
+
+
+def test_of_few_rows_nothing_is_decisive() -> None:
+    assert not any(row["decisive"] for row in sobol(lambda point, *_: point[BIAS], n=8))

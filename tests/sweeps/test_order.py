@@ -1,0 +1,78 @@
+"""How often a named order of observers holds."""
+
+from __future__ import annotations
+
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.sweeps.order import order_of_points, order_rows
+from cmg_mj.sweeps.report_parts import order as said
+from tests.sweeps.made_up import BIAS, made_up
+
+NAMES = ("linear", "ltv", "homogeneous")
+ORDER = ("homogeneous", "ltv", "linear")
+
+
+def counted(*worlds: tuple[float | None, float | None, float | None]) -> tuple[int, int]:
+    """Of one point, with the errors of the order's observers in each world."""
+    trials = made_up(
+        {BIAS: "0"}, NAMES, len(worlds), lambda _, name, world: worlds[world][ORDER.index(name)], order=ORDER
+    )
+    (row,) = order_rows(trials)
+    return row["held"], row["worlds"]
+
+
+@pytest.mark.parametrize(
+    ("errors", "held"),
+    [
+        ((1.0, 2.0, 3.0), (1, 1)),
+        ((1.0, 3.0, 2.0), (0, 1)),
+        ((1.0, 1.0, 2.0), (0, 1)),
+        ((1.0, 2.0, None), (1, 1)),
+        ((None, 1.0, 2.0), (0, 1)),
+        ((1.0, None, None), (0, 0)),
+        ((None, None, None), (0, 0)),
+        ((None, None, 1.0), (0, 1)),  # the two that are to be better fell: that breaks it
+        ((2.0, 1.0, None), (0, 1)),
+    ],
+)
+def test_a_world(errors: tuple[float | None, float | None, float | None], held: tuple[int, int]) -> None:
+    assert counted(errors) == held
+
+
+def test_the_share_has_wilsons_interval() -> None:
+    trials = made_up({BIAS: "0,1"}, NAMES, 10, lambda p, name, w: ORDER.index(name) * (w < 8 or p[BIAS]), order=ORDER)
+    first, second = order_rows(trials)
+    assert (first["held"], first["worlds"], first["share"]) == (8, 10, 0.8)
+    assert (first["low"], first["high"]) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    assert (second["held"], second["share"]) == (10, 1.0)
+    assert (
+        "By the means over the worlds it holds at 2 of 2 points; world by world in 18 of 20."
+        in said(trials, order_rows(trials), 60)[1]
+    )
+
+
+def test_points_by_their_means() -> None:
+    """One bad world of three turns the mean, and a fall does so whatever the others are."""
+    of = {0: {"ltv": 10.0}, 1: {"ltv": None}, 2: {}}
+    trials = made_up(
+        {BIAS: "0,1,2"},
+        NAMES,
+        3,
+        lambda p, name, w: of[p[BIAS]].get(name, ORDER.index(name)) if w == 0 else float(ORDER.index(name)),
+        order=ORDER,
+    )
+    assert order_of_points(trials) == (1, 3)
+
+
+@pytest.mark.parametrize(
+    ("order", "complaint"),
+    [
+        (("ltv",), "write two observers or more"),
+        (("ltv", "ltv"), "each once"),
+        (("ltv", "kalman"), "kalman does not run here; --observers are linear, ltv, homogeneous"),
+    ],
+)
+def test_what_is_no_order(order: tuple[str, ...], complaint: str) -> None:
+    with pytest.raises(InputError, match=f"--order .*{complaint}"):
+        made_up({BIAS: "0"}, NAMES, 1, lambda *_: 1.0, order=order)
