@@ -47,6 +47,41 @@ def test_the_files_of_a_sweep(tmp_path: Path) -> None:
     assert "12 of 12 trials are there from before" in goes_on.err
 
 
+def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
+    """Another order is no other study, and none leaves none behind."""
+    out = tmp_path / "out"
+    rates = ["--vary", "sensors.accelerometer.noise_density_ug_rthz=100,400"]
+    said = cmg_mj(*SMALL, *rates, *SHORT, "--order", "gyro_free,linear", "--out", str(out))
+    assert said.status == 0
+    report = (out / "report.md").read_text(encoding="utf-8")
+    assert "![Push recovery: velocity RMS error [rad/s], 3 worlds a cell](map_velocity_error.png)" in report
+    assert (out / "map_velocity_error.png").read_bytes().startswith(b"\x89PNG")
+    assert "No world fell." in report
+    assert "## The order gyro_free < linear" in report
+    assert [row["worlds"] for row in pq.read_table(out / "order.parquet").to_pylist()] == [3] * 4
+    assert 'order = [\n    "gyro_free",' in (out / "study.toml").read_text(encoding="utf-8")
+    again = cmg_mj(*SMALL, *rates, *SHORT, "--out", str(out))
+    assert "24 of 24 trials are there from before" in again.err
+    assert not (out / "order.parquet").exists()
+    assert "order" not in (out / "study.toml").read_text(encoding="utf-8")
+
+
+def test_a_design_for_indices(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    varied = ["--vary", f"{BIAS}=-1:1", "--vary", "sensors.accelerometer.noise_density_ug_rthz=log:100:800"]
+    arguments = ["sweep", "push_recovery", *varied, "--sobol", "16", "--worlds", "2", *SHORT, "--out", str(out)]
+    assert cmg_mj(*arguments, "--observers", "linear").status == 0
+    rows = pq.read_table(out / "indices.parquet").to_pylist()
+    of = {row["field"]: row for row in rows if row["figure"] == "velocity_rms_error_rad_s"}
+    noise = of["sensors.accelerometer.noise_density_ug_rthz"]
+    assert noise["total_low"] < noise["total"] < noise["total_high"]
+    assert not any("push" in row["figure"] for row in rows)
+    report = (out / "report.md").read_text(encoding="utf-8")
+    assert f"| linear     | {BIAS} " in report
+    assert f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]" in report
+    assert not list(out.glob("*.png"))
+
+
 def test_a_plan_runs_nothing(tmp_path: Path) -> None:
     said = cmg_mj(*SMALL, "--plan", "--out", str(tmp_path / "out"))
     assert said.out.startswith("2 points x 2 observers x 3 worlds = 12 trials in 2 chunks; about ")
@@ -66,6 +101,7 @@ def test_a_plan_runs_nothing(tmp_path: Path) -> None:
         (["--vary", f"{BIAS}=0:1:1000", "--worlds", "10000"], "10000000 trials; beyond 1000000 say --yes"),
         (["--vary", f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200: must be a power of two, such as 256"),
         (["--vary", f"{BIAS}=0:1", "--sobol", "2", "--sample", "3"], "--sample and --sobol: one of them"),
+        (["--vary", f"{BIAS}=0,1", "--order", "linear,ltv"], "--order linear,ltv: linear does not run here"),
         (["--vary", f"{BIAS}=0,1", "--observers", "linar"], "no such observer; did you mean 'linear'"),
     ],
 )
