@@ -6,7 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
-EXTRAS = ("papers", "export", "test")
+EXTRAS = ("papers", "export", "cluster", "test")
 
 
 def main() -> None:

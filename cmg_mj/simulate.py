@@ -198,6 +198,7 @@ def simulate(
     driver: Driver = "native",
     keep_trajectory: bool = True,
     on_progress: Callable[[float], None] | None = None,
+    threads: int = 0,
 ) -> Result:
     """Run one world, or as many as there are plants.
 
@@ -211,6 +212,7 @@ def simulate(
         driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only).
         keep_trajectory: Whether to keep every tick; without it memory does not grow with the duration.
         on_progress: Called after every tick with the simulated time [s]; a KeyboardInterrupt it raises ends the run.
+        threads: On which many worlds are stepped; 0: as many as there are processors.
 
     Returns:
         The outcomes, summaries and the trajectory. Whatever stops a run, what was recorded until then is there.
@@ -226,7 +228,7 @@ def simulate(
         raise InputError("driver = 'callback': MuJoCo's control callback drives one world, not a batch")
     timestep = rig.model.opt.timestep
     steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
-    worlds: Any = OneWorld(rig) if single else ManyWorlds(plants)
+    worlds: Any = OneWorld(rig) if single else ManyWorlds(plants, threads)
     fall = np.radians(settings.fall_angle_deg).item()
     dt = controller.law.dt
     sensors = of_worlds(controller.sensors, len(plants))

@@ -54,13 +54,17 @@ class OneWorld:
 class ManyWorlds:
     """Many worlds on arrays, stepped by MuJoCo's own thread pool.
 
+    Args:
+        plants: The rig of each world.
+        threads: Of the pool, on which nothing depends but how long it takes; 0: all processors.
+
     Attributes:
         running: Which worlds are still stepped, (n_worlds,).
     """
 
-    def __init__(self, plants: Sequence[Plant]) -> None:
+    def __init__(self, plants: Sequence[Plant], threads: int = 0) -> None:
         first = plants[0]
-        self.batch = Batch(first.model, len(plants))
+        self.batch = Batch(first.model, len(plants), threads)
         if any(plant is not first for plant in plants):
             self.batch.set_models([plant.model for plant in plants])
         b = self.batch

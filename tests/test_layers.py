@@ -27,7 +27,7 @@ ORDER = [*ABOVE, *BELOW]
 
 REAL_LOG = PACKAGE.parent / "examples" / "data" / "stepper_encoder_gyro.csv"
 
-HEAVY = {"rerun": "recording", "matplotlib": "plots", "casadi": "export"}
+HEAVY = {"rerun": "recording", "matplotlib": "plots", "casadi": "export", "distributed": "sweeps"}
 """Imported by one room each, because it costs time."""
 
 

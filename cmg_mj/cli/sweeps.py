@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +34,11 @@ if TYPE_CHECKING:
 @click.option("--sobol", type=click.IntRange(1), metavar="N", help="A design for Sobol indices, N a power of two.")
 @click.option("--order", metavar="NAMES", help="Observers, the best first: count how often that holds.")
 @click.option("--plan", is_flag=True, help="Say what it would take, and run nothing.")
+@click.option(
+    "--cluster",
+    metavar="ADDRESS",
+    help="Compute on a Dask cluster: its scheduler's address, or local:2 for one of 2 workers on this machine.",
+)
 @click.option("--yes", is_flag=True, help="Run it even if it is very large.")
 @users_code()
 def sweep(
@@ -43,6 +50,7 @@ def sweep(
     sobol: int | None,
     order: str | None,
     plan: bool,
+    cluster: str | None,
     yes: bool,
 ) -> None:
     """Run SCENARIO, or a study file that a sweep has written, in every cell: every point with every observer.
@@ -54,7 +62,7 @@ def sweep(
     from cmg_mj.sweeps.cells import Trials, cells_of
     from cmg_mj.sweeps.plan import expected
     from cmg_mj.sweeps.report import FILES, cells_markdown, save
-    from cmg_mj.sweeps.store import Store, read_chunks, run
+    from cmg_mj.sweeps.store import Store, read_chunks
     from cmg_mj.sweeps.study import MOST_TRIALS, check_values
 
     study = _study(chosen, varied, observers, worlds, sample, sobol, order)
@@ -69,23 +77,38 @@ def sweep(
             "(--plan says what it would take)"
         )
     place = Path("runs") / f"sweep-{Path(chosen.name).stem}" if chosen.out is None else named(chosen.out)
-    folder = claim(place, FILES)
-    store = Store(place, study)
-    before = store.open()
-    if before:
-        say(f"{before} of {study.trials} trials are there from before")
-    with CtrlC() as ctrl_c:
-        try:
-            with progress(f"sweep {chosen.name}", study.trials, ctrl_c) as on_progress:
-                run(store, on_progress)
-        except KeyboardInterrupt:
-            say(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
-            sys.exit(INTERRUPTED)
-        trials = Trials(study, read_chunks(store))
-        rows = cells_of(trials)
-        at = save(folder, store, trials, rows)
+    with _runner(cluster) as run:
+        folder = claim(place, FILES)
+        store = Store(place, study)
+        before = store.open()
+        if before:
+            say(f"{before} of {study.trials} trials are there from before")
+        with CtrlC() as ctrl_c:
+            try:
+                with progress(f"sweep {chosen.name}", study.trials, ctrl_c) as on_progress:
+                    run(store, on_progress)
+            except KeyboardInterrupt:
+                say(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
+                sys.exit(INTERRUPTED)
+            trials = Trials(study, read_chunks(store))
+            rows = cells_of(trials)
+            at = save(folder, store, trials, rows)
     show({"trials": study.trials, "cells": rows}, cells_markdown(study, rows), chosen.as_json)
     say_written(folder, at, f"Read {at / 'report.md'}", chosen.as_json)
+
+
+@contextmanager
+def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
+    """What runs the chunks: this process, or a cluster."""
+    if cluster is None:
+        from cmg_mj.sweeps.store import run
+
+        yield run
+    else:
+        from cmg_mj.sweeps.cluster import on_cluster
+
+        with on_cluster(cluster, say) as connected:
+            yield connected.run
 
 
 def _study(

@@ -66,6 +66,24 @@ def write_table(path: Path, table: pa.Table) -> None:
         pq.write_table(table, file)
 
 
+def as_bytes(table: pa.Table) -> bytes:
+    """A table as it is sent (an Arrow stream)."""
+    import pyarrow as pa
+
+    into = pa.BufferOutputStream()
+    with pa.ipc.new_stream(into, table.schema) as stream:
+        stream.write_table(table)
+    return into.getvalue().to_pybytes()
+
+
+def from_bytes(sent: bytes) -> pa.Table:
+    """The table that was sent."""
+    import pyarrow as pa
+
+    with pa.ipc.open_stream(sent) as stream:
+        return stream.read_all()
+
+
 def merge(parts: Sequence[Path], path: Path) -> None:
     """Write many files of the same columns as one, a row group each, without holding them all."""
     import pyarrow.parquet as pq

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,14 @@ REFUSED = "refused"
 """How a trial ends whose values do not fit each other: it never begins."""
 
 
-def compute(study: Study, chunk: Chunk, on_progress: Callable[[float], None] | None = None) -> list[dict[str, Any]]:
+def compute(
+    study: Study,
+    chunk: Chunk,
+    on_progress: Callable[[float], None] | None = None,
+    *,
+    points: Mapping[int, Point] | None = None,
+    threads: int = 0,
+) -> list[dict[str, Any]]:
     """Run the trials of a chunk.
 
     What fails is a row with its reason: values that do not fit, a rig whose physics fails, an observer that raises.
@@ -28,10 +35,13 @@ def compute(study: Study, chunk: Chunk, on_progress: Callable[[float], None] | N
         study: The sweep.
         chunk: Which of its trials.
         on_progress: Called after every tick with the share of the chunk that is done.
+        points: Those of the chunk by their numbers, which then are not made of the whole study's.
+        threads: On which its worlds are stepped; 0: as many as there are processors.
 
     Returns:
         A row a trial, in the chunk's order: its point's number, what is varied, and the figures of its run.
     """
+    at = study.points if points is None else points
     base = prepare(study.scenario.with_observer(chunk.observer).model_copy(update={"companions": []}))
     found: dict[tuple[int, int], dict[str, Any]] = {}
     pools: dict[str, list[tuple[int, int]]] = {}
@@ -44,7 +54,7 @@ def compute(study: Study, chunk: Chunk, on_progress: Callable[[float], None] | N
             continue
         if number not in experiments:
             try:
-                experiments[number] = base.with_values(study.points[number])
+                experiments[number] = base.with_values(at[number])
                 pool_of[number] = _pool_of(experiments[number])
             except InputError as error:
                 refused[number] = str(error)
@@ -53,13 +63,26 @@ def compute(study: Study, chunk: Chunk, on_progress: Callable[[float], None] | N
     for trials in pools.values():
         done, share = len(found) / len(chunk.trials), len(trials) / len(chunk.trials) / study.scenario.duration_s
         tick = partial(_inside, on_progress, done, share) if on_progress else None
-        rows = _run([experiments[number] for number, _ in trials], trials, tick)
+        rows = _run([experiments[number] for number, _ in trials], trials, tick, threads)
         found |= zip(trials, rows, strict=True)
     for trial in chunk.trials:
         if trial[0] in refused:
             found[trial] = _unfinished(REFUSED, refused[trial[0]])
     return [
-        {"point": number, **_plain(study.points[number]), **_identity(study, chunk, world), **found[number, world]}
+        {"point": number, **_plain(at[number]), **_identity(study, chunk, world), **found[number, world]}
+        for number, world in chunk.trials
+    ]
+
+
+def given_up(study: Study, chunk: Chunk, reason: str) -> list[dict[str, Any]]:
+    """Rows of a chunk that could not be computed: the reason in each."""
+    return [
+        {
+            "point": number,
+            **_plain(study.points[number]),
+            **_identity(study, chunk, world),
+            **_unfinished("stopped", reason),
+        }
         for number, world in chunk.trials
     ]
 
@@ -69,11 +92,14 @@ def _inside(on_progress: Callable[[float], None], done: float, share: float, tim
 
 
 def _run(
-    experiments: Sequence[Experiment], trials: Sequence[tuple[int, int]], tick: Callable[[float], None] | None
+    experiments: Sequence[Experiment],
+    trials: Sequence[tuple[int, int]],
+    tick: Callable[[float], None] | None,
+    threads: int,
 ) -> Iterable[dict[str, Any]]:
     worlds = [world for _, world in trials]
     try:
-        result: Result = run_together(experiments, worlds, keep_trajectory=False, on_progress=tick)
+        result: Result = run_together(experiments, worlds, keep_trajectory=False, on_progress=tick, threads=threads)
     except Exception as error:  # a user's observer may fail in any way
         return [_unfinished("stopped", raised(error)) for _ in trials]
     if any(outcome.kind == "interrupted" for outcome in result.outcomes):
