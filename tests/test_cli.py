@@ -280,6 +280,18 @@ def test_bench(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "linear" in cmg_mj("bench", "--observers", "linear", "--worlds", 2).out
 
 
+def test_bench_of_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmg_mj.sweeps.cost.DURATION_S", 3.0)
+    monkeypatch.setattr("cmg_mj.sweeps.cost.RIGS", {"plant.equilibrium_bias_deg": "-0.5:0.5"})
+    said = cmg_mj("bench", "--sweep", "--observers", "linear", "--worlds", 8, "--json")
+    assert (said.status, said.err) == (0, "")
+    one, many = json.loads(said.out)["figures"]
+    assert (one["rigs"], one["trials"], many["rigs"], many["trials"]) == (1, 8, 2, 8)
+    assert min(one["cpu_over_batch"], many["cpu_over_batch"]) > 1.0
+    assert "linear" in cmg_mj("bench", "--sweep", "--observers", "linear", "--worlds", 8).out
+    assert cmg_mj("bench", "--sweep", "--board").complaint == "--board and --sweep: one of them"
+
+
 # --- terminals, pipes ----------------------------------------------------------------------------------------
 
 

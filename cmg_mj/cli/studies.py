@@ -27,8 +27,8 @@ from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, 
 from cmg_mj.differences import safe_name
 from cmg_mj.errors import InputError, nearest
 
-BATCH = 256
-"""Worlds that are timed at once."""
+BATCH, CHUNK = 256, 512
+"""Worlds that are timed at once: of a batch, and of a sweep's chunk."""
 
 
 @click.command(short_help="Time the closed loop against bare MuJoCo.")
@@ -40,15 +40,18 @@ BATCH = 256
     help=f"Worlds of the batch.  [default: {BATCH}]",
 )
 @click.option("--board", is_flag=True, help="Count what an update takes on an emulated Cortex-M7 instead.")
+@click.option("--sweep", is_flag=True, help="Time chunks of sweeps instead: processor time of all by the batch's.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 @click.option("--markdown", is_flag=True, help="Print the table of --board as Markdown.")
 @users_code()
-def bench(observers: str, worlds: int | None, board: bool, as_json: bool, markdown: bool) -> None:
+def bench(observers: str, worlds: int | None, board: bool, sweep: bool, as_json: bool, markdown: bool) -> None:
     """Time the closed loop against bare MuJoCo doing the same physics, and an update of each observer.
 
     With --board: instructions, stack, memory and flash of an update as C on the papers' processor.
     """
     names = names_of(observers)
+    if board and sweep:
+        raise InputError("--board and --sweep: one of them")
     if board:
         if worlds is not None:
             raise InputError("--worlds: is for the batch on the host; --board has no worlds")
@@ -62,6 +65,14 @@ def bench(observers: str, worlds: int | None, board: bool, as_json: bool, markdo
         return
     if markdown:
         raise InputError("--markdown: only the table of --board is printed so")
+    if sweep:
+        from cmg_mj.sweeps.cost import measure as chunks
+        from cmg_mj.sweeps.cost import table
+
+        with progress("Bench of sweeps", 1.0) as on_progress:
+            figures = chunks(names, worlds or CHUNK, on_progress)
+        show(figures, table(figures), as_json)
+        return
     from cmg_mj.bench import bench_table, measure
 
     with progress("Bench", 1.0) as on_progress:
