@@ -21,6 +21,8 @@ MEMORY_S = 0.5
 SINGLE, WIDER = 4, 1.3
 """Their newest samples have a tap each; older ones share one, and every share is so much wider than the one before.
 A tap a sample takes 0.3 % off the floor, half a second more of memory 1 % (docs/studies/gyro_free.py --taps)."""
+PIECE = 16
+"""Worlds whose sums are taken together: so many stay in a processor's cache."""
 ROWS_A_TAP = 10
 """So many samples a tap, or there is no fit."""
 
@@ -90,21 +92,31 @@ class TiltFloor:
         if self._past is None:  # it stood still before
             self._past = np.repeat(y1[:1].T, self.edges[-1] - 1, axis=1)
         whole = np.concatenate([self._past, y1.T], axis=1)
-        self._past = whole[:, len(y1) :]
-        sums = np.cumsum(whole, axis=1)
-        sums = np.concatenate([np.zeros_like(sums[:, :1]), sums], axis=1)
-        last = sums.shape[1] - len(y1)
-        # (n_worlds, taps and the rate, n_rows)
-        inputs = np.empty((len(whole), self._taps + 1, len(y1)))
-        for tap, (newer, older) in enumerate(pairwise(self.edges)):
-            np.subtract(sums[:, last - newer :][:, : len(y1)], sums[:, last - older :][:, : len(y1)], inputs[:, tap])
-        inputs[:, -1] = x2.T
-        for part, mask in enumerate((counted, pushed)):
-            rows = mask.any(axis=1)
-            kept = inputs if mask.all() else np.where(mask[rows].T[:, None], inputs[:, :, rows], 0.0)
-            # Not by @: BLAS would take every core for it, and keep them busy for a while.
-            self._products[part] += np.einsum("wir,wjr->wij", kept, kept)
+        self._past = whole[:, len(y1) :].copy()
+        masks = [(mask, mask.any(axis=1), mask.all()) for mask in (counted, pushed)]
+        for first in range(0, len(whole), PIECE):
+            worlds = slice(first, first + PIECE)
+            inputs = self._inputs(whole[worlds], x2[:, worlds])
+            for part, (mask, rows, everywhere) in enumerate(masks):
+                if not rows.any():
+                    continue
+                kept = inputs if everywhere else np.where(mask[rows, worlds].T[:, None], inputs[:, :, rows], 0.0)
+                # Not by @: BLAS would take every core for it, and keep them busy for a while.
+                self._products[part, worlds] += np.einsum("wir,wjr->wij", kept, kept)
+        for part, (mask, *_) in enumerate(masks):
             self._counts[part] += mask.sum(axis=0)
+
+    def _inputs(self, y1: np.ndarray, x2: np.ndarray) -> np.ndarray:
+        """What goes into the taps, and the rate below: (n_worlds, taps + 1, n_rows)."""
+        n_rows = len(x2)
+        sums = np.cumsum(y1, axis=1)
+        sums = np.concatenate([np.zeros_like(sums[:, :1]), sums], axis=1)
+        last = sums.shape[1] - n_rows
+        inputs = np.empty((len(y1), self._taps + 1, n_rows))
+        for tap, (newer, older) in enumerate(pairwise(self.edges)):
+            np.subtract(sums[:, last - newer :][:, :n_rows], sums[:, last - older :][:, :n_rows], inputs[:, tap])
+        inputs[:, -1] = x2.T
+        return inputs
 
     def errors(self, world: int) -> tuple[float | None, float | None]:
         """What is left of the rate in one world.
