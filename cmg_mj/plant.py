@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass as plain_dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -30,38 +29,13 @@ from cmg_mj.processor import Processor, WithProcessor
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
 from cmg_mj.rig_check import starts
-from cmg_mj.rig_parts import KEYFRAME
+from cmg_mj.rig_parts import KEYFRAME, Cube
 from cmg_mj.sensors import Sensors
 from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.variations import vary
 
 QUARTER_TURN = math.pi / 2.0
-
-
-@plain_dataclass(frozen=True)
-class Cube:
-    """Addresses of one module in the compiled model.
-
-    Attributes:
-        name: Its prefix, `cube1`.
-        gimbal: Address of the gimbal angle in qpos, and of its rate in qvel (hinges only: they agree).
-        flywheel: The same for the flywheel.
-        servo: The gimbal servo's control.
-        motor: The flywheel motor's control.
-        direction: +1 or -1: the sign of u its gimbal is given, so that all cubes push the same way.
-        gimbal_zero: Gimbal angle at which the spin axis is upright, x3 = 0 [rad].
-        speed: Nominal flywheel speed, signed [rad/s].
-    """
-
-    name: str
-    gimbal: int
-    flywheel: int
-    servo: int
-    motor: int
-    direction: float
-    gimbal_zero: float
-    speed: float
 
 
 class Plant:
@@ -119,8 +93,7 @@ class Plant:
             settings,
             self.path,
             tilt=self.tilt,
-            gimbals=self._gimbals,
-            flywheels=[cube.flywheel for cube in self.cubes],
+            cubes=self.cubes,
         )
         shaken = max(abs(cube.speed) for cube in self.cubes) if settings.flywheel_imbalance_kg_m else 0.0
         self.largest_step = largest_step(self.model, self.key, own, shaken)
@@ -169,7 +142,6 @@ class Plant:
         self.cubes = tuple(self._cube(prefix) for prefix in prefixes)
         self.servos = [cube.servo for cube in self.cubes]
         self.directions = [cube.direction for cube in self.cubes]
-        self._gimbals = [cube.gimbal for cube in self.cubes]
         self._shares = [cube.direction / len(self.cubes) for cube in self.cubes]
         self._encoders = [int(model.sensor_adr[self._id("sensor", f"{name}/gimbal_encoder")]) for name in prefixes]
         self._specific_forces = [address + axis for address, _ in self._accelerometers for axis in (0, 2)]
