@@ -34,6 +34,7 @@ class PlantSettings:
         servo_damping_n_m_s_rad: Of each gimbal servo's position loop [N m s/rad].
         tilt_friction_n_m: Dry friction of the tilt joint [N m].
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
+        flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
         flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
     """
 
@@ -50,10 +51,11 @@ class PlantSettings:
     servo_damping_n_m_s_rad: NonNegative | None = None
     tilt_friction_n_m: NonNegative | None = None
     tilt_damping_n_m_s: NonNegative | None = None
+    flywheel_speed_rad_s: Positive | None = None
     flywheel_imbalance_kg_m: float = 0.0
 
     def changes_of_physics(self) -> dict[str, float]:
-        """What is given of friction, damping, inertia, imbalance and servos."""
+        """What is given of friction, damping, inertia, servos and wheels."""
         of = ("gimbal", "servo", "tilt", "flywheel")
         fields = [field for field in dataclasses.fields(self) if field.name.startswith(of)]
         return {field.name: value for field in fields if (value := getattr(self, field.name)) != field.default}

@@ -1,9 +1,10 @@
-"""How a rig differs from its model file: integrator and step, friction, imbalance, the equilibrium bias."""
+"""How a rig differs from its model file: integrator and step, friction, servos, wheels, the equilibrium bias."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -64,6 +65,36 @@ def vary(
             body = int(model.jnt_bodyid[cube.flywheel])
             model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
+
+
+def at_speed(model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: float, path: Path) -> tuple[Cube, ...]:
+    """Let the flywheels turn at another speed from the start, each in its own direction.
+
+    Args:
+        model: The model, whose keyframe is changed.
+        key: The keyframe.
+        cubes: The modules as the file has them.
+        speed: [rad/s].
+        path: The model's file, for messages.
+
+    Returns:
+        The modules at that speed.
+
+    Raises:
+        InputError: A motor takes no such command.
+    """
+    found = []
+    for cube in cubes:
+        signed = math.copysign(speed, cube.speed)
+        low, high = model.actuator_ctrlrange[cube.motor]
+        if model.actuator_ctrllimited[cube.motor] and not low <= signed <= high:
+            raise InputError(
+                f"plant.flywheel_speed_rad_s = {speed:g}: {path}: actuator '{cube.name}/flywheel_motor' takes only "
+                f"{low:g} to {high:g} rad/s (ctrlrange)"
+            )
+        model.key_qvel[key, cube.flywheel] = model.key_ctrl[key, cube.motor] = signed
+        found.append(replace(cube, speed=signed))
+    return tuple(found)
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, cubes: Sequence[Cube]) -> None:

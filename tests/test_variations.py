@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.resources import folder
 from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
+from tests import paper_model as paper
 
 KP, KV = 60.0, 1.1
 
@@ -108,9 +110,76 @@ def test_a_servo_of_another_kind_has_no_stiffness(servo: str, tmp_path: Path) ->
             load_plant(PlantSettings(**{"model": str(path), name: 1.0}))
 
 
+# --- the flywheels --------------------------------------------------------------------------------------------
+
+
+def test_flywheels_by_a_setting_are_those_of_a_file(tmp_path: Path) -> None:
+    path = edited(tmp_path, "scissored_pair.xml", (r"\b314\b", "200"))
+    by_setting = run("plant.flywheel_speed_rad_s=200", "controller.lqr.state_cost=[100.0,1.0,1.0,0.1]")
+    assert_same(by_setting, run(f"plant.model={path}", "controller.lqr.state_cost=[100.0,1.0,1.0,0.1]"))
+
+
+@pytest.mark.parametrize("model", ["scissored_pair.xml", "single_gimbal.xml"])
+def test_the_momentum_is_inertia_times_speed(model: str) -> None:
+    """Turned a quarter back, a wheel spins about the tilt axis: its share of the angular momentum there is J w."""
+    J_d, speed = paper.J_d, 123.0
+    plant = load_plant(model=model, flywheel_speed_rad_s=speed)
+    assert [abs(cube.speed) for cube in plant.cubes] == [speed] * len(plant.cubes)
+    assert plant.reduced.omega_d == pytest.approx(speed, rel=1e-12)
+    assert plant.reduced.J_d * plant.reduced.omega_d == pytest.approx(J_d * speed, rel=1e-12)
+    as_filed = load_plant(model=model)
+    assert [cube.direction for cube in plant.cubes] == [cube.direction for cube in as_filed.cubes]
+    assert replace(plant.reduced, omega_d=as_filed.reduced.omega_d) == as_filed.reduced
+    data = plant.new_data()
+    for cube in plant.cubes:
+        data.qpos[cube.gimbal] = cube.gimbal_zero - cube.direction * math.pi / 2.0
+    mujoco.mj_forward(plant.model, data)
+    mujoco.mj_subtreeVel(plant.model, data)
+    momentum = data.subtree_angmom[plant.frame] @ data.xaxis[plant.tilt]
+    assert momentum == pytest.approx(len(plant.cubes) * J_d * speed, rel=1e-12)
+
+
+def test_a_gimbals_rate_turns_that_much_momentum() -> None:
+    """The torque on the upright rig at rest is 2 J w u: half the speed, half the torque."""
+    torques = []
+    for speed in (157.0, 314.0):
+        plant = load_plant(equilibrium_bias_deg=0.0, initial_tilt_deg=0.0, flywheel_speed_rad_s=speed)
+        data = plant.new_data()
+        for cube in plant.cubes:
+            data.qvel[cube.gimbal] = 0.5 * cube.direction
+        mujoco.mj_forward(plant.model, data)
+        torques.append(-float(data.qfrc_bias[plant.tilt]))
+    assert torques == pytest.approx([2.0 * paper.J_d * speed * 0.5 for speed in (157.0, 314.0)], rel=1e-9)
+
+
+def test_wheels_keep_their_speed_in_a_run() -> None:
+    for driver in ("native", "callback"):
+        scenario = load_scenario("push_recovery", ["duration_s=0.5", "push=[]", "plant.flywheel_speed_rad_s=250"])
+        trajectory = prepare(scenario).run(driver=driver).trajectory
+        assert trajectory is not None
+        np.testing.assert_allclose(np.abs(trajectory["rate/cube2/flywheel_rad_s"]), 250.0, rtol=0.01)
+
+
+def test_changed_back_it_is_the_rig_it_was() -> None:
+    plant = load_plant()
+    slow = plant.changed(PlantSettings(flywheel_speed_rad_s=100.0))
+    back = slow.changed(PlantSettings())
+    assert (back.cubes, back.reduced) == (plant.cubes, plant.reduced)
+    assert slow.reduced.omega_d == pytest.approx(100.0)
+    np.testing.assert_array_equal(back.model.key_qvel, plant.model.key_qvel)
+
+
+def test_a_motor_that_takes_no_such_speed(tmp_path: Path) -> None:
+    path = edited(tmp_path, "cube.xml", ('(name="flywheel_motor")', r'\1 ctrllimited="true" ctrlrange="-400 400"'))
+    assert load_plant(model=str(path), flywheel_speed_rad_s=400.0)
+    complaint = r"plant\.flywheel_speed_rad_s = 401: .*'cube1/flywheel_motor' takes only -400 to 400 rad/s"
+    with pytest.raises(InputError, match=complaint):
+        load_plant(model=str(path), flywheel_speed_rad_s=401.0)
+
+
 # --- all of them ----------------------------------------------------------------------------------------------
 
-GIVEN: dict[str, Any] = {"servo_stiffness_n_m_rad": KP, "servo_damping_n_m_s_rad": 0.0}
+GIVEN: dict[str, Any] = {"servo_stiffness_n_m_rad": KP, "servo_damping_n_m_s_rad": 0.0, "flywheel_speed_rad_s": 250.0}
 
 
 @pytest.mark.parametrize("name", GIVEN)
