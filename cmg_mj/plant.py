@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass as plain_dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -30,38 +29,13 @@ from cmg_mj.processor import Processor, WithProcessor
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.resources import find
 from cmg_mj.rig_check import starts
-from cmg_mj.rig_parts import KEYFRAME
+from cmg_mj.rig_parts import KEYFRAME, Cube
 from cmg_mj.sensors import Sensors
 from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
-from cmg_mj.variations import vary
+from cmg_mj.variations import at_speed, vary
 
 QUARTER_TURN = math.pi / 2.0
-
-
-@plain_dataclass(frozen=True)
-class Cube:
-    """Addresses of one module in the compiled model.
-
-    Attributes:
-        name: Its prefix, `cube1`.
-        gimbal: Address of the gimbal angle in qpos, and of its rate in qvel (hinges only: they agree).
-        flywheel: The same for the flywheel.
-        servo: The gimbal servo's control.
-        motor: The flywheel motor's control.
-        direction: +1 or -1: the sign of u its gimbal is given, so that all cubes push the same way.
-        gimbal_zero: Gimbal angle at which the spin axis is upright, x3 = 0 [rad].
-        speed: Nominal flywheel speed, signed [rad/s].
-    """
-
-    name: str
-    gimbal: int
-    flywheel: int
-    servo: int
-    motor: int
-    direction: float
-    gimbal_zero: float
-    speed: float
 
 
 class Plant:
@@ -70,8 +44,8 @@ class Plant:
     Attributes:
         settings: What it was made from.
         model: The compiled model, without what is only seen. Do not change it: the plant may be shared.
-        reduced: Parameters of the reduced model, read off the file as it is, without bias or friction, which
-            the controller does not know.
+        reduced: Parameters of the reduced model, read off the file as it is but for the flywheels' speed, which
+            the controller knows: without bias or friction, which it does not.
         hints: What on the model is not what the reduced model takes it for, in clauses.
         cubes: Addresses of the modules.
         tilt: Address of q_b in qpos and qvel.
@@ -87,7 +61,7 @@ class Plant:
         self.model, self.hints = load_rig(path, lock=settings.lock_thrust_bearing)
         self._as_filed = self.model
         self._resolve()
-        self.reduced = self._read_reduced()
+        self._cubes_as_filed, self._reduced_as_filed = self.cubes, self._read_reduced()
         self._take(settings, period_s)
 
     def changed(self, settings: PlantSettings, period_s: float | None = None) -> Plant:
@@ -113,14 +87,17 @@ class Plant:
         self.settings = settings
         self.bias = math.radians(settings.equilibrium_bias_deg)
         self.model = copy.copy(self._as_filed)
+        self.cubes, self.reduced = self._cubes_as_filed, self._reduced_as_filed
+        if settings.flywheel_speed_rad_s is not None:
+            self.cubes = at_speed(self.model, self.key, self.cubes, settings.flywheel_speed_rad_s, self.path)
+            self.reduced = self._read_reduced()
         own = float(self.model.opt.timestep)
         vary(
             self.model,
             settings,
             self.path,
             tilt=self.tilt,
-            gimbals=self._gimbals,
-            flywheels=[cube.flywheel for cube in self.cubes],
+            cubes=self.cubes,
         )
         shaken = max(abs(cube.speed) for cube in self.cubes) if settings.flywheel_imbalance_kg_m else 0.0
         self.largest_step = largest_step(self.model, self.key, own, shaken)
@@ -169,7 +146,6 @@ class Plant:
         self.cubes = tuple(self._cube(prefix) for prefix in prefixes)
         self.servos = [cube.servo for cube in self.cubes]
         self.directions = [cube.direction for cube in self.cubes]
-        self._gimbals = [cube.gimbal for cube in self.cubes]
         self._shares = [cube.direction / len(self.cubes) for cube in self.cubes]
         self._encoders = [int(model.sensor_adr[self._id("sensor", f"{name}/gimbal_encoder")]) for name in prefixes]
         self._specific_forces = [address + axis for address, _ in self._accelerometers for axis in (0, 2)]
@@ -202,7 +178,7 @@ class Plant:
 
     def _mass_matrix(self, angles: dict[int, float]) -> np.ndarray:
         """Mass matrix at the keyframe with some joint angles replaced, (nv, nv)."""
-        model = self.model
+        model = self._as_filed
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, self.key)
         for joint, angle in angles.items():
@@ -221,11 +197,12 @@ class Plant:
         J2 = turned[self.tilt, self.tilt] / n - J1
         J_d = sum(abs(turned[self.tilt, c.flywheel]) for c in self.cubes) / n
         momentum = sum(turned[self.tilt, c.flywheel] * c.speed for c in self.cubes)
-        data = mujoco.MjData(self.model)
-        mujoco.mj_resetDataKeyframe(self.model, data, self.key)
+        model = self._as_filed
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, self.key)
         data.qvel[:] = 0.0
         data.qpos[self.tilt] = self.tilt_zero + QUARTER_TURN
-        mujoco.mj_forward(self.model, data)
+        mujoco.mj_forward(model, data)
         gravity_torque = -data.qfrc_bias[self.tilt] / n
         return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n)
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.fields import STRICT, NonNegative
+from cmg_mj.fields import STRICT, NonNegative, Positive
 
 FINEST_STEP_S = 1e-6
 """The smallest physics step [s]."""
@@ -30,8 +30,11 @@ class PlantSettings:
         gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
         gimbal_friction_n_m: Dry friction of each gimbal [N m].
         gimbal_damping_n_m_s: Viscous friction of each gimbal [N m s/rad].
+        servo_stiffness_n_m_rad: Of each gimbal servo's position loop [N m/rad].
+        servo_damping_n_m_s_rad: Of each gimbal servo's position loop [N m s/rad].
         tilt_friction_n_m: Dry friction of the tilt joint [N m].
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
+        flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
         flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
     """
 
@@ -44,13 +47,15 @@ class PlantSettings:
     gimbal_armature_kg_m2: NonNegative | None = None
     gimbal_friction_n_m: NonNegative | None = None
     gimbal_damping_n_m_s: NonNegative | None = None
+    servo_stiffness_n_m_rad: Positive | None = None
+    servo_damping_n_m_s_rad: NonNegative | None = None
     tilt_friction_n_m: NonNegative | None = None
     tilt_damping_n_m_s: NonNegative | None = None
+    flywheel_speed_rad_s: Positive | None = None
     flywheel_imbalance_kg_m: float = 0.0
 
     def changes_of_physics(self) -> dict[str, float]:
-        """What is given of friction, damping, inertia and imbalance."""
-        names = [
-            field.name for field in dataclasses.fields(self) if field.name.startswith(("gimbal", "tilt", "flywheel"))
-        ]
-        return {name: value for name in names if (value := getattr(self, name))}
+        """What is given of friction, damping, inertia, servos and wheels."""
+        of = ("gimbal", "servo", "tilt", "flywheel")
+        fields = [field for field in dataclasses.fields(self) if field.name.startswith(of)]
+        return {field.name: value for field in fields if (value := getattr(self, field.name)) != field.default}

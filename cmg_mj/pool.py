@@ -21,6 +21,8 @@ ARRAYS = frozenset(
         "plant.gimbal_armature_kg_m2",
         "plant.gimbal_friction_n_m",
         "plant.gimbal_damping_n_m_s",
+        "plant.servo_stiffness_n_m_rad",
+        "plant.servo_damping_n_m_s_rad",
         "plant.tilt_friction_n_m",
         "plant.tilt_damping_n_m_s",
         "plant.flywheel_imbalance_kg_m",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -15,6 +16,31 @@ NEEDS = (
     "a rig needs the joints tilt, CUBE/gimbal, CUBE/flywheel, the actuators CUBE/gimbal_servo, CUBE/flywheel_motor, "
     f"the sensors CUBE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe {KEYFRAME}, for one CUBE or more"
 )
+
+
+@dataclass(frozen=True)
+class Cube:
+    """Addresses of one module in the compiled model.
+
+    Attributes:
+        name: Its prefix, `cube1`.
+        gimbal: Address of the gimbal angle in qpos, and of its rate in qvel (hinges only: they agree).
+        flywheel: The same for the flywheel.
+        servo: The gimbal servo's control.
+        motor: The flywheel motor's control.
+        direction: +1 or -1: the sign of u its gimbal is given, so that all cubes push the same way.
+        gimbal_zero: Gimbal angle at which the spin axis is upright, x3 = 0 [rad].
+        speed: Nominal flywheel speed, signed [rad/s].
+    """
+
+    name: str
+    gimbal: int
+    flywheel: int
+    servo: int
+    motor: int
+    direction: float
+    gimbal_zero: float
+    speed: float
 
 
 def lacks(spec: mujoco.MjSpec) -> list[str]:

@@ -1,9 +1,10 @@
-"""How a rig differs from its model file: integrator and step, friction, imbalance, the equilibrium bias."""
+"""How a rig differs from its model file: integrator and step, friction, servos, wheels, the equilibrium bias."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -11,7 +12,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant_settings import PlantSettings
-from cmg_mj.rig_parts import KEYFRAME
+from cmg_mj.rig_parts import KEYFRAME, Cube
 
 _INTEGRATORS = {
     "RK4": int(mujoco.mjtIntegrator.mjINT_RK4),
@@ -28,8 +29,7 @@ def vary(
     path: Path,
     *,
     tilt: int,
-    gimbals: Sequence[int],
-    flywheels: Sequence[int],
+    cubes: Sequence[Cube],
 ) -> None:
     """Change a compiled model as its settings say.
 
@@ -38,15 +38,15 @@ def vary(
         settings: What is to differ; what is left out stays.
         path: The file, for messages.
         tilt: The tilt joint.
-        gimbals: The gimbals' joints.
-        flywheels: The flywheels' joints.
+        cubes: The modules.
 
     Raises:
-        InputError: The body that tilts has no mass of its own to move.
+        InputError: The body that tilts has no mass of its own to move, or a servo is none that has what is to differ.
     """
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    gimbals = [cube.gimbal for cube in cubes]
     for field, joints, value in (
         (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),
         (model.dof_frictionloss, gimbals, settings.gimbal_friction_n_m),
@@ -56,14 +56,77 @@ def vary(
     ):
         if value is not None:
             field[list(joints)] = value
+    _vary_servos(model, settings, path, cubes)
     if settings.equilibrium_bias_deg:
         frame = int(model.jnt_bodyid[tilt])
         model.body_ipos[frame] += bias_shift(model, tilt, math.radians(settings.equilibrium_bias_deg), path)
     if settings.flywheel_imbalance_kg_m:
-        for flywheel in flywheels:
-            body = int(model.jnt_bodyid[flywheel])
+        for cube in cubes:
+            body = int(model.jnt_bodyid[cube.flywheel])
             model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
+
+
+def at_speed(model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: float, path: Path) -> tuple[Cube, ...]:
+    """Let the flywheels turn at another speed from the start, each in its own direction.
+
+    Args:
+        model: The model, whose keyframe is changed.
+        key: The keyframe.
+        cubes: The modules as the file has them.
+        speed: [rad/s].
+        path: The model's file, for messages.
+
+    Returns:
+        The modules at that speed.
+
+    Raises:
+        InputError: A motor takes no such command.
+    """
+    found = []
+    for cube in cubes:
+        signed = math.copysign(speed, cube.speed)
+        low, high = model.actuator_ctrlrange[cube.motor]
+        if model.actuator_ctrllimited[cube.motor] and not low <= signed <= high:
+            raise InputError(
+                f"plant.flywheel_speed_rad_s = {speed:g}: {path}: actuator '{cube.name}/flywheel_motor' takes only "
+                f"{low:g} to {high:g} rad/s (ctrlrange)"
+            )
+        model.key_qvel[key, cube.flywheel] = model.key_ctrl[key, cube.motor] = signed
+        found.append(replace(cube, speed=signed))
+    return tuple(found)
+
+
+def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, cubes: Sequence[Cube]) -> None:
+    """Give the gimbals' servos another stiffness and damping: torque = kp (setpoint - angle) - kv rate."""
+    given = {
+        "servo_stiffness_n_m_rad": settings.servo_stiffness_n_m_rad,
+        "servo_damping_n_m_s_rad": settings.servo_damping_n_m_s_rad,
+    }
+    names = [name for name, value in given.items() if value is not None]
+    if not names:
+        return
+    stiffness, damping = given.values()
+    for cube in cubes:
+        servo = cube.servo
+        gain, bias = model.actuator_gainprm[servo], model.actuator_biasprm[servo]
+        # A position loop whose setpoint is the integral of its command: what <intvelocity> makes.
+        is_loop = (
+            model.actuator_dyntype[servo] == mujoco.mjtDyn.mjDYN_INTEGRATOR
+            and model.actuator_gaintype[servo] == mujoco.mjtGain.mjGAIN_FIXED
+            and model.actuator_biastype[servo] == mujoco.mjtBias.mjBIAS_AFFINE
+            and gain[0] == -bias[1]
+        )
+        if not is_loop:
+            raise InputError(
+                f"plant.{names[0]}: {path}: actuator '{cube.name}/gimbal_servo' is no position loop whose setpoint is "
+                "the integral of its command (<intvelocity>), which alone has this stiffness and damping"
+            )
+        per_gear = 1.0 / float(model.actuator_gear[servo, 0]) ** 2  # they are those at the joint
+        if stiffness is not None:
+            gain[0], bias[1] = stiffness * per_gear, -stiffness * per_gear
+        if damping is not None:
+            bias[2] = -damping * per_gear
 
 
 def bias_shift(model: mujoco.MjModel, tilt: int, bias: float, path: Path) -> np.ndarray:

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 )
 @click.option("--observers", metavar="NAMES", help="Names with commas between, or all.  [default: the scenario's own]")
 @click.option("--worlds", type=click.IntRange(1, MOST_WORLDS), metavar="N", help="Worlds a cell.  [default: 20]")
-@click.option("--sample", type=click.IntRange(1), metavar="N", help="N points of a quasi-random design of the ranges.")
+@click.option(
+    "--sample", type=click.IntRange(1), metavar="N", help="N points of a quasi-random design of the ranges and lists."
+)
 @click.option("--sobol", type=click.IntRange(1), metavar="N", help="A design for Sobol indices, N a power of two.")
 @click.option("--order", metavar="NAMES", help="Observers, the best first: count how often that holds.")
 @click.option("--plan", is_flag=True, help="Say what it would take, and run nothing.")

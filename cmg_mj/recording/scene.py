@@ -8,12 +8,13 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from cmg_mj.plant import Cube, Plant
+from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.recording.framing import Ball
 from cmg_mj.recording.run import Run, torque_steps
 from cmg_mj.recording.shapes import shapes
 from cmg_mj.recording.timeline import TIMELINE, column, instant
+from cmg_mj.rig_parts import Cube
 
 POSE_RATE_HZ = 100.0
 """Poses are recorded at most this often; the eye needs no more."""

@@ -24,7 +24,7 @@ class Axis:
 
     Attributes:
         field: As with `--set`.
-        values: What it takes; none for a range to be sampled.
+        values: What it takes, in a list or a range with a count; none for a range of which any value may be sampled.
         low: The range's lower end, for one to be sampled.
         high: Its upper end.
         log: Whether it is sampled evenly in its logarithm.
@@ -41,8 +41,10 @@ class Axis:
         """Whether it is a range to be sampled."""
         return not self.values
 
-    def at(self, shares: np.ndarray) -> list[float]:
-        """Its values at shares of the range between 0 and 1, (n,)."""
+    def at(self, shares: np.ndarray) -> list[Any]:
+        """Its values at shares of the range between 0 and 1, (n,); of a list each has an equal part of them."""
+        if not self.is_range:
+            return [self.values[min(int(share * len(self.values)), len(self.values) - 1)] for share in shares]
         if self.log:
             found = np.exp(math.log(self.low) + shares * (math.log(self.high) - math.log(self.low)))
         else:

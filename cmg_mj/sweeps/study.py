@@ -54,8 +54,8 @@ class Study:
         axes: What is varied.
         observers: Those in the loop.
         worlds: Trials a point and observer: world i has the same noise at every point, for every observer.
-        design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges. `sobol`: one for
-            Sobol indices.
+        design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges and lists.
+            `sobol`: one for Sobol indices.
         n: Points of the design; of one for indices that many times the number of axes and two.
         order: Observers, the best first, as someone expects them; how often that holds is counted. No
             trial depends on it.
@@ -86,8 +86,6 @@ class Study:
                 raise InputError(
                     f"--vary {axis.field}: a range without a count is for --sample and --sobol; write first:last:count"
                 )
-            if not axis.is_range and self.design != "grid":
-                raise InputError(f"--vary {axis.field}: --{self.design} needs a range low:high, not values")
         if self.design == "sobol" and (self.n < 2 or self.n & (self.n - 1)):
             raise InputError(f"--sobol {self.n}: must be a power of two, such as {_power_near(self.n)}")
         if self.order:

@@ -60,7 +60,7 @@ def sweep(
         vary: Field, named as with `--set` -> a list of values, or text as `--vary` takes it, such as "-1:1:5".
         observers: Those in the loop; by default the scenario's own.
         worlds: Trials a cell: world i has the same noise in every cell.
-        sample: So many points of a quasi-random design of the ranges, instead of every combination.
+        sample: So many points of a quasi-random design of the ranges and lists, instead of every combination.
         sobol: A design for Sobol indices instead, a power of two.
         order: Observers, the best first: how often that holds is counted.
 

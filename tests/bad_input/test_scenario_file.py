@@ -79,6 +79,12 @@ def test_top_level(given: str, fragments: list[str]) -> None:
     ("yes for true", "lock_thrust_bearing = 'yes'", "plant.lock_thrust_bearing = 'yes': must be true or false"),
     ("1 for true", "lock_thrust_bearing = 1", "plant.lock_thrust_bearing = 1: must be true or false"),
     ("negative friction", "gimbal_friction_n_m = -1", f"plant.gimbal_friction_n_m = -1: {FROM_0}"),
+    ("a servo without stiffness", "servo_stiffness_n_m_rad = 0", "plant.servo_stiffness_n_m_rad = 0: must be a number"),
+    (
+        "wheels that stand",
+        "flywheel_speed_rad_s = 0",
+        "plant.flywheel_speed_rad_s = 0: must be a number greater than 0",
+    ),
     ("true for an optional number", "tilt_damping_n_m_s = true", f"plant.tilt_damping_n_m_s = true: {FROM_0}"),
     ("nan without bounds", "flywheel_imbalance_kg_m = nan", "flywheel_imbalance_kg_m = nan: must be a finite number"),
 )

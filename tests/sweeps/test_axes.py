@@ -37,6 +37,11 @@ def test_a_range_to_be_sampled() -> None:
     assert parse_axis("a.b", axis.said(), "file") == axis
 
 
+def test_of_a_list_each_value_has_an_equal_part_of_the_shares() -> None:
+    axis = parse_axis("a.b", "RK4,implicit,Euler", "--vary")
+    assert axis.at(np.array([0.0, 0.33, 0.34, 0.66, 0.67, 1.0])) == ["RK4", "RK4", *["implicit"] * 2, *["Euler"] * 2]
+
+
 @pytest.mark.parametrize(
     ("said", "complaint"),
     [

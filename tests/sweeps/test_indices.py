@@ -32,6 +32,23 @@ def test_the_indices_of_a_known_function() -> None:
     assert all(np.array_equal(a, b) for a, b in zip(found, again, strict=True))
 
 
+def test_the_indices_of_a_list() -> None:
+    """y = a + b, a of 0, 1, 2, 3 and b evenly from 0 to 4: variances 5/4 and 4/3."""
+    trials = made_up(
+        {BIAS: "0,1,2,3", NOISE: "0:4"},
+        ("linear",),
+        1,
+        lambda point, *_: point[BIAS] + point[NOISE],
+        design="sobol",
+        n=1024,
+    )
+    of = {row["field"]: row for row in index_rows(trials) if row["figure"] == VELOCITY}
+    for field, variance in ((BIAS, 5.0 / 4.0), (NOISE, 4.0 / 3.0)):
+        share = variance / (5.0 / 4.0 + 4.0 / 3.0)
+        assert of[field]["first"] == pytest.approx(share, abs=0.01)
+        assert of[field]["total"] == pytest.approx(share, abs=0.01)
+
+
 @pytest.mark.parametrize(("weights", "decisive"), [((4.0, 1.0), [True, False]), ((1.0, 1.0), [False, False])])
 def test_decisive_only_where_intervals_part(weights: tuple[float, float], decisive: list[bool]) -> None:
     n = 256

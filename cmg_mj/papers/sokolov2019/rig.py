@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from typing import Any
@@ -62,19 +63,17 @@ def servo_of(plant: Plant) -> Servo:
 
 
 def rig_with(settings: PlantSettings, servo: Servo) -> Plant:
-    """The rig with another servo: a plant of its own, whose model is changed before anything runs on it.
+    """The rig with another servo.
 
     Raises:
         ValueError: The servo is too stiffly damped for RK4 at this timestep: it would chatter by itself.
     """
-    plant = load_plant(settings)
+    of_its_own = {"servo_stiffness_n_m_rad": servo.kp, "servo_damping_n_m_s_rad": servo.kv}
+    plant = load_plant(dataclasses.replace(settings, **of_its_own))
     decay = servo.kv * plant.timestep / servo.inertia
     if decay > RK4_LIMIT:
         raise ValueError(
             f"servo lag {1e3 * servo.lag_s:.3g} ms: kv h/I = {decay:.3g} must be at most {RK4_LIMIT} at timestep_s = "
             f"{plant.timestep:g}"
         )
-    for i in plant.servos:
-        plant.model.actuator_gainprm[i, 0] = servo.kp
-        plant.model.actuator_biasprm[i, 1:3] = -servo.kp, -servo.kv
     return plant
