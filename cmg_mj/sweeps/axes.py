@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,20 +14,23 @@ from cmg_mj.errors import InputError
 MOST_VALUES = 10_000
 """Of one field."""
 LOG = "log:"
+TOGETHER = "+"
+"""Between fields that take the same values."""
 DIGITS = 12
 """Of a range's values: 0.3 is to be 0.3, in the table too."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One varied field.
+    """One varied field, or several that take the same values together.
 
     Attributes:
-        field: As with `--set`.
+        field: As with `--set`; of several the first, which names the axis in tables and pictures.
         values: What it takes, in a list or a range with a count; none for a range of which any value may be sampled.
         low: The range's lower end, for one to be sampled.
         high: Its upper end.
         log: Whether it is sampled evenly in its logarithm.
+        also: Fields that take the same value at every point.
     """
 
     field: str
@@ -35,6 +38,17 @@ class Axis:
     low: float = math.nan
     high: float = math.nan
     log: bool = False
+    also: tuple[str, ...] = ()
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """All that it sets."""
+        return (self.field, *self.also)
+
+    @property
+    def written(self) -> str:
+        """Its fields as `--vary` takes them."""
+        return TOGETHER.join(self.fields)
 
     @property
     def is_range(self) -> bool:
@@ -60,7 +74,7 @@ def parse_axis(field: str, said: Any, where: str) -> Axis:
     """Read what a field is to take.
 
     Args:
-        field: The field.
+        field: The field; several that take the same values with `+` between.
         said: A list of values; or text: values with commas between, `first:last:count` for as many evenly spaced,
             `low:high` for a range to be sampled, each also with `log:` before it.
         where: What to call it in an error.
@@ -71,10 +85,11 @@ def parse_axis(field: str, said: Any, where: str) -> Axis:
     Raises:
         InputError: It is not written so.
     """
-    if not field:
+    field, *also = (part.strip() for part in field.split(TOGETHER))
+    if not field or "" in also:
         raise InputError(f"{where}: write FIELD=VALUES, for example plant.equilibrium_bias_deg=-1.5:1.5:13")
     if isinstance(said, str) and ":" in said and not said.lstrip().startswith(("[", '"')):
-        return _range(field, said, where)
+        return replace(_range(field, said, where), also=tuple(also))
     values = said if isinstance(said, list) else _listed(str(said), where)
     if not values:
         raise InputError(f"{where}: no values; write FIELD=VALUES, such as plant.equilibrium_bias_deg=0,0.5")
@@ -83,7 +98,7 @@ def parse_axis(field: str, said: Any, where: str) -> Axis:
     twice = next((value for i, value in enumerate(values) if value in values[:i]), None)
     if twice is not None:
         raise InputError(f"{where}: {twice} is there twice")
-    return Axis(field, tuple(values))
+    return Axis(field, tuple(values), also=tuple(also))
 
 
 def _range(field: str, said: str, where: str) -> Axis:

@@ -56,7 +56,8 @@ def report(study: Study, rows: Sequence[dict[str, Any]], parts: Sequence[str] = 
     counts = (
         f"{len(study.points)} points, {len(study.observers)} observers, {study.worlds} worlds: {study.trials} trials."
     )
-    first = [f"# {study.scenario.title or 'Sweep'}", counts]
+    together = [f"With {axis.field} go, alike: {', '.join(axis.also)}." for axis in study.axes if axis.also]
+    first = [f"# {study.scenario.title or 'Sweep'}", counts, *together]
     return "\n\n".join(
         [*first, *parts, "## Cells", f"Mean {heading(SHOWN)}, with the falls:", cells_markdown(study, rows)]
     )

@@ -100,9 +100,9 @@ def merged(store: Store, path: Path) -> None:
 def resolved(study: Study) -> dict[str, Any]:
     """The study with every default of its scenario written out: it reruns from that."""
     fields = prepare(study.scenario).resolved()
-    for axis in study.axes:
-        section, _, name = axis.field.rpartition(".")
-        if axis.field == "plant.timestep_s" or section != "plant":
+    for field in (field for axis in study.axes for field in axis.fields):
+        section, _, name = field.rpartition(".")
+        if field == "plant.timestep_s" or section != "plant":
             continue
         fields["plant"].pop(name, None)
     if study.scenario.plant.timestep_s is None:

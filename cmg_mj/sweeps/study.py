@@ -77,7 +77,7 @@ class Study:
         """
         if not self.axes:
             raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
-        fields = [axis.field for axis in self.axes]
+        fields = [field for axis in self.axes for field in axis.fields]
         twice = next((field for i, field in enumerate(fields) if field in fields[:i]), None)
         if twice is not None:
             raise InputError(f"--vary {twice}: given twice")
@@ -102,13 +102,14 @@ class Study:
     @cached_property
     def points(self) -> list[Point]:
         """What is varied, a point each."""
-        fields = [axis.field for axis in self.axes]
         if self.design == "grid":
             rows: Any = itertools.product(*(axis.values for axis in self.axes))
         else:
-            shares = _sampled(len(fields), self.n, self.scenario.seed, indices=self.design == "sobol")
+            shares = _sampled(len(self.axes), self.n, self.scenario.seed, indices=self.design == "sobol")
             rows = zip(*(axis.at(share) for axis, share in zip(self.axes, shares.T, strict=True)), strict=True)
-        return [dict(zip(fields, row, strict=True)) for row in rows]
+        return [
+            {field: value for axis, value in zip(self.axes, row, strict=True) for field in axis.fields} for row in rows
+        ]
 
     @property
     def cells(self) -> int:
@@ -127,7 +128,7 @@ class Study:
     @property
     def chunks(self) -> list[Chunk]:
         """All trials: those that can run in one batch stand together."""
-        apart = [axis.field for axis in self.axes if not pools(axis.field)]
+        apart = [field for axis in self.axes for field in axis.fields if not pools(field)]
         order = sorted(range(len(self.points)), key=lambda point: [repr(self.points[point][field]) for field in apart])
         found: list[Chunk] = []
         for observer in self.observers:
@@ -142,7 +143,7 @@ class Study:
             how["n"] = self.n
         if self.order:
             how["order"] = list(self.order)
-        return {"sweep": how, "vary": {axis.field: axis.said() for axis in self.axes}, "scenario": dict(scenario)}
+        return {"sweep": how, "vary": {axis.written: axis.said() for axis in self.axes}, "scenario": dict(scenario)}
 
 
 def check_values(study: Study) -> None:
@@ -158,11 +159,13 @@ def check_values(study: Study) -> None:
     for axis in study.axes:
         for value in axis.values or (axis.low, axis.high):
             changed = copy.deepcopy(fields)
-            assign(changed, axis.field, value, f"--vary {axis.field}")
-            scenario = parse_scenario(changed, f"--vary {axis.field}={value}")
-            if axis.field.startswith("observer."):
+            for field in axis.fields:
+                assign(changed, field, value, f"--vary {field}")
+            scenario = parse_scenario(changed, f"--vary {axis.written}={value}")
+            own = {field.partition(".")[2]: value for field in axis.fields if field.startswith("observer.")}
+            if own:
                 for observer in study.observers:
-                    given = {"kind": observer, axis.field.partition(".")[2]: value}
+                    given = {"kind": observer, **own}
                     plant = plant or load_rig(study.scenario)
                     prepare(scenario.model_copy(update={"observer": ObserverSettings(**given)}), plant)
 

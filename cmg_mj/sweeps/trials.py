@@ -24,7 +24,9 @@ def schema_of(study: Study) -> pa.Schema:
     """The columns: the point's number, what is varied, who ran and how it ended, the figures."""
     import pyarrow as pa
 
-    varied = [(axis.field, _type_of([axis.low] if axis.is_range else axis.values)) for axis in study.axes]
+    varied = [
+        (field, _type_of([axis.low] if axis.is_range else axis.values)) for axis in study.axes for field in axis.fields
+    ]
     known = [(name, FIRST[name]) for name in COLUMNS]
     return pa.schema([("point", "int64"), *varied, *known, *((name, "float64") for name in FIGURES)])
 

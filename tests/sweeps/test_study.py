@@ -11,7 +11,7 @@ from scipy.stats import sobol_indices, uniform
 from cmg_mj.errors import InputError
 from cmg_mj.scenario import load_scenario
 from cmg_mj.sweeps.axes import parse_axis
-from cmg_mj.sweeps.study import CHUNK, Study
+from cmg_mj.sweeps.study import CHUNK, Study, check_values
 
 BIAS, NOISE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz"
 
@@ -26,6 +26,21 @@ def test_a_grid_is_every_combination() -> None:
     of = study(f"{BIAS}=0,1", f"{NOISE}=200,400,800")
     assert of.points[1] == {BIAS: 0, NOISE: 400}
     assert (len(of.points), of.cells, of.trials) == (6, 12, 36)
+
+
+def test_fields_that_go_together() -> None:
+    rates = "controller.rate_hz+sensors.accelerometer.rate_hz"
+    of = study(f"{rates}=100,200", f"{BIAS}=0,1")
+    assert of.points[2] == {"controller.rate_hz": 200, "sensors.accelerometer.rate_hz": 200, BIAS: 0}
+    assert len(of.points) == 4
+    assert of.as_fields({})["vary"] == {rates: [100, 200], BIAS: [0, 1]}
+    check_values(of)
+    with pytest.raises(InputError, match=r"sensors\.accelerometer\.rate_hzz: no such field"):
+        check_values(study("controller.rate_hz+sensors.accelerometer.rate_hzz=100,200"))
+    with pytest.raises(InputError, match=r"controller\.rate_hz: given twice"):
+        study("controller.rate_hz+controller.rate_hz=100,200")
+    with pytest.raises(InputError, match="write FIELD=VALUES"):
+        study("controller.rate_hz+=100,200")
 
 
 def test_every_trial_is_in_one_chunk() -> None:
