@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cmg_mj.intervals import CONFIDENCE
 from cmg_mj.sweeps.cells import FIGURES, Trials
+from cmg_mj.sweeps.order import figures_of, log_ratio, pairs_of
 
 RESAMPLES = 999
 FEWEST = 16
 """Rows of a design by whose intervals anything is called decisive: those of fewer are too narrow."""
+LOST, LOG_RATIO = "lost_share", "log_ratio_of_"
+"""What is decomposed beside the figures: the share of worlds that fell or stopped, and, before a figure's name, the
+logarithm of two observers' ratio."""
 AT_ONCE = 2_000_000
 """Values of resamples held together."""
 
@@ -79,32 +84,47 @@ def _estimated(blocks: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def index_rows(trials: Trials) -> list[dict[str, Any]]:
-    """A row a figure, observer and field; without indices, and with the reason, where they cannot be had.
+    """A row a quantity, observer and field; without indices, and with the reason, where they cannot be had.
 
     What is decomposed is the mean over a point's worlds, whose noise is the same at every point.
     """
     study = trials.study
     fields = [axis.field for axis in study.axes]
     rows = []
-    for key in FIGURES:
-        means = trials.figure(key).mean(axis=2)
-        if not np.isfinite(means).any() and trials.stood.any():
-            continue  # such as an error in the push window without a push
-        for place, observer in enumerate(study.observers):
-            why = _refused(trials, key, place)
-            found = None if why else indices(means[:, place], study.n, study.scenario.seed)
-            for i, field in enumerate(fields):
-                row: dict[str, Any] = {"figure": key, "observer": observer, "field": field}
-                row |= {name: None if found is None else float(found[j][i]) for j, name in enumerate(Indices._fields)}
-                row["decisive"] = None if found is None else bool(found.decisive[i]) and study.n >= FEWEST
-                rows.append(row | {"refused": why})
+    for figure, observer, values, outcome in _quantities(trials):
+        why = _refused(values, outcome)
+        found = None if why else indices(values.mean(axis=1), study.n, study.scenario.seed)
+        for i, field in enumerate(fields):
+            row: dict[str, Any] = {"figure": figure, "observer": observer, "field": field}
+            row |= {name: None if found is None else float(found[j][i]) for j, name in enumerate(Indices._fields)}
+            row["decisive"] = None if found is None else bool(found.decisive[i]) and study.n >= FEWEST
+            rows.append(row | {"refused": why})
     return rows
 
 
-def _refused(trials: Trials, key: str, place: int) -> str | None:
-    """Why an observer's figure has no indices, with counts."""
-    values = trials.figure(key)[:, place]
-    outcome = trials.outcome[:, place]
+def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
+    """What is decomposed: its name, whose it is, the values and the outcomes, (n_points, n_worlds) each.
+
+    Every observer's figures; how often it did not stand; and by a named order the logarithm of the ratio of two errors.
+    """
+    observers = trials.study.observers
+    for key in FIGURES:
+        values = trials.figure(key)
+        if np.isfinite(values.mean(axis=2)).any() or not trials.stood.any():  # not an error in the window of no push
+            for place, observer in enumerate(observers):
+                yield key, observer, values[:, place], trials.outcome[:, place]
+    for place, observer in enumerate(observers):
+        lost = ~trials.stood[:, place]
+        yield LOST, observer, lost.astype(float), np.full(lost.shape, "done", dtype=object)
+    for better, worse in pairs_of(trials.study.order):
+        both = [observers.index(better), observers.index(worse)]
+        outcome = np.where(trials.stood[:, both[0]], trials.outcome[:, both[1]], trials.outcome[:, both[0]])
+        for key in figures_of(trials):
+            yield f"{LOG_RATIO}{key}", f"{better} / {worse}", log_ratio(trials, key, better, worse), outcome
+
+
+def _refused(values: np.ndarray, outcome: np.ndarray) -> str | None:
+    """Why a quantity has no indices, with counts."""
     means = values.mean(axis=1)
     if np.isfinite(means).all():
         return None if np.ptp(means) > 0.0 else "the same at every point"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +11,8 @@ import numpy as np
 from cmg_mj.intervals import Interval
 from cmg_mj.sweeps.cells import Trials, fell_interval
 
-JUDGED = "velocity_rms_error_rad_s"
+JUDGED = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "tilt_rms_deg")
+"""Figures that an order is counted by, where a trial has them; each is better when it is less."""
 
 
 class Held(NamedTuple):
@@ -29,28 +32,46 @@ class Held(NamedTuple):
         return fell_interval(self.times, self.of) if self.of else None
 
 
-def order_at(trials: Trials, key: str = JUDGED) -> list[Held]:
+def figures_of(trials: Trials) -> list[str]:
+    """Those of JUDGED that the trials have."""
+    return [key for key in JUDGED if np.isfinite(trials.figure(key)).any()] or [JUDGED[0]]
+
+
+def order_at(trials: Trials, key: str) -> list[Held]:
     """In how many of each point's worlds the study's order holds.
 
     Args:
         trials: The trials.
-        key: The figure that decides, which is better when it is less. A fall or a stop is worse than any.
+        key: The figure that decides. A fall or a stop is worse than any.
 
     Returns:
         A point each. A world in which two next to each other did not stand cannot tell, unless the others break
         the order.
     """
-    return [_held(values) for values in _errors(trials, key)]
+    return [_held(values) for values in _errors(trials, key, trials.study.order)]
 
 
-def order_of_points(trials: Trials, key: str = JUDGED) -> Held:
+def order_of_points(trials: Trials, key: str, order: Sequence[str]) -> Held:
     """At how many points it holds for the means over the worlds; one that did not stand in every world has none."""
-    return _held(_errors(trials, key).mean(axis=2).T)
+    return _held(_errors(trials, key, order).mean(axis=2).T)
 
 
-def _errors(trials: Trials, key: str) -> np.ndarray:
-    """Of the study's order, (n_points, n_order, n_worlds); infinite where one did not stand."""
-    places = [trials.study.observers.index(name) for name in trials.study.order]
+def pairs_of(order: Sequence[str]) -> list[tuple[str, str]]:
+    """The comparisons that an order is made of."""
+    return list(pairwise(order))
+
+
+def log_ratio(trials: Trials, key: str, better: str, worse: str) -> np.ndarray:
+    """Logarithm of one observer's figure by another's, (n_points, n_worlds); NaN where one did not stand."""
+    places = [trials.study.observers.index(name) for name in (better, worse)]
+    first, second = np.moveaxis(trials.figure(key)[:, places], 1, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.log(first / second)
+
+
+def _errors(trials: Trials, key: str, order: Sequence[str]) -> np.ndarray:
+    """Of an order's observers, (n_points, n_order, n_worlds); infinite where one did not stand."""
+    places = [trials.study.observers.index(name) for name in order]
     values = trials.figure(key)[:, places]
     return np.where(np.isnan(values), np.inf, values)
 
@@ -64,11 +85,13 @@ def _held(errors: np.ndarray) -> Held:
 
 
 def order_rows(trials: Trials) -> list[dict[str, Any]]:
-    """A row a point: in how many worlds the order held, of how many, and the share with its interval."""
+    """A row a figure and point: in how many worlds the order held, of how many, and the share with its interval."""
     rows = []
-    for number, (point, held) in enumerate(zip(trials.study.points, order_at(trials), strict=True)):
-        share = held.share
-        low, high = (None, None) if share is None else (share.low, share.high)
-        row = {"point": number, **point, "order": ",".join(trials.study.order), "held": held.times, "worlds": held.of}
-        rows.append(row | {"share": None if share is None else share.mean, "low": low, "high": high})
+    for key in figures_of(trials):
+        for number, (point, held) in enumerate(zip(trials.study.points, order_at(trials, key), strict=True)):
+            share = held.share
+            low, high = (None, None) if share is None else (share.low, share.high)
+            row = {"figure": key, "point": number, **point, "order": ",".join(trials.study.order)}
+            row |= {"held": held.times, "worlds": held.of, "share": None if share is None else share.mean}
+            rows.append(row | {"low": low, "high": high})
     return rows

@@ -10,8 +10,8 @@ from cmg_mj.picture import Picture
 from cmg_mj.summary_keys import heading
 from cmg_mj.sweeps.cells import Trials
 from cmg_mj.sweeps.drawn import SHOWN
-from cmg_mj.sweeps.indices import FEWEST
-from cmg_mj.sweeps.order import order_of_points
+from cmg_mj.sweeps.indices import FEWEST, LOG_RATIO, LOST
+from cmg_mj.sweeps.order import JUDGED, Held, figures_of, order_of_points, pairs_of
 from cmg_mj.sweeps.study import Study
 
 ABOUT_MAPS = (
@@ -19,6 +19,7 @@ ABOUT_MAPS = (
     "are its error. A dot: another one's mean difference to it, world by world, is within its 95 % interval. A line in "
     "an observer's colour: half of its worlds fall beyond it. For falls, a dot says that Wilson's intervals overlap."
 )
+HEADINGS_OF_A_SHARE = ("share", "95 % interval")
 ABOUT_CURVES = (
     "Bands are 95 % intervals. A cross: some worlds did not stand to the end, and the mean is that of the others, "
     "which had it easier."
@@ -41,30 +42,45 @@ def pictures(trials: Trials, drawn: Sequence[Picture]) -> list[str]:
 def order(trials: Trials, rows: Sequence[dict[str, Any]], most: int) -> list[str]:
     """How often the named order holds."""
     study = trials.study
-    by_points = order_of_points(trials)
-    held, worlds = sum(row["held"] for row in rows), sum(row["worlds"] for row in rows)
-    said = f"By the means over the worlds it holds at {by_points.times} of {by_points.of} points"
-    share = by_points.share
-    if share is not None and study.design == "sample":  # points of a grid are no sample of anything
-        said += f" ({_percent(share.mean)}, Wilson's 95 % interval {_percent(share.low)} to {_percent(share.high)})"
-    unknown = len(study.points) - by_points.of
-    if unknown:
-        said += f"; {unknown} points cannot tell"
+    orders = [study.order] if len(study.order) == 2 else [study.order, *pairs_of(study.order)]
+    table = []
+    for key in figures_of(trials):
+        worlds = [row for row in rows if row["figure"] == key]
+        in_worlds = f"{sum(row['held'] for row in worlds)} of {sum(row['worlds'] for row in worlds)}"
+        for order in orders:
+            held = order_of_points(trials, key, order)
+            table.append(
+                [heading(key), " < ".join(order), *_points(held, study), in_worlds if order is study.order else ""]
+            )
+    share = HEADINGS_OF_A_SHARE if study.design == "sample" else ()  # points of a grid are no sample of anything
+    headings = ["counted by", "order", "points", *share, "worlds"]
     parts = [
         f"## The order {' < '.join(study.order)}",
-        f"{said}; world by world in {held} of {worlds}. Counted by the {heading(SHOWN[0])}; a fall is worse than any "
-        "error, and where two next to each other fell nobody can tell.",
+        "At how many points it holds by the means over the worlds, and in how many worlds. A fall is worse than any "
+        "error; where two next to each other fell nobody can tell, and such points and worlds are left out.",
+        markdown.table(headings, table, text_columns=2),
     ]
     if study.design != "grid":
         return [*parts, "Every point is in order.parquet."]
     fields = [axis.field for axis in study.axes]
+    rows = [row for row in rows if row["figure"] == JUDGED[0]]
     table = [
         [*(_said(row[field]) for field in fields), f"{row['held']} of {row['worlds']}", *_share(row)]
         for row in rows[:most]
     ]
-    parts.append(markdown.table([*fields, "worlds", "share", "95 % interval"], table, text_columns=0))
+    parts.append(f"World by world, by the {heading(JUDGED[0])}:")
+    parts.append(markdown.table([*fields, "worlds", *HEADINGS_OF_A_SHARE], table, text_columns=0))
     more = len(rows) - most
     return parts if more <= 0 else [*parts, f"{more} points more are in order.parquet."]
+
+
+def _points(held: Held, study: Study) -> list[str]:
+    """At how many points an order holds; of a sample with the share and its interval."""
+    said = [f"{held.times} of {held.of}"]
+    if study.design == "sample":
+        share = held.share
+        said += _share({} if share is None else {"share": share.mean, "low": share.low, "high": share.high})
+    return said
 
 
 def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -77,11 +93,13 @@ def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
     if study.n < FEWEST:
         about += f" Of fewer than {FEWEST} rows the intervals are too narrow, and nothing is called decisive."
     parts = ["## What the errors depend on: Sobol indices", about]
-    for key in SHOWN:
+    titles = {key: heading(key) for key in SHOWN} | {LOST: "share of worlds that fell or stopped"}
+    titles |= {f"{LOG_RATIO}{key}": f"logarithm of the ratio: {heading(key)}" for key in JUDGED}
+    for key, title in titles.items():
         of = [row for row in rows if row["figure"] == key]
         given = [row for row in of if not row["refused"]]
         if of:
-            parts.append(f"### {heading(key)}")
+            parts.append(f"### {title[0].upper()}{title[1:]}")
         if given:
             headings = ["observer", "field", "first order", "total", "decisive"]
             parts.append(markdown.table(headings, [_index_row(row) for row in given], text_columns=2))
@@ -97,7 +115,7 @@ def _index_row(row: dict[str, Any]) -> list[str]:
 
 
 def _share(row: dict[str, Any]) -> list[str]:
-    if row["share"] is None:
+    if row.get("share") is None:
         return ["-", "-"]
     return [_percent(row["share"]), f"{_percent(row['low'])} to {_percent(row['high'])}"]
 

@@ -58,7 +58,7 @@ def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
     assert (out / "map_velocity_error.png").read_bytes().startswith(b"\x89PNG")
     assert "No world fell." in report
     assert "## The order gyro_free < linear" in report
-    assert [row["worlds"] for row in pq.read_table(out / "order.parquet").to_pylist()] == [3] * 4
+    assert [row["worlds"] for row in pq.read_table(out / "order.parquet").to_pylist()] == [3] * 8
     assert 'order = [\n    "gyro_free",' in (out / "study.toml").read_text(encoding="utf-8")
     again = cmg_mj(*SMALL, *rates, *SHORT, "--out", str(out))
     assert "24 of 24 trials are there from before" in again.err

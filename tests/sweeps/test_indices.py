@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.sweeps.indices import Indices, index_rows, indices
+from cmg_mj.sweeps.indices import LOG_RATIO, LOST, Indices, index_rows, indices
 from cmg_mj.sweeps.study import Study, _sampled
 from tests.sweeps.made_up import BIAS, NOISE, VELOCITY, made_up
 
@@ -75,6 +75,37 @@ def test_what_is_decomposed_is_the_mean_over_the_worlds() -> None:
     assert by["linear", BIAS]["total"] == pytest.approx(1.0, abs=0.1)
     assert by["linear", NOISE]["total"] == pytest.approx(0.0, abs=1e-9)
     assert (by["ltv", BIAS]["decisive"], by["ltv", NOISE]["decisive"]) == (True, False)
+
+
+def test_the_logarithm_of_a_ratio() -> None:
+    """exp(a) by exp(0.02 b), a of 0 to 1 and b of 100 to 200: the logarithm is a - 0.02 b, variances 1/12 and 4/12."""
+    trials = made_up(
+        {BIAS: "0:1", NOISE: "100:200"},
+        ("linear", "ltv"),
+        2,
+        lambda point, name, _: float(np.exp(point[BIAS] if name == "ltv" else 0.02 * point[NOISE])),
+        design="sobol",
+        n=256,
+        order=("ltv", "linear"),
+    )
+    of = [row for row in index_rows(trials) if row["figure"] == f"{LOG_RATIO}{VELOCITY}"]
+    assert [(row["observer"], row["field"]) for row in of] == [("ltv / linear", BIAS), ("ltv / linear", NOISE)]
+    assert [row["total"] for row in of] == pytest.approx([0.2, 0.8], abs=0.02)
+    assert [row["decisive"] for row in of] == [False, True]
+
+
+def test_the_share_of_falls_has_indices() -> None:
+    trials = made_up(
+        {BIAS: "0:1", NOISE: "100:200"},
+        ("linear",),
+        1,
+        lambda point, *_: None if point[BIAS] > 0.5 else 1.0,
+        design="sobol",
+        n=256,
+    )
+    bias, noise = (row for row in index_rows(trials) if row["figure"] == LOST)
+    assert (bias["first"], bias["total"]) == pytest.approx((1.0, 1.0), abs=0.05)
+    assert (noise["first"], noise["total"]) == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
 def test_refused_with_counts_where_a_world_fell() -> None:

@@ -7,7 +7,7 @@ import pytest
 from cmg_mj.errors import InputError
 from cmg_mj.sweeps.order import order_of_points, order_rows
 from cmg_mj.sweeps.report_parts import order as said
-from tests.sweeps.made_up import BIAS, made_up
+from tests.sweeps.made_up import BIAS, VELOCITY, made_up
 
 NAMES = ("linear", "ltv", "homogeneous")
 ORDER = ("homogeneous", "ltv", "linear")
@@ -46,10 +46,9 @@ def test_the_share_has_wilsons_interval() -> None:
     assert (first["held"], first["worlds"], first["share"]) == (8, 10, 0.8)
     assert (first["low"], first["high"]) == pytest.approx((0.4902, 0.9433), abs=1e-4)
     assert (second["held"], second["share"]) == (10, 1.0)
-    assert (
-        "By the means over the worlds it holds at 2 of 2 points; world by world in 18 of 20."
-        in said(trials, order_rows(trials), 60)[1]
-    )
+    first, whole, *_ = said(trials, order_rows(trials), 60)[2].splitlines()[::2]
+    assert first.split("|")[1].strip() == "counted by"
+    assert [cell.strip() for cell in whole.split("|")[2:-1]] == ["homogeneous < ltv < linear", "2 of 2", "18 of 20"]
 
 
 def test_points_by_their_means() -> None:
@@ -62,7 +61,9 @@ def test_points_by_their_means() -> None:
         lambda p, name, w: of[p[BIAS]].get(name, ORDER.index(name)) if w == 0 else float(ORDER.index(name)),
         order=ORDER,
     )
-    assert order_of_points(trials) == (1, 3)
+    assert order_of_points(trials, VELOCITY, ORDER) == (1, 3)
+    assert order_of_points(trials, VELOCITY, ("homogeneous", "ltv")) == (3, 3)  # a fall is worse
+    assert order_of_points(trials, VELOCITY, ("ltv", "linear")) == (1, 3)
 
 
 @pytest.mark.parametrize(
