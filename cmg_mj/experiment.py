@@ -29,6 +29,7 @@ from cmg_mj.resources import folder
 from cmg_mj.scenario import as_fields, base_of, located, parse_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Driver, Result, simulate
+from cmg_mj.stacked import stacked
 from cmg_mj.trajectory import whole_file
 
 ON_THE_BOARD = """\
@@ -71,7 +72,7 @@ class Experiment:
         Args:
             worlds: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
             processor: What takes its decisions in its place.
-            **others: `law` and `sensors` instead of the scenario's.
+            **others: `law`, `sensors` and `tilt` instead of the scenario's.
 
         Returns:
             The controller.
@@ -268,7 +269,8 @@ def run_together(experiments: Sequence[Experiment], worlds: Sequence[int], **opt
     law, sensors, pushes = pooled(
         [(each.law, each.scenario.sensors, tuple(each.scenario.push)) for each in experiments]
     )
-    controller = first.controller(worlds, law=law, sensors=sensors)
+    tilt = stacked([each.plant.radial_tilt for each in experiments])
+    controller = first.controller(worlds, law=law, sensors=sensors, tilt=tilt)
     return first._simulate([each.plant for each in experiments], controller, pushes, **options)
 
 

@@ -33,7 +33,7 @@ from cmg_mj.rig_parts import KEYFRAME, Cube
 from cmg_mj.sensors import Sensors
 from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
-from cmg_mj.variations import at_speed, vary
+from cmg_mj.variations import at_speed, place_accelerometers, vary
 
 QUARTER_TURN = math.pi / 2.0
 
@@ -91,6 +91,7 @@ class Plant:
         if settings.flywheel_speed_rad_s is not None:
             self.cubes = at_speed(self.model, self.key, self.cubes, settings.flywheel_speed_rad_s, self.path)
             self.reduced = self._read_reduced()
+        self.radial_tilt = place_accelerometers(self.model, settings, self._tilt_as_filed, self.path)
         own = float(self.model.opt.timestep)
         vary(
             self.model,
@@ -126,7 +127,9 @@ class Plant:
             spec = parse(self.path)
             if self.settings.lock_thrust_bearing:
                 lock_thrust_bearing(spec, self.path)
-            return compile_model(spec, self.path)
+            model = compile_model(spec, self.path)
+        place_accelerometers(model, self.settings, self._tilt_as_filed, self.path)
+        return model
 
     # --- names ---------------------------------------------------------------------------------------------
 
@@ -140,8 +143,7 @@ class Plant:
         prefixes = [name.removesuffix("/gimbal") for name in names if name.endswith("/gimbal")]
         self.frame = int(model.jnt_bodyid[self.tilt])
         self._accelerometers = [self._accelerometer(f"accelerometer_{which}") for which in ("inner", "outer")]
-        radii = [radius for _, radius in self._accelerometers]
-        self.radial_tilt = RadialTilt(*radii)
+        self._tilt_as_filed = RadialTilt(*(radius for _, radius in self._accelerometers))
         self._gyro = int(model.sensor_adr[self._id("sensor", "fog")]) + 1  # its y axis
         self.cubes = tuple(self._cube(prefix) for prefix in prefixes)
         self.servos = [cube.servo for cube in self.cubes]
@@ -214,6 +216,7 @@ class Plant:
         *,
         law: Law | None = None,
         sensors: Sensors | None = None,
+        tilt: RadialTilt | None = None,
         processor: Processor | None = None,
         **options: Any,
     ) -> Controller:
@@ -223,6 +226,7 @@ class Plant:
             observer: An observer, or its name (or package.module:Class).
             law: The law; by default Table 2's gains at 200 Hz.
             sensors: The sensors; by default those of the datasheets.
+            tilt: The tilt estimate; by default that for this rig's accelerometers.
             processor: What takes the decisions in the controller's place, if anything does.
             **options: Options of `Controller`, such as seed, feedback and companions; whatever else is given is a
                 parameter of the observer, if that is given by name.
@@ -241,13 +245,13 @@ class Plant:
             observer = make_observer(observer, law.dt, self.reduced, noise, **parameters)
         elif parameters:
             name = next(iter(parameters))
-            known = {"law", "sensors", "processor", *CONTROLLER_OPTIONS}
+            known = {"law", "sensors", "tilt", "processor", *CONTROLLER_OPTIONS}
             raise InputError(f"controller({name}=...): no such option; {nearest(name, known)}")
         make = Controller if processor is None else partial(WithProcessor, processor)
         return make(
             observer,
             law,
-            self.radial_tilt,
+            tilt or self.radial_tilt,
             sensors,
             directions=self.directions,
             gimbal_zero=[cube.gimbal_zero for cube in self.cubes],

@@ -23,6 +23,8 @@ ARRAYS = frozenset(
         "plant.gimbal_damping_n_m_s",
         "plant.servo_stiffness_n_m_rad",
         "plant.servo_damping_n_m_s_rad",
+        "plant.accelerometer_inner_m",
+        "plant.accelerometer_outer_m",
         "plant.tilt_friction_n_m",
         "plant.tilt_damping_n_m_s",
         "plant.flywheel_imbalance_kg_m",
