@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from cmg_mj.accelerometer import Accelerometer
+from cmg_mj.backlash import ARCMIN_A_DEGREE
 from cmg_mj.complaint import complaint
 from cmg_mj.controller import CONTROLLER_OPTIONS, Controller
 from cmg_mj.elementwise import Scalar
@@ -53,6 +54,7 @@ class Plant:
         largest_step: The largest physics step that is accurate enough [s].
         tilt_zero: q_b at which the radial line is upright [rad].
         bias: e [rad].
+        backlash: Between the servos' motors and the gimbals [rad].
         radial_tilt: The tilt estimate for this rig's accelerometers.
     """
 
@@ -86,6 +88,7 @@ class Plant:
         """Change the model as the settings say, and fit the physics step."""
         self.settings = settings
         self.bias = math.radians(settings.equilibrium_bias_deg)
+        self.backlash = math.radians(settings.gimbal_backlash_arcmin / ARCMIN_A_DEGREE)
         self.model = copy.copy(self._as_filed)
         self.cubes, self.reduced = self._cubes_as_filed, self._reduced_as_filed
         if settings.flywheel_speed_rad_s is not None:
@@ -217,6 +220,7 @@ class Plant:
         law: Law | None = None,
         sensors: Sensors | None = None,
         tilt: RadialTilt | None = None,
+        backlash: Scalar | None = None,
         processor: Processor | None = None,
         **options: Any,
     ) -> Controller:
@@ -227,6 +231,7 @@ class Plant:
             law: The law; by default Table 2's gains at 200 Hz.
             sensors: The sensors; by default those of the datasheets.
             tilt: The tilt estimate; by default that for this rig's accelerometers.
+            backlash: Between the servos' motors and the gimbals; by default this rig's [rad].
             processor: What takes the decisions in the controller's place, if anything does.
             **options: Options of `Controller`, such as seed, feedback and companions; whatever else is given is a
                 parameter of the observer, if that is given by name.
@@ -245,7 +250,7 @@ class Plant:
             observer = make_observer(observer, law.dt, self.reduced, noise, **parameters)
         elif parameters:
             name = next(iter(parameters))
-            known = {"law", "sensors", "tilt", "processor", *CONTROLLER_OPTIONS}
+            known = {"law", "sensors", "tilt", "backlash", "processor", *CONTROLLER_OPTIONS}
             raise InputError(f"controller({name}=...): no such option; {nearest(name, known)}")
         make = Controller if processor is None else partial(WithProcessor, processor)
         return make(
@@ -256,6 +261,7 @@ class Plant:
             directions=self.directions,
             gimbal_zero=[cube.gimbal_zero for cube in self.cubes],
             timestep=self.model.opt.timestep,
+            backlash=self.backlash if backlash is None else backlash,
             **options,
         )
 

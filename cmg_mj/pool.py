@@ -21,6 +21,7 @@ ARRAYS = frozenset(
         "plant.gimbal_armature_kg_m2",
         "plant.gimbal_friction_n_m",
         "plant.gimbal_damping_n_m_s",
+        "plant.gimbal_backlash_arcmin",
         "plant.servo_stiffness_n_m_rad",
         "plant.servo_damping_n_m_s_rad",
         "plant.accelerometer_inner_m",

@@ -273,7 +273,7 @@ def simulate(
                     if ticked and controller.tick is not None:
                         if not single:
                             _stop_blind(worlds, controller.tick, ends, step * timestep)
-                        worlds.command(controller.tick.u)
+                        worlds.command(controller.turning)
                     worlds.advance(count)
                 else:
                     ticked = step % controller.period == 0

@@ -32,6 +32,7 @@ def values(seed: int = 3) -> dict[str, Any]:
         "plant.gimbal_armature_kg_m2": 1e-3 * (1.0 + small[0]),
         "plant.gimbal_friction_n_m": 0.02 * small[1],
         "plant.gimbal_damping_n_m_s": 0.1 + 0.1 * small[2],
+        "plant.gimbal_backlash_arcmin": [0.0, 0.0, 5.0, 10.0, 20.0, 30.0],
         "plant.servo_stiffness_n_m_rad": 60.0 + 30.0 * small[5],
         "plant.servo_damping_n_m_s_rad": 0.6 + 0.2 * small[6],
         "plant.accelerometer_inner_m": 0.05 + 0.03 * small[0],
