@@ -65,9 +65,9 @@ def _tick(plant: Plant, controller: Controller, data: mujoco.MjData, sense: Call
 
 def _hold(plant: Plant, controller: Controller, data: mujoco.MjData) -> None:
     """Set the servos' commands to those of the last tick."""
-    if controller.tick is not None:
+    if controller.turning is not None:
         for cube in plant.cubes:
-            data.ctrl[cube.servo] = cube.direction * controller.tick.u
+            data.ctrl[cube.servo] = cube.direction * controller.turning
 
 
 class ControlCallback:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
+from cmg_mj.backlash import Backlash
 from cmg_mj.elementwise import Scalar
 from cmg_mj.gimbal_angle import GimbalAngle
 from cmg_mj.ideal import Ideal
@@ -58,6 +59,7 @@ class Controller:
         companions: Observers that ride along open loop, by name.
         trim_s: For so long from the start, the integrator is held at the value that the observer's bias estimate asks
             for, k_e1/k_e4 e, instead of finding it by integration [s].
+        backlash: Between the servos' motors and the gimbals, one for all worlds or (n_worlds,) [rad].
 
     Attributes:
         extra_signals: Names of what the observer, then each companion, estimates beyond x.
@@ -85,6 +87,7 @@ class Controller:
         angles: Angles = "measured",
         companions: Mapping[str, Observer] | None = None,
         trim_s: float = 0.0,
+        backlash: Scalar = 0.0,
     ) -> None:
         self.observer = observer
         self.law = law
@@ -105,6 +108,7 @@ class Controller:
         self.trim_s = trim_s
         self.trim_part, self.trim_gain = trim_of(trim_s, law, self.extra_signals[0])
         self.trimmed_until = steps_until(trim_s, timestep)
+        self.backlash = backlash
         self.gimbal_angle = GimbalAngle(self.directions, self.gimbal_zero)
         self.reset()
 
@@ -113,6 +117,9 @@ class Controller:
         self._sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds)
         self._x_e: Scalar = 0.0
         self.tick: Tick | None = None
+        self.turning: Scalar = None
+        """The rate at which the gimbals are turned since the last tick: its u, behind the backlash [rad/s]."""
+        self._gap = None if type(self.backlash) is float and not self.backlash else Backlash(self.backlash, self.law.dt)
         self.step: int | None = None
         """The physics step of the last update."""
         self.beat = math.gcd(self.period, *(sensor.beat for sensor in self._sampled))
@@ -138,7 +145,8 @@ class Controller:
         if step % self.period:
             return False
         accelerometers, encoders, fog = self._sampled
-        self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), ideal.rate)
+        u = self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), ideal.rate).u
+        self.turning = u if self._gap is None else self._gap(u)
         return True
 
     def decide(

@@ -38,7 +38,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
     compare = scenario.compare
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
     imperfections = scenario.sensors.accelerometer.imperfections
-    changes = settings.changes_of_physics()
+    changes = settings.changes()
     rows = [
         ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
         ("plant", f"{fields['plant']['model']}, cubes: {', '.join(rig.cubes)}"),

@@ -29,6 +29,7 @@ from cmg_mj.resources import folder
 from cmg_mj.scenario import as_fields, base_of, located, parse_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Driver, Result, simulate
+from cmg_mj.stacked import stacked
 from cmg_mj.trajectory import whole_file
 
 ON_THE_BOARD = """\
@@ -71,7 +72,7 @@ class Experiment:
         Args:
             worlds: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
             processor: What takes its decisions in its place.
-            **others: `law` and `sensors` instead of the scenario's.
+            **others: `law`, `sensors`, `tilt` and `backlash` instead of the scenario's.
 
         Returns:
             The controller.
@@ -130,7 +131,7 @@ class Experiment:
             return run_together(self.varied(vary), numbers, **options)
         rigs = [self.plant] * len(numbers) if plants is None else list(plants)
         _require_alike([self.plant, *rigs], len(rigs), len(numbers))
-        return self._simulate(rigs, self.controller(numbers), **options)
+        return self._simulate(rigs, self.controller(numbers, **_of_the_rigs(rigs)), **options)
 
     def varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
         """The scenario with other settings in each world; worlds with equal settings share one.
@@ -268,8 +269,14 @@ def run_together(experiments: Sequence[Experiment], worlds: Sequence[int], **opt
     law, sensors, pushes = pooled(
         [(each.law, each.scenario.sensors, tuple(each.scenario.push)) for each in experiments]
     )
-    controller = first.controller(worlds, law=law, sensors=sensors)
-    return first._simulate([each.plant for each in experiments], controller, pushes, **options)
+    rigs = [each.plant for each in experiments]
+    controller = first.controller(worlds, law=law, sensors=sensors, **_of_the_rigs(rigs))
+    return first._simulate(rigs, controller, pushes, **options)
+
+
+def _of_the_rigs(rigs: Sequence[Plant]) -> dict[str, Any]:
+    """What a controller of many worlds has of their rigs."""
+    return {"tilt": stacked([rig.radial_tilt for rig in rigs]), "backlash": stacked([rig.backlash for rig in rigs])}
 
 
 def _require_alike(rigs: Sequence[Plant], plants: int, worlds: int) -> None:

@@ -77,7 +77,7 @@ def known_rig(settings: PlantSettings) -> RigFacts | None:
     """
     path = find("models", settings.model, ".xml", "plant.model =")
     kept = folder("models") / FILE
-    if settings.changes_of_physics() or settings.integrator != PlantSettings.integrator:
+    if settings.changes() or settings.integrator != PlantSettings.integrator:
         return None  # only MuJoCo can say whether it goes with them, and at which step
     # What a linked model includes, MuJoCo looks for beside the link.
     if path.is_symlink() or path.resolve().parent != folder("models").resolve():

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from cmg_mj.accelerometer import Accelerometer
+from cmg_mj.backlash import ARCMIN_A_DEGREE
 from cmg_mj.complaint import complaint
 from cmg_mj.controller import CONTROLLER_OPTIONS, Controller
 from cmg_mj.elementwise import Scalar
@@ -33,7 +34,7 @@ from cmg_mj.rig_parts import KEYFRAME, Cube
 from cmg_mj.sensors import Sensors
 from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
-from cmg_mj.variations import at_speed, vary
+from cmg_mj.variations import at_speed, place_accelerometers, vary
 
 QUARTER_TURN = math.pi / 2.0
 
@@ -53,6 +54,7 @@ class Plant:
         largest_step: The largest physics step that is accurate enough [s].
         tilt_zero: q_b at which the radial line is upright [rad].
         bias: e [rad].
+        backlash: Between the servos' motors and the gimbals [rad].
         radial_tilt: The tilt estimate for this rig's accelerometers.
     """
 
@@ -86,11 +88,13 @@ class Plant:
         """Change the model as the settings say, and fit the physics step."""
         self.settings = settings
         self.bias = math.radians(settings.equilibrium_bias_deg)
+        self.backlash = math.radians(settings.gimbal_backlash_arcmin / ARCMIN_A_DEGREE)
         self.model = copy.copy(self._as_filed)
         self.cubes, self.reduced = self._cubes_as_filed, self._reduced_as_filed
         if settings.flywheel_speed_rad_s is not None:
             self.cubes = at_speed(self.model, self.key, self.cubes, settings.flywheel_speed_rad_s, self.path)
             self.reduced = self._read_reduced()
+        self.radial_tilt = place_accelerometers(self.model, settings, self._tilt_as_filed, self.path)
         own = float(self.model.opt.timestep)
         vary(
             self.model,
@@ -126,7 +130,9 @@ class Plant:
             spec = parse(self.path)
             if self.settings.lock_thrust_bearing:
                 lock_thrust_bearing(spec, self.path)
-            return compile_model(spec, self.path)
+            model = compile_model(spec, self.path)
+        place_accelerometers(model, self.settings, self._tilt_as_filed, self.path)
+        return model
 
     # --- names ---------------------------------------------------------------------------------------------
 
@@ -140,8 +146,7 @@ class Plant:
         prefixes = [name.removesuffix("/gimbal") for name in names if name.endswith("/gimbal")]
         self.frame = int(model.jnt_bodyid[self.tilt])
         self._accelerometers = [self._accelerometer(f"accelerometer_{which}") for which in ("inner", "outer")]
-        radii = [radius for _, radius in self._accelerometers]
-        self.radial_tilt = RadialTilt(*radii)
+        self._tilt_as_filed = RadialTilt(*(radius for _, radius in self._accelerometers))
         self._gyro = int(model.sensor_adr[self._id("sensor", "fog")]) + 1  # its y axis
         self.cubes = tuple(self._cube(prefix) for prefix in prefixes)
         self.servos = [cube.servo for cube in self.cubes]
@@ -214,6 +219,8 @@ class Plant:
         *,
         law: Law | None = None,
         sensors: Sensors | None = None,
+        tilt: RadialTilt | None = None,
+        backlash: Scalar | None = None,
         processor: Processor | None = None,
         **options: Any,
     ) -> Controller:
@@ -223,6 +230,8 @@ class Plant:
             observer: An observer, or its name (or package.module:Class).
             law: The law; by default Table 2's gains at 200 Hz.
             sensors: The sensors; by default those of the datasheets.
+            tilt: The tilt estimate; by default that for this rig's accelerometers.
+            backlash: Between the servos' motors and the gimbals; by default this rig's [rad].
             processor: What takes the decisions in the controller's place, if anything does.
             **options: Options of `Controller`, such as seed, feedback and companions; whatever else is given is a
                 parameter of the observer, if that is given by name.
@@ -241,17 +250,18 @@ class Plant:
             observer = make_observer(observer, law.dt, self.reduced, noise, **parameters)
         elif parameters:
             name = next(iter(parameters))
-            known = {"law", "sensors", "processor", *CONTROLLER_OPTIONS}
+            known = {"law", "sensors", "tilt", "backlash", "processor", *CONTROLLER_OPTIONS}
             raise InputError(f"controller({name}=...): no such option; {nearest(name, known)}")
         make = Controller if processor is None else partial(WithProcessor, processor)
         return make(
             observer,
             law,
-            self.radial_tilt,
+            tilt or self.radial_tilt,
             sensors,
             directions=self.directions,
             gimbal_zero=[cube.gimbal_zero for cube in self.cubes],
             timestep=self.model.opt.timestep,
+            backlash=self.backlash if backlash is None else backlash,
             **options,
         )
 

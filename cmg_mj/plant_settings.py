@@ -30,8 +30,12 @@ class PlantSettings:
         gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
         gimbal_friction_n_m: Dry friction of each gimbal [N m].
         gimbal_damping_n_m_s: Viscous friction of each gimbal [N m s/rad].
+        gimbal_backlash_arcmin: Play between each gimbal and its servo's motor, held by friction (`backlash.py`) [arcmin].
         servo_stiffness_n_m_rad: Of each gimbal servo's position loop [N m/rad].
         servo_damping_n_m_s_rad: Of each gimbal servo's position loop [N m s/rad].
+        accelerometer_inner_m: The inner accelerometer's distance from the tilt axis on the radial line [m]. The tilt
+            estimate knows it.
+        accelerometer_outer_m: The outer accelerometer's [m].
         tilt_friction_n_m: Dry friction of the tilt joint [N m].
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
         flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
@@ -47,15 +51,23 @@ class PlantSettings:
     gimbal_armature_kg_m2: NonNegative | None = None
     gimbal_friction_n_m: NonNegative | None = None
     gimbal_damping_n_m_s: NonNegative | None = None
+    gimbal_backlash_arcmin: Annotated[float, Field(ge=0.0, lt=5400.0)] = 0.0
     servo_stiffness_n_m_rad: Positive | None = None
     servo_damping_n_m_s_rad: NonNegative | None = None
+    accelerometer_inner_m: Positive | None = None
+    accelerometer_outer_m: Positive | None = None
     tilt_friction_n_m: NonNegative | None = None
     tilt_damping_n_m_s: NonNegative | None = None
     flywheel_speed_rad_s: Positive | None = None
     flywheel_imbalance_kg_m: float = 0.0
 
-    def changes_of_physics(self) -> dict[str, float]:
-        """What is given of friction, damping, inertia, servos and wheels."""
-        of = ("gimbal", "servo", "tilt", "flywheel")
+    def changes(self) -> dict[str, float]:
+        """What is given of friction, damping, inertia, backlash, servos, wheels and places of the accelerometers."""
+        of = ("gimbal", "servo", "accelerometer", "tilt", "flywheel")
         fields = [field for field in dataclasses.fields(self) if field.name.startswith(of)]
         return {field.name: value for field in fields if (value := getattr(self, field.name)) != field.default}
+
+    def changes_of_physics(self) -> dict[str, float]:
+        """What of these moves masses and makes torques."""
+        others = ("accelerometer_inner_m", "accelerometer_outer_m", "gimbal_backlash_arcmin")
+        return {name: value for name, value in self.changes().items() if name not in others}

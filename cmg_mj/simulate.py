@@ -234,8 +234,8 @@ def simulate(
     sensors = of_worlds(controller.sensors, len(plants))
     targets = {BIAS: [plant.apparent_bias(own.accelerometer) for plant, own in zip(plants, sensors, strict=True)]}
     limit = controller.law.rate_limit
-    facts = rig.facts
-    floors = Floors([facts.noise(own) for own in sensors], max(dt, 1.0 / controller.sensors.accelerometer.rate_hz))
+    noises = [plant.facts.noise(own) for plant, own in zip(plants, sensors, strict=True)]
+    floors = Floors(noises, max(dt, 1.0 / controller.sensors.accelerometer.rate_hz))
     metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, floors)
     beside = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds)
     rows = Rows(plants, observers, controller.extra_signals, metrics, beside, dt, keep=keep_trajectory, single=single)
@@ -273,7 +273,7 @@ def simulate(
                     if ticked and controller.tick is not None:
                         if not single:
                             _stop_blind(worlds, controller.tick, ends, step * timestep)
-                        worlds.command(controller.tick.u)
+                        worlds.command(controller.turning)
                     worlds.advance(count)
                 else:
                     ticked = step % controller.period == 0

@@ -41,15 +41,15 @@ class RadialTilt:
     proportional to r, and the combination below is gravity alone, whatever the motion.
 
     Attributes:
-        r_inner: Distance of the inner accelerometer from the pivot [m].
-        r_outer: Distance of the outer accelerometer from the pivot [m].
+        r_inner: Distance of the inner accelerometer from the pivot, of many worlds an array (n_worlds,) [m].
+        r_outer: Distance of the outer accelerometer from the pivot, likewise [m].
     """
 
-    r_inner: float
-    r_outer: float
+    r_inner: Scalar
+    r_outer: Scalar
 
     @cached_property
-    def _weights(self) -> tuple[float, float]:
+    def _weights(self) -> tuple[Scalar, Scalar]:
         """Of the inner and the outer accelerometer in the combination that is gravity alone."""
         span = self.r_outer - self.r_inner
         return self.r_outer / span, self.r_inner / span

@@ -13,6 +13,7 @@ import numpy as np
 from cmg_mj.errors import InputError
 from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.rig_parts import KEYFRAME, Cube
+from cmg_mj.tilt import RadialTilt
 
 _INTEGRATORS = {
     "RK4": int(mujoco.mjtIntegrator.mjINT_RK4),
@@ -95,6 +96,46 @@ def at_speed(model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: floa
         model.key_qvel[key, cube.flywheel] = model.key_ctrl[key, cube.motor] = signed
         found.append(replace(cube, speed=signed))
     return tuple(found)
+
+
+def place_accelerometers(
+    model: mujoco.MjModel, settings: PlantSettings, as_filed: RadialTilt, path: Path
+) -> RadialTilt:
+    """Move the accelerometers along the radial line.
+
+    Args:
+        model: The model, as its file has it.
+        settings: Their distances from the tilt axis; what is left out stays.
+        as_filed: The tilt estimate for their places in the file.
+        path: The model's file, for messages.
+
+    Returns:
+        The tilt estimate for their new places.
+
+    Raises:
+        InputError: The outer one is no farther out than the inner one.
+    """
+    given = {
+        "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
+        "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
+    }
+    if all(to is None for to, _ in given.values()):
+        return as_filed
+    inner, outer = (was if to is None else to for to, was in given.values())
+    if not inner < outer:
+        changed = ", ".join(f"plant.{name}_m = {to:g}" for name, (to, _) in given.items() if to is not None)
+        raise InputError(
+            f"{changed}: the inner accelerometer must lie nearer to the tilt axis than the outer one, and they are "
+            f"{inner:g} and {outer:g} m away ({path})"
+        )
+    tilt = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "tilt")
+    for name, (to, was) in given.items():
+        if to is not None:
+            site = int(model.sensor_objid[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)])
+            arm = model.site_pos[site] - model.jnt_pos[tilt]
+            model.site_pos[site] += arm * [1.0, 0.0, 1.0] * (to / was - 1.0)
+            model.site_sameframe[site] = 0  # should it have stood where the body's frame does
+    return RadialTilt(inner, outer)
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, cubes: Sequence[Cube]) -> None:

@@ -32,8 +32,11 @@ def values(seed: int = 3) -> dict[str, Any]:
         "plant.gimbal_armature_kg_m2": 1e-3 * (1.0 + small[0]),
         "plant.gimbal_friction_n_m": 0.02 * small[1],
         "plant.gimbal_damping_n_m_s": 0.1 + 0.1 * small[2],
+        "plant.gimbal_backlash_arcmin": [0.0, 0.0, 5.0, 10.0, 20.0, 30.0],
         "plant.servo_stiffness_n_m_rad": 60.0 + 30.0 * small[5],
         "plant.servo_damping_n_m_s_rad": 0.6 + 0.2 * small[6],
+        "plant.accelerometer_inner_m": 0.05 + 0.03 * small[0],
+        "plant.accelerometer_outer_m": 0.15 + 0.05 * small[2],
         "plant.tilt_friction_n_m": 0.005 * small[3],
         "plant.tilt_damping_n_m_s": 0.01 * small[4],
         "plant.flywheel_imbalance_kg_m": 1e-5 * small[5],
@@ -75,6 +78,11 @@ def test_an_observer_that_is_told_the_noise_keeps_worlds_of_other_noise_apart() 
     noise = {"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]}
     with pytest.raises(InputError, match="the sensors' noise, which gyro_free is told, differs"):
         experiment("gyro_free").run_many(2, vary=noise)
+
+
+def test_an_observer_that_is_told_the_noise_keeps_worlds_of_other_places_apart() -> None:
+    with pytest.raises(InputError, match="the sensors' noise, which kalman is told, differs"):
+        experiment("kalman").run_many(2, vary={"accelerometer_outer_m": [0.2, 0.25]})
 
 
 def test_gains_by_other_weights_run_together() -> None:

@@ -20,6 +20,7 @@ from cmg_mj.plant import Plant, load_plant
 from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.resources import folder
 from cmg_mj.scenario import load_scenario
+from cmg_mj.tilt import RadialTilt
 from cmg_mj.trajectory import Trajectory
 from tests import paper_model as paper
 
@@ -177,9 +178,77 @@ def test_a_motor_that_takes_no_such_speed(tmp_path: Path) -> None:
         load_plant(model=str(path), flywheel_speed_rad_s=401.0)
 
 
+# --- the accelerometers ---------------------------------------------------------------------------------------
+
+INNER, OUTER = 0.05, 0.25
+
+
+def moved_sites(where: Path) -> Path:
+    """The file with its accelerometers on the diagonal of x and z at other distances."""
+
+    def site(which: str, radius: float) -> tuple[str, str]:
+        at = radius / math.sqrt(2.0)
+        return rf'(name="accelerometer_{which}" pos=)"[^"]*"', rf'\1"{at!r} 0 {at!r}"'
+
+    return edited(where, "scissored_pair.xml", site("inner", INNER), site("outer", OUTER))
+
+
+def test_accelerometers_by_settings_are_those_of_a_file(tmp_path: Path) -> None:
+    path = moved_sites(tmp_path)
+    plant = load_plant(accelerometer_inner_m=INNER, accelerometer_outer_m=OUTER)
+    filed = load_plant(model=str(path))
+    assert plant.radial_tilt == RadialTilt(INNER, OUTER)
+    for model, other in ((plant.model, filed.model), (plant.drawn_model, filed.drawn_model)):
+        np.testing.assert_allclose(model.site_pos, other.site_pos, rtol=0.0, atol=1e-15)
+    by_setting = run(f"plant.accelerometer_inner_m={INNER}", f"plant.accelerometer_outer_m={OUTER}")
+    np.testing.assert_allclose(by_setting["y1_rad"], run(f"plant.model={path}")["y1_rad"], rtol=0.0, atol=1e-9)
+
+
+def test_what_they_feel_of_a_turn_grows_with_the_distance() -> None:
+    """a = r (alpha tangential, -w^2 radial): their readings differ by that, and y1 is the tilt all the same."""
+    plant = load_plant(accelerometer_inner_m=INNER, accelerometer_outer_m=OUTER, lock_thrust_bearing=True)
+    data = plant.new_data()
+    data.qpos[plant.tilt], data.qvel[plant.tilt] = plant.tilt_zero + 0.2, 3.0
+    mujoco.mj_forward(plant.model, data)
+    alpha, rate = float(data.qacc[plant.tilt]), 3.0
+    ix, iz, ox, oz = plant.ideal(data.sensordata.tolist(), data.qvel.tolist()).accelerations
+    assert ox - ix == pytest.approx((OUTER - INNER) * alpha, rel=1e-12)
+    assert oz - iz == pytest.approx(-(OUTER - INNER) * rate**2, rel=1e-12)
+    assert plant.radial_tilt(ix, iz, ox, oz) == pytest.approx(0.2, abs=1e-12)
+    assert plant.radial_tilt.acceleration(ix, ox) == pytest.approx(alpha, rel=1e-12)
+
+
+def test_one_of_them_alone() -> None:
+    filed = load_plant().radial_tilt
+    assert load_plant(accelerometer_outer_m=OUTER).radial_tilt == RadialTilt(filed.r_inner, OUTER)
+    assert (
+        load_plant().changed(PlantSettings(accelerometer_inner_m=INNER)).changed(PlantSettings()).radial_tilt == filed
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ((0.2, 0.1), r"inner_m = 0\.2, plant\.accelerometer_outer_m = 0\.1: the inner .* 0\.2 and 0\.1 m away"),
+        ((0.2, 0.2), "must lie nearer"),
+        ((0.3, None), r"plant\.accelerometer_inner_m = 0\.3: .* 0\.3 and 0\.201525 m away"),
+        ((None, 0.05), r"plant\.accelerometer_outer_m = 0\.05: .* 0\.0671751 and 0\.05 m away"),
+    ],
+)
+def test_the_inner_one_is_the_inner_one(given: tuple, complaint: str) -> None:
+    with pytest.raises(InputError, match=complaint):
+        load_plant(accelerometer_inner_m=given[0], accelerometer_outer_m=given[1])
+
+
 # --- all of them ----------------------------------------------------------------------------------------------
 
-GIVEN: dict[str, Any] = {"servo_stiffness_n_m_rad": KP, "servo_damping_n_m_s_rad": 0.0, "flywheel_speed_rad_s": 250.0}
+GIVEN: dict[str, Any] = {
+    "servo_stiffness_n_m_rad": KP,
+    "servo_damping_n_m_s_rad": 0.0,
+    "flywheel_speed_rad_s": 250.0,
+    "accelerometer_inner_m": INNER,
+    "accelerometer_outer_m": OUTER,
+}
 
 
 @pytest.mark.parametrize("name", GIVEN)

@@ -1,0 +1,43 @@
+"""Play between the servos' motors and their gimbals, held by friction: a gimbal rests until its motor has crossed it.
+
+In velocity mode a servo's motor turns at the commanded rate and does not know of the gap behind it. Encoders sit on the
+gimbals. The observers are told the command, not what the gimbals make of it.
+"""
+
+from __future__ import annotations
+
+from cmg_mj.elementwise import Scalar, clip, where
+
+ARCMIN_A_DEGREE = 60.0
+
+
+class Backlash:
+    """The play operator: gimbal+ = gimbal, limited to motor+ -+ gap/2, from the middle of the gap.
+
+    Args:
+        gap: From one side to the other, a float or an array (n_worlds,) [rad].
+        dt: Control period [s].
+    """
+
+    def __init__(self, gap: Scalar, dt: float) -> None:
+        self._gap = gap
+        self._dt = dt
+        self._motor: Scalar = None
+        self._gimbal: Scalar = None
+
+    def __call__(self, u: Scalar) -> Scalar:
+        """What the gimbals make of a command that is held for a period.
+
+        Args:
+            u: The rate of the motors [rad/s].
+
+        Returns:
+            The rate at which the gimbals are turned meanwhile; where there is no gap, u itself [rad/s].
+        """
+        if self._motor is None:
+            self._motor = self._gimbal = 0.0 * u
+        half = self._gap / 2.0
+        self._motor = self._motor + u * self._dt
+        before = self._gimbal
+        self._gimbal = clip(before, self._motor - half, self._motor + half)
+        return where(self._gap > 0.0, (self._gimbal - before) / self._dt, u)
