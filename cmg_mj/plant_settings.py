@@ -30,7 +30,7 @@ class PlantSettings:
         gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
         gimbal_friction_n_m: Dry friction of each gimbal [N m].
         gimbal_damping_n_m_s: Viscous friction of each gimbal [N m s/rad].
-        gimbal_backlash_arcmin: Play between each gimbal and its servo's motor, held by friction (`backlash.py`) [arcmin].
+        gimbal_backlash_arcmin: Play between each gimbal and its servo's motor, held by friction [arcmin].
         servo_stiffness_n_m_rad: Of each gimbal servo's position loop [N m/rad].
         servo_damping_n_m_s_rad: Of each gimbal servo's position loop [N m s/rad].
         accelerometer_inner_m: The inner accelerometer's distance from the tilt axis on the radial line [m]. The tilt

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from cmg_mj.papers.sokolov2019.backlash import gap_rad
+from cmg_mj.backlash import ARCMIN_A_DEGREE
+from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.lag import linearised
 
 
@@ -60,5 +61,5 @@ def foreseen_cycle(observer: str, points: int = 60) -> Foreseen | None:
     c = float(brentq(growth, grid[first - 1], grid[first], xtol=1e-9))  # type: ignore[arg-type]
     factor, shape = turning(c)
     rate = math.atan2(factor.imag, factor.real) / dt
-    motor = gap_rad() / (1.0 + c)
+    motor = math.radians(GAP_ARCMIN / ARCMIN_A_DEGREE) / (1.0 + c)
     return Foreseen(math.degrees(motor * rate * float(abs(shape[0]) / abs(shape[-1]))), rate / (2.0 * math.pi))

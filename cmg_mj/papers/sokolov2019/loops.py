@@ -10,7 +10,7 @@ import numpy as np
 from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.papers.claim import OnShare
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, gap_rad, run_behind_a_gap
+from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment
 from cmg_mj.papers.words import plus_minus
@@ -56,10 +56,10 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
     for i, name in enumerate(OBSERVERS):
         prepared = experiment(settings, name)
         biases = np.repeat([*BIASES_DEG, SHOWN_DEG], worlds)
-        rigs = [each.plant for each in prepared.varied({"equilibrium_bias_deg": biases})]
         cases = len(BIASES_DEG) + 1
-        gaps = np.repeat([*[0.0] * len(BIASES_DEG), gap_rad()], worlds)
-        *own, gap[name] = run_behind_a_gap(prepared, [*range(worlds)] * cases, gaps, rigs).groups(cases)
+        gaps = np.repeat([*[0.0] * len(BIASES_DEG), GAP_ARCMIN], worlds)
+        varied = {"equilibrium_bias_deg": biases, "gimbal_backlash_arcmin": gaps}
+        *own, gap[name] = prepared.run_many([*range(worlds)] * cases, vary=varied).groups(cases)
         for e, found in zip(BIASES_DEG, own, strict=True):
             by_bias[e][name] = found
         quiet[name] = experiment([*settings, *NO_NOISE], name).run()

@@ -35,7 +35,7 @@ def picture(name: str, found: Loops) -> Picture:
         rows[1].append(Panel("tilt rate [rad/s]", rates, shaded=shaded))
         rows[2].append(
             Panel(
-                "rate the gimbal is\nturned at [rad/s]",
+                "command u [rad/s]",
                 [Line(t, one["u_rad_s"], "u", color=3, width=0.6)],
                 shaded=shaded,
             )
