@@ -77,6 +77,8 @@ def valid_scenario() -> str:
     fields = Scenario().model_dump(mode="json", exclude_none=True)
     fields["plant"] |= {"timestep_s": 0.005, "gimbal_friction_n_m": 0.1, "tilt_damping_n_m_s": 0.01}
     fields["plant"] |= {"gimbal_armature_kg_m2": 1e-4, "gimbal_damping_n_m_s": 0.01, "tilt_friction_n_m": 0.01}
+    fields["plant"] |= {"servo_stiffness_n_m_rad": 80.0, "servo_damping_n_m_s_rad": 0.7, "flywheel_speed_rad_s": 300.0}
+    fields["plant"] |= {"accelerometer_inner_m": 0.07, "accelerometer_outer_m": 0.2, "gimbal_backlash_arcmin": 5.0}
     fields["controller"] |= {"gains": [35.0, 4.0, -1.0, 0.3]}
     fields["observer"] = {"kind": "homogeneous", "k1": 20.0, "k2": 150.0, "alpha": 0.85, "friction_n_m": 0.1}
     fields |= {"duration_s": 0.5, "push": [{"start_s": 0.1, "duration_s": 0.1, "torque_n_m": 1.0}]}
