@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cmg_mj.intervals import Interval
 from cmg_mj.sweeps.cells import Trials, fell_interval
+from cmg_mj.sweeps.study import Study
+from cmg_mj.sweeps.trials import as_table, point_columns
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 JUDGED = "velocity_rms_error_rad_s"
 
@@ -61,6 +67,15 @@ def _held(errors: np.ndarray) -> Held:
     holds = (better < worse).all(axis=0)
     broken = ((better >= worse) & np.isfinite(worse)).any(axis=0)
     return Held(int(holds.sum()), int((holds | broken).sum()))
+
+
+def order_table(study: Study, rows: Sequence[dict[str, Any]]) -> pa.Table:
+    """The rows of `order_rows` as a table."""
+    import pyarrow as pa
+
+    ends = [(name, "float64") for name in ("share", "low", "high")]
+    columns = [*point_columns(study), ("order", "string"), ("held", "int64"), ("worlds", "int64"), *ends]
+    return as_table(rows, pa.schema(columns))
 
 
 def order_rows(trials: Trials) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from cmg_mj import markdown
 from cmg_mj.picture import Picture
-from cmg_mj.summary_keys import heading
+from cmg_mj.summary_keys import KEYS, heading
 from cmg_mj.sweeps.cells import Trials
 from cmg_mj.sweeps.drawn import SHOWN
 from cmg_mj.sweeps.indices import FEWEST
@@ -41,19 +41,10 @@ def pictures(trials: Trials, drawn: Sequence[Picture]) -> list[str]:
 def order(trials: Trials, rows: Sequence[dict[str, Any]], most: int) -> list[str]:
     """How often the named order holds."""
     study = trials.study
-    by_points = order_of_points(trials)
-    held, worlds = sum(row["held"] for row in rows), sum(row["worlds"] for row in rows)
-    said = f"By the means over the worlds it holds at {by_points.times} of {by_points.of} points"
-    share = by_points.share
-    if share is not None and study.design == "sample":  # points of a grid are no sample of anything
-        said += f" ({_percent(share.mean)}, Wilson's 95 % interval {_percent(share.low)} to {_percent(share.high)})"
-    unknown = len(study.points) - by_points.of
-    if unknown:
-        said += f"; {unknown} points cannot tell"
     parts = [
         f"## The order {' < '.join(study.order)}",
-        f"{said}; world by world in {held} of {worlds}. Counted by the {heading(SHOWN[0])}; a fall is worse than any "
-        "error, and where two next to each other fell nobody can tell.",
+        f"{_holds(trials, rows)}. Counted by the {heading(SHOWN[0])}; a fall is worse than any error, and where two "
+        "next to each other fell nobody can tell.",
     ]
     if study.design != "grid":
         return [*parts, "Every point is in order.parquet."]
@@ -65,6 +56,25 @@ def order(trials: Trials, rows: Sequence[dict[str, Any]], most: int) -> list[str
     parts.append(markdown.table([*fields, "worlds", "share", "95 % interval"], table, text_columns=0))
     more = len(rows) - most
     return parts if more <= 0 else [*parts, f"{more} points more are in order.parquet."]
+
+
+def order_in_short(trials: Trials, rows: Sequence[dict[str, Any]]) -> str:
+    """The same in a sentence."""
+    return f"The order {' < '.join(trials.study.order)}: {_holds(trials, rows)}."
+
+
+def _holds(trials: Trials, rows: Sequence[dict[str, Any]]) -> str:
+    study = trials.study
+    by_points = order_of_points(trials)
+    held, worlds = sum(row["held"] for row in rows), sum(row["worlds"] for row in rows)
+    said = f"By the means over the worlds it holds at {by_points.times} of {by_points.of} points"
+    share = by_points.share
+    if share is not None and study.design == "sample":  # points of a grid are no sample of anything
+        said += f" ({_percent(share.mean)}, Wilson's 95 % interval {_percent(share.low)} to {_percent(share.high)})"
+    unknown = len(study.points) - by_points.of
+    if unknown:
+        said += f"; {unknown} points cannot tell"
+    return f"{said}; world by world in {held} of {worlds}"
 
 
 def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -89,6 +99,24 @@ def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
         if refused:
             parts.append("\n".join(["Refused:", "", *(f"- {name}: {why}" for name, why in refused.items())]))
     return parts
+
+
+def indices_in_short(rows: Sequence[dict[str, Any]]) -> str:
+    """The total indices of those figures, or why there are none."""
+    columns = [(key, f"total index, {KEYS[key].label}") for key in SHOWN if any(row["figure"] == key for row in rows)]
+    of = {(row["observer"], row["field"], row["figure"]): row for row in rows}
+    table = [
+        [observer, field, *(_total(of[observer, field, key]) for key, _ in columns)]
+        for observer, field in dict.fromkeys((row["observer"], row["field"]) for row in rows)
+    ]
+    shown = markdown.table(["observer", "field", *(said for _, said in columns)], table, text_columns=2)
+    return f"{shown}\n\n*: decisive, its interval is above all others'."
+
+
+def _total(row: dict[str, Any]) -> str:
+    if row["refused"]:
+        return f"refused: {row['refused']}"
+    return f"{row['total']:.3f} [{row['total_low']:.3f}, {row['total_high']:.3f}]{'*' if row['decisive'] else ''}"
 
 
 def _index_row(row: dict[str, Any]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,10 +13,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import tomli_w
 
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.experiment import prepare
-from cmg_mj.sweeps.study import Chunk, Study
-from cmg_mj.sweeps.trials import merge, table_of, write_table
+from cmg_mj.sweeps.study import Study
+from cmg_mj.sweeps.trials import schema_of, table_of, write_table, write_tables
 from cmg_mj.sweeps.work import compute
 from cmg_mj.trajectory import whole_file
 
@@ -59,15 +59,35 @@ class Store:
         else:
             _write(path, asked)
         (self.folder / CHUNKS).mkdir(exist_ok=True)
-        return sum(len(chunk.trials) for chunk in self.study.chunks if self.path(chunk).exists())
+        chunks = self.study.chunks
+        return sum(chunks.size(number) for number in range(len(chunks)) if self.has(number))
 
-    def path(self, chunk: Chunk) -> Path:
-        """The finished chunk's file."""
-        return self.folder / CHUNKS / f"{chunk.number:06d}.parquet"
+    def has(self, number: int) -> bool:
+        """Whether a chunk is finished."""
+        return self.path(number).exists()
 
-    def finish(self, chunk: Chunk, on_progress: Callable[[float], None] | None = None) -> None:
-        """Compute a chunk and keep it."""
-        write_table(self.path(chunk), table_of(self.study, compute(self.study, chunk, on_progress)))
+    def path(self, number: int) -> Path:
+        """A chunk's file, which is there when it is finished."""
+        return self.folder / CHUNKS / f"{number:06d}.parquet"
+
+    def keep(self, number: int, table: pa.Table) -> None:
+        """Keep a chunk's trials: it is finished.
+
+        Raises:
+            RunStopped: They cannot be written.
+        """
+        try:
+            write_table(self.path(number), table)
+        except OSError as error:
+            raise RunStopped(
+                f"{self.path(number)}: cannot be written: {error.strerror or error}; what is finished is kept, and the "
+                "same command goes on from there"
+            ) from error
+
+    def tables(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """The trials of a finished sweep, chunk by chunk; all columns of them, or some."""
+        names = None if columns is None else list(columns)
+        return (pq.read_table(self.path(number), columns=names) for number in range(len(self.study.chunks)))
 
 
 def run(store: Store, on_progress: Callable[[float], None] | None = None) -> None:
@@ -79,10 +99,12 @@ def run(store: Store, on_progress: Callable[[float], None] | None = None) -> Non
             is finished is kept.
     """
     done = 0
-    for chunk in store.study.chunks:
-        size = len(chunk.trials)
-        if not store.path(chunk).exists():
-            store.finish(chunk, None if on_progress is None else partial(_inside, on_progress, done, size))
+    study, chunks = store.study, store.study.chunks
+    for number in range(len(chunks)):
+        size = chunks.size(number)
+        if not store.has(number):
+            tick = None if on_progress is None else partial(_inside, on_progress, done, size)
+            store.keep(number, table_of(study, compute(study, chunks[number], tick)))
         done += size
         if on_progress:
             on_progress(done)
@@ -94,7 +116,7 @@ def _inside(on_progress: Callable[[float], None], done: int, size: int, share: f
 
 def merged(store: Store, path: Path) -> None:
     """Write all trials of a finished sweep as one file."""
-    merge([store.path(chunk) for chunk in store.study.chunks], path)
+    write_tables(path, schema_of(store.study), store.tables())
 
 
 def resolved(study: Study) -> dict[str, Any]:
@@ -132,8 +154,3 @@ def _flat(fields: Any, at: str = "") -> dict[str, Any]:
     if not isinstance(fields, Mapping) or at == "vary":
         return {at: fields}
     return {name: leaf for key, part in fields.items() for name, leaf in _flat(part, f"{at}.{key}".strip(".")).items()}
-
-
-def read_chunks(store: Store) -> pa.Table:
-    """The trials of a finished sweep."""
-    return pa.concat_tables(pq.read_table(store.path(chunk)) for chunk in store.study.chunks)
