@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from cmg_mj.errors import InputError, RunStopped, raised
 from cmg_mj.sweeps import on_worker
 from cmg_mj.sweeps.on_worker import Part, computed, part_of
-from cmg_mj.sweeps.store import Store
+from cmg_mj.sweeps.store import GOES_ON, Store
 from cmg_mj.sweeps.trials import from_bytes, table_of
 from cmg_mj.sweeps.work import given_up
 
@@ -223,6 +223,4 @@ class Cluster:
         return True
 
     def _gone(self) -> RunStopped:
-        return RunStopped(
-            f"--cluster {self.said}: is gone; what is finished is kept, and the same command goes on from there"
-        )
+        return RunStopped(f"--cluster {self.said}: is gone; {GOES_ON}")

@@ -17,7 +17,7 @@ from cmg_mj.sweeps.cells import Trials, cells_in_blocks, cells_of, cells_schema
 from cmg_mj.sweeps.indices import index_rows, index_table
 from cmg_mj.sweeps.order import order_rows, order_table
 from cmg_mj.sweeps.pictures import NAMES, pictures_of
-from cmg_mj.sweeps.store import CHUNKS, TRIALS, Store, merged
+from cmg_mj.sweeps.store import GOES_ON, TRIALS, Store, merged
 from cmg_mj.sweeps.study import Study, counted
 from cmg_mj.sweeps.trials import write_table, write_tables
 
@@ -63,7 +63,7 @@ def save(folder: RunFolder, store: Store, found: Found) -> Path:
     """Write the tables, the pictures and the report of a finished sweep.
 
     Raises:
-        InputError: One cannot be written; then none is.
+        InputError: One cannot be written.
     """
     study, trials = store.study, found.trials
     pictures = pictures_of(trials)
@@ -78,11 +78,9 @@ def save(folder: RunFolder, store: Store, found: Found) -> Path:
         files[INDICES] = lambda path: write_table(path, index_table(found.indices))
     files[REPORT] = lambda path: write_text(path, report(found, pictures))
     try:
-        return folder.write(files, all_or_none=True)
+        return folder.write(files)
     except InputError as error:
-        raise InputError(
-            f"{error}; the trials are kept in {store.folder / CHUNKS}, and the same command goes on"
-        ) from None
+        raise InputError(f"{error}; {GOES_ON}") from None
 
 
 def report(found: Found, pictures: Sequence[Picture]) -> str:

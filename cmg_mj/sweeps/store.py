@@ -23,6 +23,7 @@ from cmg_mj.trajectory import whole_file
 STUDY, CHUNKS = "study.toml", "chunks"
 TRIALS = "trials.parquet"
 """Files of a sweep's folder."""
+GOES_ON = "what is finished is kept, and the same command goes on from there"
 ORDER = "order"
 """What a study file says in [sweep] that no trial depends on: another one is no other study."""
 
@@ -48,17 +49,19 @@ class Store:
             How many trials are finished.
 
         Raises:
-            InputError: The folder has another study.
+            InputError: The folder has another study, or cannot be written.
         """
         asked = resolved(self.study)
         path = self.folder / STUDY
-        if path.exists():
-            there = _require_same(path, asked)
-            if there["sweep"].get(ORDER) != asked["sweep"].get(ORDER):
+        there = _require_same(path, asked) if path.exists() else None
+        try:
+            if there is None:
+                _write(path, asked)
+            elif there["sweep"].get(ORDER) != asked["sweep"].get(ORDER):
                 _write(path, there | {"sweep": asked["sweep"]})
-        else:
-            _write(path, asked)
-        (self.folder / CHUNKS).mkdir(exist_ok=True)
+            (self.folder / CHUNKS).mkdir(exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{self.folder}: cannot be written: {error.strerror or error}") from error
         chunks = self.study.chunks
         return sum(chunks.size(number) for number in range(len(chunks)) if self.has(number))
 
@@ -79,15 +82,22 @@ class Store:
         try:
             write_table(self.path(number), table)
         except OSError as error:
-            raise RunStopped(
-                f"{self.path(number)}: cannot be written: {error.strerror or error}; what is finished is kept, and the "
-                "same command goes on from there"
-            ) from error
+            raise RunStopped(f"{self.path(number)}: cannot be written: {error.strerror or error}; {GOES_ON}") from error
 
     def tables(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """The trials of a finished sweep, chunk by chunk; all columns of them, or some."""
+        """The trials of a finished sweep, chunk by chunk; all columns of them, or some.
+
+        Raises:
+            InputError: A chunk cannot be read.
+        """
         names = None if columns is None else list(columns)
-        return (pq.read_table(self.path(number), columns=names) for number in range(len(self.study.chunks)))
+        for number in range(len(self.study.chunks)):
+            path = self.path(number)
+            try:
+                yield pq.read_table(path, columns=names)
+            except (OSError, pa.ArrowException) as error:
+                why = " ".join(str(error).split())
+                raise InputError(f"{path}: cannot be read: {why}; delete it, and it is computed again") from error
 
 
 def run(store: Store, on_progress: Callable[[float], None] | None = None) -> None:
