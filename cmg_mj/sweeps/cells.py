@@ -24,7 +24,7 @@ FIGURES = [key for key, of in KEYS.items() if of.compared and of.better and not 
 
 COLUMNS = ["point", "observer", "world", "outcome", *FIGURES]
 """Of the trials, by which cells are made."""
-BLOCK = 4096
+BLOCK = 1024
 """Cells whose rows are held together."""
 
 
