@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, claim, named, names_of, of_a_run
+from cmg_mj.cli.pace import Pace
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code
 from cmg_mj.errors import InputError
 
@@ -88,7 +89,8 @@ def sweep(
             say(f"{before} of {study.trials} trials are there from before")
         with CtrlC() as ctrl_c:
             try:
-                with progress(f"sweep {chosen.name}", study.trials, ctrl_c) as on_progress:
+                pace = Pace("trials", study.trials, before)
+                with progress(f"sweep {chosen.name}", study.trials, ctrl_c, pace) as on_progress:
                     run(store, on_progress)
             except KeyboardInterrupt:
                 say(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")

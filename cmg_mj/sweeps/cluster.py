@@ -149,7 +149,7 @@ class Cluster:
             RunStopped: The cluster has gone away, or something fails on it.
         """
         chunks = store.study.chunks
-        left = deque(number for number in range(len(chunks)) if not store.has(number))
+        left = deque(store.left())
         suspects: deque[int] = deque()
         alone: int | None = None
         done = store.study.trials - sum(chunks.size(number) for number in left)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -40,7 +40,15 @@ class Points:
     def __iter__(self) -> Iterator[Point]:
         return (self[number] for number in range(self._length))
 
-    def __getitem__(self, number: int) -> Point:
+    @overload
+    def __getitem__(self, number: int) -> Point: ...
+
+    @overload
+    def __getitem__(self, number: slice) -> list[Point]: ...
+
+    def __getitem__(self, number: int | slice) -> Point | list[Point]:
+        if isinstance(number, slice):
+            return [self[each] for each in range(self._length)[number]]
         if not 0 <= number < self._length:
             raise IndexError(number)
         if self._columns is not None:

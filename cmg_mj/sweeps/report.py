@@ -117,8 +117,8 @@ def cells_markdown(study: Study, cells: Sequence[dict[str, Any]]) -> str:
     """A row a point, a column an observer."""
     fields = [axis.field for axis in study.axes]
     rows = []
-    for number in range(min(MOST_ROWS, len(study.points))):
-        point, first = study.points[number], number * len(study.observers)
+    for number, point in enumerate(study.points[:MOST_ROWS]):
+        first = number * len(study.observers)
         of = {row["observer"]: row for row in cells[first : first + len(study.observers)]}
         rows.append([*(_said(point[field]) for field in fields), *(_cell(of[name]) for name in study.observers)])
     table = markdown.table([*fields, *study.observers], rows, text_columns=0)

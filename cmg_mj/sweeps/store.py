@@ -63,11 +63,11 @@ class Store:
         except OSError as error:
             raise InputError(f"{self.folder}: cannot be written: {error.strerror or error}") from error
         chunks = self.study.chunks
-        return sum(chunks.size(number) for number in range(len(chunks)) if self.has(number))
+        return self.study.trials - sum(chunks.size(number) for number in self.left())
 
-    def has(self, number: int) -> bool:
-        """Whether a chunk is finished."""
-        return self.path(number).exists()
+    def left(self) -> list[int]:
+        """Numbers of the chunks that are not finished."""
+        return [number for number in range(len(self.study.chunks)) if not self.path(number).exists()]
 
     def path(self, number: int) -> Path:
         """A chunk's file, which is there when it is finished."""
@@ -108,13 +108,13 @@ def run(store: Store, on_progress: Callable[[float], None] | None = None) -> Non
         on_progress: Called after every tick with the trials done; a KeyboardInterrupt it raises ends the sweep, what
             is finished is kept.
     """
-    done = 0
     study, chunks = store.study, store.study.chunks
-    for number in range(len(chunks)):
+    left = store.left()
+    done = study.trials - sum(chunks.size(number) for number in left)
+    for number in left:
         size = chunks.size(number)
-        if not store.has(number):
-            tick = None if on_progress is None else partial(_inside, on_progress, done, size)
-            store.keep(number, table_of(study, compute(study, chunks[number], tick)))
+        tick = None if on_progress is None else partial(_inside, on_progress, done, size)
+        store.keep(number, table_of(study, compute(study, chunks[number], tick)))
         done += size
         if on_progress:
             on_progress(done)
