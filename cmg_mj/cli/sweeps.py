@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, claim, named, names_of, of_a_run
+from cmg_mj.cli.pace import Pace
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
+    from cmg_mj.sweeps.report import Found
     from cmg_mj.sweeps.study import Study
 
 
@@ -61,11 +63,11 @@ def sweep(
     95 % intervals, shares of falls, paired differences to the best), report.md with pictures, and study.toml, which
     reruns. The same command again goes on where it was stopped.
     """
-    from cmg_mj.sweeps.cells import Trials, cells_of
+    from cmg_mj.sweeps.cells import COLUMNS, Trials
     from cmg_mj.sweeps.plan import expected
-    from cmg_mj.sweeps.report import FILES, cells_markdown, save
-    from cmg_mj.sweeps.store import Store, read_chunks
-    from cmg_mj.sweeps.study import MOST_TRIALS, check_values
+    from cmg_mj.sweeps.report import FILES, found_of, save, summary
+    from cmg_mj.sweeps.store import Store
+    from cmg_mj.sweeps.study import MOST_TRIALS, check_values, counted
 
     study = _study(chosen, varied, observers, worlds, sample, sobol, order)
     check_values(study)
@@ -75,8 +77,8 @@ def sweep(
         return
     if study.trials > MOST_TRIALS and not yes:
         raise InputError(
-            f"{study.cells} cells of {study.worlds} worlds: {study.trials} trials; beyond {MOST_TRIALS} say --yes "
-            "(--plan says what it would take)"
+            f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; beyond {MOST_TRIALS} say "
+            "--yes (--plan says what it would take)"
         )
     place = Path("runs") / f"sweep-{Path(chosen.name).stem}" if chosen.out is None else named(chosen.out)
     with _runner(cluster) as run:
@@ -87,15 +89,15 @@ def sweep(
             say(f"{before} of {study.trials} trials are there from before")
         with CtrlC() as ctrl_c:
             try:
-                with progress(f"sweep {chosen.name}", study.trials, ctrl_c) as on_progress:
+                pace = Pace("trials", study.trials, before)
+                with progress(f"sweep {chosen.name}", study.trials, ctrl_c, pace) as on_progress:
                     run(store, on_progress)
             except KeyboardInterrupt:
                 say(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
                 sys.exit(INTERRUPTED)
-            trials = Trials(study, read_chunks(store))
-            rows = cells_of(trials)
-            at = save(folder, store, trials, rows)
-    show({"trials": study.trials, "cells": rows}, cells_markdown(study, rows), chosen.as_json)
+            found = found_of(Trials(study, store.tables(COLUMNS)))
+            at = save(folder, store, found)
+    show(_as_json(found) if chosen.as_json else None, summary(found), chosen.as_json)
     say_written(folder, at, f"Read {at / 'report.md'}", chosen.as_json)
 
 
@@ -158,7 +160,19 @@ def _split(setting: str) -> tuple[str, str]:
     return field.strip(), values
 
 
+def _as_json(found: Found) -> dict[str, Any]:
+    from cmg_mj.sweeps.cells import cells_of
+
+    study = found.trials.study
+    tables: dict[str, Any] = {"trials": study.trials, "cells": list(cells_of(found.trials))}
+    if study.order:
+        tables["order"] = found.order
+    return tables | ({"indices": found.indices} if study.design == "sobol" else {})
+
+
 def _plan_text(takes: dict[str, Any]) -> str:
-    how_many = f"{takes['points']} points x {takes['observers']} observers x {takes['worlds']} worlds"
+    from cmg_mj.sweeps.study import counted
+
+    how_many = " x ".join(counted(takes[what], what[:-1]) for what in ("points", "observers", "worlds"))
     how_long = f"about {takes['minutes']:.2g} minutes on this machine, {takes['memory_mb']:.0f} MB"
-    return f"{how_many} = {takes['trials']} trials in {takes['chunks']} chunks; {how_long}"
+    return f"{how_many} = {counted(takes['trials'], 'trial')} in {counted(takes['chunks'], 'chunk')}; {how_long}"

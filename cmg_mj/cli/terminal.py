@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import click
 
+from cmg_mj.cli.pace import Pace
+
 if TYPE_CHECKING:
     from cmg_mj.run_folder import RunFolder
 
@@ -131,8 +133,18 @@ def show(value: Any, table: Any, as_json: bool) -> None:
 
 
 @contextmanager
-def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[OnProgress]:
-    """A progress bar on standard error, gone when done; silent when that is not a terminal."""
+def progress(label: str, total: float, ctrl_c: CtrlC | None = None, pace: Pace | None = None) -> Iterator[OnProgress]:
+    """A progress bar on standard error, gone when done; elsewhere than on a terminal a line a minute of a pace, or none.
+
+    Args:
+        label: What is going on.
+        total: How much is to be done.
+        ctrl_c: Looked at on every call.
+        pace: Says how fast it goes.
+
+    Yields:
+        What moves it.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
@@ -141,10 +153,10 @@ def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
-        TimeRemainingColumn(),
+        TimeRemainingColumn() if pace is None else TextColumn("{task.fields[pace]}", markup=False),
     )
     bar = Progress(*columns, console=console, transient=True)
-    task = bar.add_task(label, total=total)
+    task = bar.add_task(label, total=total, pace="")
 
     shown = -total
 
@@ -152,10 +164,16 @@ def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[
         nonlocal shown
         if ctrl_c is not None:
             ctrl_c.check()
-        if now is None and done - shown < total / 500.0:
+        if pace is not None and not console.is_terminal:
+            if line := pace.line(done):
+                say(line)
+            return
+        if now is None and done - shown < total / 2000.0:
             return  # called after every tick, of which one in many is worth drawing
         shown = done
         bar.update(task, completed=done, description=now)  # None leaves the description as it is
+        if pace is not None:
+            bar.update(task, pace=pace.said(done))
 
     with bar if console.is_terminal else nullcontext():  # below rich 15, a disabled bar leaves an empty line
         yield on_progress

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +13,7 @@ import numpy as np
 from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.summary_keys import KEYS
 from cmg_mj.sweeps.study import Study
+from cmg_mj.sweeps.trials import as_table, point_columns
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -19,37 +22,51 @@ FIGURES = [key for key, of in KEYS.items() if of.compared and of.better and not 
 """Of which a cell has the mean, and how far it is behind the best observer's."""
 
 
+COLUMNS = ["point", "observer", "world", "outcome", *FIGURES]
+"""Of the trials, by which cells are made."""
+BLOCK = 1024
+"""Cells whose rows are held together."""
+
+
 class Trials:
-    """The columns of a sweep's trials, by cell.
+    """How a sweep's trials ended, and their figures, by cell: 8 bytes a figure.
 
     Args:
         study: The sweep.
-        table: Its trials, in any order.
+        tables: Its trials, in any order and in any number of tables, which are looked at one after the other.
+
+    Attributes:
+        study: The sweep.
+        outcome: How each ended, (n_points, n_observers, n_worlds).
+        stood: Whether to the end.
     """
 
-    def __init__(self, study: Study, table: pa.Table) -> None:
+    def __init__(self, study: Study, tables: Iterable[pa.Table]) -> None:
         self.study = study
+        shape = (len(study.points), len(study.observers), study.worlds)
+        self.outcome = np.full(shape, "", dtype=object)
+        self._figures = {key: np.full(shape, math.nan) for key in FIGURES}
         place = {name: i for i, name in enumerate(study.observers)}
-        points = table["point"].to_numpy()
-        observers = np.array([place[name] for name in table["observer"].to_pylist()])
-        worlds = table["world"].to_numpy()
-        self._shape = (len(study.points), len(study.observers), study.worlds)
-        self._order = (points, observers, worlds)
-        self._table = table
-        self.outcome = self._placed(np.array(table["outcome"].to_pylist(), dtype=object), "")
+        for table in tables:
+            observers = _texts(table["observer"])
+            at = (table["point"].to_numpy(), np.array([place[name] for name in observers]), table["world"].to_numpy())
+            self.outcome[at] = _texts(table["outcome"])
+            for key, values in self._figures.items():
+                values[at] = table[key].to_numpy(zero_copy_only=False)
         self.stood = self.outcome == "done"
-
-    def _placed(self, values: np.ndarray, missing: Any) -> np.ndarray:
-        placed = np.full(self._shape, missing, dtype=values.dtype)
-        placed[self._order] = values
-        return placed
 
     def figure(self, key: str) -> np.ndarray:
         """A figure of every trial, (n_points, n_observers, n_worlds); NaN where the rig did not stand to the end."""
-        values = self._table[key].to_numpy(zero_copy_only=False).astype(float)
-        return np.where(self.stood, self._placed(values, math.nan), math.nan)
+        return np.where(self.stood, self._figures[key], math.nan)
 
 
+def _texts(column: pa.ChunkedArray) -> np.ndarray:
+    """A column of few words, each of which is one object, (n,)."""
+    encoded = column.combine_chunks().dictionary_encode()
+    return np.array(encoded.dictionary.to_pylist(), dtype=object)[encoded.indices.to_numpy()]
+
+
+@cache  # of few different counts, at 0.3 ms each
 def fell_interval(fell: int, trials: int) -> Interval:
     """The share of falls with Wilson's 95 % interval."""
     from scipy.stats import binomtest
@@ -58,14 +75,13 @@ def fell_interval(fell: int, trials: int) -> Interval:
     return Interval(fell / trials, float(found.low), float(found.high))
 
 
-def cells_of(trials: Trials) -> list[dict[str, Any]]:
-    """A row a cell: how many stood and fell, every figure's mean with its interval, and how far it is behind the best.
+def cells_of(trials: Trials) -> Iterator[dict[str, Any]]:
+    """A row a cell, point by point: how many stood and fell, every figure's mean, and how far it is behind the best.
 
     The best observer of a point is that of the smallest (or largest, where more is better) mean among those that stood
     in every world; differences are taken world by world.
     """
     figures = {key: trials.figure(key) for key in FIGURES}
-    rows = []
     for number, point in enumerate(trials.study.points):
         best = {key: _best(values[number], key) for key, values in figures.items()}
         for place, observer in enumerate(trials.study.observers):
@@ -77,13 +93,12 @@ def cells_of(trials: Trials) -> list[dict[str, Any]]:
             row |= {"fell": fell, "stopped": n - stood - fell}
             row |= {"fell_share": share.mean, "fell_low": share.low, "fell_high": share.high}
             for key, values in figures.items():
-                row |= _with_ends(key, known_interval(values[number, place]))
+                row |= _with_ends(key, values[number, place])
                 leader = best[key]
-                behind = None if leader is None else known_interval(values[number, place] - values[number, leader])
+                behind = values[number, place] - (math.nan if leader is None else values[number, leader])
                 row |= _with_ends(f"{key}_behind_best", behind)
                 row[f"{key}_best"] = None if leader is None else trials.study.observers[leader]
-            rows.append(row)
-    return rows
+            yield row
 
 
 def _best(values: np.ndarray, key: str) -> int | None:
@@ -94,14 +109,35 @@ def _best(values: np.ndarray, key: str) -> int | None:
     return int(np.nanargmin(means if KEYS[key].better == "less" else -means))
 
 
-def _with_ends(key: str, interval: Interval | None) -> dict[str, float | None]:
-    if interval is None:
-        return {key: None, f"{key}_low": None, f"{key}_high": None}
-    return {key: interval.mean, f"{key}_low": interval.low, f"{key}_high": interval.high}
+def _with_ends(key: str, values: np.ndarray) -> dict[str, float | None]:
+    """The mean of those that are known, and its interval: of one, that itself and no interval."""
+    interval = known_interval(values)
+    if interval is not None:
+        return {key: interval.mean, f"{key}_low": interval.low, f"{key}_high": interval.high}
+    alone = values[np.isfinite(values)]
+    return {key: float(alone[0]) if len(alone) else None, f"{key}_low": None, f"{key}_high": None}
 
 
-def as_table(rows: Sequence[dict[str, Any]]) -> pa.Table:
-    """The rows as a table."""
+def cells_schema(study: Study) -> pa.Schema:
+    """The columns of `cells_of`."""
     import pyarrow as pa
 
-    return pa.Table.from_pylist(list(rows))
+    counts = [(name, "int64") for name in ("trials", "stood", "fell", "stopped")]
+    shares = [(name, "float64") for name in ("fell_share", "fell_low", "fell_high")]
+    ends = ("", "_low", "_high")
+    figures = [
+        column
+        for key in FIGURES
+        for column in [
+            *((f"{of}{end}", "float64") for of in (key, f"{key}_behind_best") for end in ends),
+            (f"{key}_best", "string"),
+        ]
+    ]
+    return pa.schema([*point_columns(study), ("observer", "string"), *counts, *shares, *figures])
+
+
+def cells_in_blocks(trials: Trials) -> Iterator[pa.Table]:
+    """All cells, some thousand at a time."""
+    rows = cells_of(trials)
+    while block := list(itertools.islice(rows, BLOCK)):
+        yield as_table(block, cells_schema(trials.study))

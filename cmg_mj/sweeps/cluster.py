@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any
 from cmg_mj.errors import InputError, RunStopped, raised
 from cmg_mj.sweeps import on_worker
 from cmg_mj.sweeps.on_worker import Part, computed, part_of
-from cmg_mj.sweeps.store import Store
-from cmg_mj.sweeps.study import Chunk
-from cmg_mj.sweeps.trials import from_bytes, table_of, write_table
+from cmg_mj.sweeps.store import GOES_ON, Store
+from cmg_mj.sweeps.trials import from_bytes, table_of
 from cmg_mj.sweeps.work import given_up
 
 if TYPE_CHECKING:
@@ -124,14 +123,14 @@ class Cluster:
         said: As the user named it.
         client: The connection.
         tell: Takes a line for the user.
-        running: Chunks that are handed over.
+        running: Numbers of the chunks that are handed over.
         killed: A chunk's number -> how many workers died while they had it.
     """
 
     said: str
     client: Client
     tell: Callable[[str], None]
-    running: dict[Future, Chunk] = field(default_factory=dict)
+    running: dict[Future, int] = field(default_factory=dict)
     killed: Counter[int] = field(default_factory=Counter)
 
     def run(self, store: Store, on_progress: Callable[[float], None] | None = None) -> None:
@@ -149,10 +148,11 @@ class Cluster:
             InputError: A worker lacks something.
             RunStopped: The cluster has gone away, or something fails on it.
         """
-        left = deque(chunk for chunk in store.study.chunks if not store.path(chunk).exists())
-        suspects: deque[Chunk] = deque()
-        alone: Chunk | None = None
-        done = store.study.trials - sum(len(chunk.trials) for chunk in left)
+        chunks = store.study.chunks
+        left = deque(store.left())
+        suspects: deque[int] = deque()
+        alone: int | None = None
+        done = store.study.trials - sum(chunks.size(number) for number in left)
         try:
             while left or suspects or self.running:
                 room = self._window() - len(self.running) if left else 0
@@ -161,15 +161,15 @@ class Cluster:
                 if not self.running:
                     alone = suspects.popleft()
                     self._hand_over(store, alone)
-                for future, chunk in self._ended():
-                    if self._kept(store, future, chunk):
-                        done += len(chunk.trials)
-                    elif chunk is alone and self.killed[chunk.number] >= KILLS:
-                        reason = f"its chunk has killed {self.killed[chunk.number]} workers"
-                        write_table(store.path(chunk), table_of(store.study, given_up(store.study, chunk, reason)))
-                        done += len(chunk.trials)
+                for future, number in self._ended():
+                    if self._kept(store, future, number):
+                        done += chunks.size(number)
+                    elif number == alone and self.killed[number] >= KILLS:
+                        reason = f"its chunk has killed {self.killed[number]} workers"
+                        store.keep(number, table_of(store.study, given_up(store.study, chunks[number], reason)))
+                        done += chunks.size(number)
                     else:
-                        (left if self.killed[chunk.number] < KILLS - 1 else suspects).append(chunk)
+                        (left if self.killed[number] < KILLS - 1 else suspects).append(number)
                 if on_progress:
                     on_progress(done)
         finally:
@@ -186,10 +186,11 @@ class Cluster:
             self.tell(f"--cluster {self.said}: no worker is there yet; waiting for one")
         return WINDOW * max(1, len(there))
 
-    def _hand_over(self, store: Store, chunk: Chunk) -> None:
-        self.running[self.client.submit(on_dask, part_of(store.study, chunk), pure=False)] = chunk
+    def _hand_over(self, store: Store, number: int) -> None:
+        part = part_of(store.study, store.study.chunks[number])
+        self.running[self.client.submit(on_dask, part, pure=False)] = number
 
-    def _ended(self) -> list[tuple[Future, Chunk]]:
+    def _ended(self) -> list[tuple[Future, int]]:
         """Those that have ended meanwhile, well or not; they are no longer running."""
         from distributed import CancelledError, wait
 
@@ -202,14 +203,14 @@ class Cluster:
             raise self._gone() from error
         return [(future, self.running.pop(future)) for future in waited.done]
 
-    def _kept(self, store: Store, future: Future, chunk: Chunk) -> bool:
+    def _kept(self, store: Store, future: Future, number: int) -> bool:
         """Keep a chunk's table; False if its worker died."""
         from distributed import CancelledError, KilledWorker
 
         try:
             table = future.result()
         except KilledWorker as error:
-            self.killed[chunk.number] += error.allowed_failures + 1
+            self.killed[number] += error.allowed_failures + 1
             return False
         except CancelledError as error:
             raise self._gone() from error
@@ -218,10 +219,8 @@ class Cluster:
         except Exception as error:
             why = raised(error.__cause__ or error)
             raise RunStopped(f"--cluster {self.said}: a chunk cannot be computed there: {why}") from error
-        write_table(store.path(chunk), from_bytes(table))
+        store.keep(number, from_bytes(table))
         return True
 
     def _gone(self) -> RunStopped:
-        return RunStopped(
-            f"--cluster {self.said}: is gone; what is finished is kept, and the same command goes on from there"
-        )
+        return RunStopped(f"--cluster {self.said}: is gone; {GOES_ON}")

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cmg_mj.intervals import CONFIDENCE
 from cmg_mj.sweeps.cells import FIGURES, Trials
 from cmg_mj.sweeps.order import figures_of, log_ratio, pairs_of
+from cmg_mj.sweeps.trials import as_table
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 RESAMPLES = 999
 FEWEST = 16
@@ -81,6 +85,15 @@ def _estimated(blocks: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.nda
     taken = blocks[:, rows]
     found = sobol_indices(func={"f_A": taken[0], "f_B": taken[1], "f_AB": taken[2:]}, n=rows.shape[1])
     return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)
+
+
+def index_table(rows: Sequence[dict[str, Any]]) -> pa.Table:
+    """The rows of `index_rows` as a table."""
+    import pyarrow as pa
+
+    names = [(name, "string") for name in ("figure", "observer", "field")]
+    found = [(name, "float64") for name in Indices._fields]
+    return as_table(rows, pa.schema([*names, *found, ("decisive", "bool"), ("refused", "string")]))
 
 
 def index_rows(trials: Trials) -> list[dict[str, Any]]:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cmg_mj.intervals import Interval
 from cmg_mj.sweeps.cells import Trials, fell_interval
+from cmg_mj.sweeps.study import Study
+from cmg_mj.sweeps.trials import as_table, point_columns
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 JUDGED = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "tilt_rms_deg")
 """Figures that an order is counted by, where a trial has them; each is better when it is less."""
@@ -82,6 +87,22 @@ def _held(errors: np.ndarray) -> Held:
     holds = (better < worse).all(axis=0)
     broken = ((better >= worse) & np.isfinite(worse)).any(axis=0)
     return Held(int(holds.sum()), int((holds | broken).sum()))
+
+
+def order_table(study: Study, rows: Sequence[dict[str, Any]]) -> pa.Table:
+    """The rows of `order_rows` as a table."""
+    import pyarrow as pa
+
+    ends = [(name, "float64") for name in ("share", "low", "high")]
+    columns = [
+        ("figure", "string"),
+        *point_columns(study),
+        ("order", "string"),
+        ("held", "int64"),
+        ("worlds", "int64"),
+        *ends,
+    ]
+    return as_table(rows, pa.schema(columns))
 
 
 def order_rows(trials: Trials) -> list[dict[str, Any]]:

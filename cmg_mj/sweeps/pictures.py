@@ -15,7 +15,7 @@ def pictures_of(trials: Trials) -> list[Picture]:
     """One numeric field varied: curves; two in a grid: a map a figure; else none."""
     study = trials.study
     varied = [axis.field for axis in study.axes if axis.is_range or len(axis.values) > 1]
-    if not all(_numeric(point[field]) for point in study.points for field in varied):
+    if not all(_numeric(value) for axis in study.axes if axis.field in varied for value in axis.values):
         return []
     if len(varied) == 1 and study.design != "sobol":
         found = [curves(trials, varied[0])]

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from cmg_mj import markdown
+from cmg_mj.intervals import Interval
 from cmg_mj.picture import Picture
-from cmg_mj.summary_keys import heading
+from cmg_mj.summary_keys import KEYS, heading
 from cmg_mj.sweeps.cells import Trials
 from cmg_mj.sweeps.drawn import SHOWN
 from cmg_mj.sweeps.indices import FEWEST, LOG_RATIO, LOST
@@ -78,9 +79,20 @@ def _points(held: Held, study: Study) -> list[str]:
     """At how many points an order holds; of a sample with the share and its interval."""
     said = [f"{held.times} of {held.of}"]
     if study.design == "sample":
-        share = held.share
-        said += _share({} if share is None else {"share": share.mean, "low": share.low, "high": share.high})
+        said += _interval(held.share)
     return said
+
+
+def order_in_short(trials: Trials) -> str:
+    """The same in a sentence, for the figure that comes first."""
+    study, key = trials.study, figures_of(trials)[0]
+    held = order_of_points(trials, key, study.order)
+    said = f"The order {' < '.join(study.order)}: by the {heading(key)} it holds at {held.times} of {held.of} points"
+    if held.share is not None and study.design == "sample":  # points of a grid are no sample of anything
+        share, interval = _interval(held.share)
+        said += f" ({share}, Wilson's 95 % interval {interval})"
+    unknown = len(study.points) - held.of
+    return f"{said}; {unknown} points cannot tell." if unknown else f"{said}."
 
 
 def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -109,15 +121,37 @@ def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
     return parts
 
 
+def indices_in_short(rows: Sequence[dict[str, Any]]) -> str:
+    """The total indices of those figures, or why there are none."""
+    columns = [(key, f"total index, {KEYS[key].label}") for key in SHOWN if any(row["figure"] == key for row in rows)]
+    of = {(row["observer"], row["field"], row["figure"]): row for row in rows}
+    table = [
+        [observer, field, *(_total(of[observer, field, key]) for key, _ in columns)]
+        for observer, field in dict.fromkeys((row["observer"], row["field"]) for row in rows)
+    ]
+    shown = markdown.table(["observer", "field", *(said for _, said in columns)], table, text_columns=2)
+    return f"{shown}\n\n*: decisive, its interval is above all others'."
+
+
+def _total(row: dict[str, Any]) -> str:
+    if row["refused"]:
+        return f"refused: {row['refused']}"
+    return f"{row['total']:.3f} [{row['total_low']:.3f}, {row['total_high']:.3f}]{'*' if row['decisive'] else ''}"
+
+
 def _index_row(row: dict[str, Any]) -> list[str]:
     cells = [f"{row[name]:.3f} [{row[f'{name}_low']:.3f}, {row[f'{name}_high']:.3f}]" for name in ("first", "total")]
     return [row["observer"], row["field"], *cells, "yes" if row["decisive"] else ""]
 
 
 def _share(row: dict[str, Any]) -> list[str]:
-    if row.get("share") is None:
+    return _interval(None if row["share"] is None else Interval(row["share"], row["low"], row["high"]))
+
+
+def _interval(share: Interval | None) -> list[str]:
+    if share is None:
         return ["-", "-"]
-    return [_percent(row["share"]), f"{_percent(row['low'])} to {_percent(row['high'])}"]
+    return [_percent(share.mean), f"{_percent(share.low)} to {_percent(share.high)}"]
 
 
 def _percent(share: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,16 +13,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import tomli_w
 
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.experiment import prepare
-from cmg_mj.sweeps.study import Chunk, Study
-from cmg_mj.sweeps.trials import merge, table_of, write_table
+from cmg_mj.sweeps.study import Study
+from cmg_mj.sweeps.trials import schema_of, table_of, write_table, write_tables
 from cmg_mj.sweeps.work import compute
 from cmg_mj.trajectory import whole_file
 
 STUDY, CHUNKS = "study.toml", "chunks"
 TRIALS = "trials.parquet"
 """Files of a sweep's folder."""
+GOES_ON = "what is finished is kept, and the same command goes on from there"
 ORDER = "order"
 """What a study file says in [sweep] that no trial depends on: another one is no other study."""
 
@@ -48,26 +49,55 @@ class Store:
             How many trials are finished.
 
         Raises:
-            InputError: The folder has another study.
+            InputError: The folder has another study, or cannot be written.
         """
         asked = resolved(self.study)
         path = self.folder / STUDY
-        if path.exists():
-            there = _require_same(path, asked)
-            if there["sweep"].get(ORDER) != asked["sweep"].get(ORDER):
+        there = _require_same(path, asked) if path.exists() else None
+        try:
+            if there is None:
+                _write(path, asked)
+            elif there["sweep"].get(ORDER) != asked["sweep"].get(ORDER):
                 _write(path, there | {"sweep": asked["sweep"]})
-        else:
-            _write(path, asked)
-        (self.folder / CHUNKS).mkdir(exist_ok=True)
-        return sum(len(chunk.trials) for chunk in self.study.chunks if self.path(chunk).exists())
+            (self.folder / CHUNKS).mkdir(exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{self.folder}: cannot be written: {error.strerror or error}") from error
+        chunks = self.study.chunks
+        return self.study.trials - sum(chunks.size(number) for number in self.left())
 
-    def path(self, chunk: Chunk) -> Path:
-        """The finished chunk's file."""
-        return self.folder / CHUNKS / f"{chunk.number:06d}.parquet"
+    def left(self) -> list[int]:
+        """Numbers of the chunks that are not finished."""
+        return [number for number in range(len(self.study.chunks)) if not self.path(number).exists()]
 
-    def finish(self, chunk: Chunk, on_progress: Callable[[float], None] | None = None) -> None:
-        """Compute a chunk and keep it."""
-        write_table(self.path(chunk), table_of(self.study, compute(self.study, chunk, on_progress)))
+    def path(self, number: int) -> Path:
+        """A chunk's file, which is there when it is finished."""
+        return self.folder / CHUNKS / f"{number:06d}.parquet"
+
+    def keep(self, number: int, table: pa.Table) -> None:
+        """Keep a chunk's trials: it is finished.
+
+        Raises:
+            RunStopped: They cannot be written.
+        """
+        try:
+            write_table(self.path(number), table)
+        except OSError as error:
+            raise RunStopped(f"{self.path(number)}: cannot be written: {error.strerror or error}; {GOES_ON}") from error
+
+    def tables(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """The trials of a finished sweep, chunk by chunk; all columns of them, or some.
+
+        Raises:
+            InputError: A chunk cannot be read.
+        """
+        names = None if columns is None else list(columns)
+        for number in range(len(self.study.chunks)):
+            path = self.path(number)
+            try:
+                yield pq.read_table(path, columns=names)
+            except (OSError, pa.ArrowException) as error:
+                why = " ".join(str(error).split())
+                raise InputError(f"{path}: cannot be read: {why}; delete it, and it is computed again") from error
 
 
 def run(store: Store, on_progress: Callable[[float], None] | None = None) -> None:
@@ -78,11 +108,13 @@ def run(store: Store, on_progress: Callable[[float], None] | None = None) -> Non
         on_progress: Called after every tick with the trials done; a KeyboardInterrupt it raises ends the sweep, what
             is finished is kept.
     """
-    done = 0
-    for chunk in store.study.chunks:
-        size = len(chunk.trials)
-        if not store.path(chunk).exists():
-            store.finish(chunk, None if on_progress is None else partial(_inside, on_progress, done, size))
+    study, chunks = store.study, store.study.chunks
+    left = store.left()
+    done = study.trials - sum(chunks.size(number) for number in left)
+    for number in left:
+        size = chunks.size(number)
+        tick = None if on_progress is None else partial(_inside, on_progress, done, size)
+        store.keep(number, table_of(study, compute(study, chunks[number], tick)))
         done += size
         if on_progress:
             on_progress(done)
@@ -94,7 +126,7 @@ def _inside(on_progress: Callable[[float], None], done: int, size: int, share: f
 
 def merged(store: Store, path: Path) -> None:
     """Write all trials of a finished sweep as one file."""
-    merge([store.path(chunk) for chunk in store.study.chunks], path)
+    write_tables(path, schema_of(store.study), store.tables())
 
 
 def resolved(study: Study) -> dict[str, Any]:
@@ -132,8 +164,3 @@ def _flat(fields: Any, at: str = "") -> dict[str, Any]:
     if not isinstance(fields, Mapping) or at == "vary":
         return {at: fields}
     return {name: leaf for key, part in fields.items() for name, leaf in _flat(part, f"{at}.{key}".strip(".")).items()}
-
-
-def read_chunks(store: Store) -> pa.Table:
-    """The trials of a finished sweep."""
-    return pa.concat_tables(pq.read_table(store.path(chunk)) for chunk in store.study.chunks)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,15 +18,13 @@ from cmg_mj.pool import pools
 from cmg_mj.scenario import as_fields, parse_scenario
 from cmg_mj.schema import ObserverSettings, Scenario
 from cmg_mj.sweeps.axes import Axis
+from cmg_mj.sweeps.points import Points, sampled
 
 Design = Literal["grid", "sample", "sobol"]
 MOST_TRIALS = 1_000_000
 """Beyond it a sweep must be asked for twice (`--yes`)."""
 CHUNK = 1024
 """Trials that are computed and kept together: so many fill a batch, and take minutes at most."""
-
-Point = dict[str, Any]
-"""Field -> its value."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +40,41 @@ class Chunk:
     number: int
     observer: str
     trials: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Chunks:
+    """The chunks of a study by their numbers: a chunk's trials are made when it is asked for."""
+
+    study: Study
+
+    @property
+    def _trials(self) -> int:
+        """Of one observer."""
+        return len(self.study.points) * self.study.worlds
+
+    @property
+    def _of_one(self) -> int:
+        return -(-self._trials // CHUNK)
+
+    def __len__(self) -> int:
+        return self._of_one * len(self.study.observers)
+
+    def __iter__(self) -> Iterator[Chunk]:
+        return (self[number] for number in range(len(self)))
+
+    def __getitem__(self, number: int) -> Chunk:
+        if not 0 <= number < len(self):
+            raise IndexError(number)
+        observer, piece = divmod(number, self._of_one)
+        first = piece * CHUNK
+        order, worlds = self.study._order, self.study.worlds
+        places = (divmod(place, worlds) for place in range(first, first + self.size(number)))
+        return Chunk(number, self.study.observers[observer], tuple((int(order[at]), world) for at, world in places))
+
+    def size(self, number: int) -> int:
+        """How many trials a chunk has."""
+        return min(CHUNK, self._trials - number % self._of_one * CHUNK)
 
 
 @dataclass(frozen=True)
@@ -100,16 +132,12 @@ class Study:
                 raise InputError(f"{said}: {name} does not run here; --observers are {', '.join(self.observers)}")
 
     @cached_property
-    def points(self) -> list[Point]:
+    def points(self) -> Points:
         """What is varied, a point each."""
         if self.design == "grid":
-            rows: Any = itertools.product(*(axis.values for axis in self.axes))
-        else:
-            shares = _sampled(len(self.axes), self.n, self.scenario.seed, indices=self.design == "sobol")
-            rows = zip(*(axis.at(share) for axis, share in zip(self.axes, shares.T, strict=True)), strict=True)
-        return [
-            {field: value for axis, value in zip(self.axes, row, strict=True) for field in axis.fields} for row in rows
-        ]
+            return Points(self.axes)
+        shares = sampled(len(self.axes), self.n, self.scenario.seed, indices=self.design == "sobol")
+        return Points(self.axes, shares)
 
     @property
     def cells(self) -> int:
@@ -125,16 +153,23 @@ class Study:
         """How many runs it takes."""
         return self.cells * self.worlds
 
-    @property
-    def chunks(self) -> list[Chunk]:
-        """All trials: those that can run in one batch stand together."""
+    @cached_property
+    def _order(self) -> np.ndarray:
+        """Numbers of the points, those that can run in one batch together, (n_points,)."""
         apart = [field for axis in self.axes for field in axis.fields if not pools(field)]
-        order = sorted(range(len(self.points)), key=lambda point: [repr(self.points[point][field]) for field in apart])
-        found: list[Chunk] = []
-        for observer in self.observers:
-            for trials in _in_pieces(((point, world) for point in order for world in range(self.worlds)), CHUNK):
-                found.append(Chunk(len(found), observer, trials))
-        return found
+        if not apart:
+            return np.arange(len(self.points))
+
+        def unpooled(number: int) -> list[str]:
+            point = self.points[number]
+            return [repr(point[field]) for field in apart]
+
+        return np.array(sorted(range(len(self.points)), key=unpooled))
+
+    @property
+    def chunks(self) -> Chunks:
+        """All trials: those that can run in one batch stand together."""
+        return Chunks(self)
 
     def as_fields(self, scenario: Mapping[str, Any]) -> dict[str, Any]:
         """As a study file says it, with the scenario as given."""
@@ -170,32 +205,10 @@ def check_values(study: Study) -> None:
                     prepare(scenario.model_copy(update={"observer": ObserverSettings(**given)}), plant)
 
 
-def _sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray:
-    """Points in the unit cube, evenly spread, (n_points, dimensions).
-
-    For indices they are those of Saltelli's scheme, as `scipy.stats.sobol_indices` wants them: A, B, then A with each
-    column in turn from B.
-    """
-    from scipy.stats import qmc  # half a second
-
-    generator: Any = {"seed": np.random.default_rng(seed)}  # called `rng` since 1.15; this name all versions take
-
-    if not indices:
-        import warnings
-
-        with warnings.catch_warnings():  # that n is no power of two
-            warnings.simplefilter("ignore", UserWarning)
-            return qmc.Sobol(dimensions, **generator).random(n)
-    both = qmc.Sobol(2 * dimensions, **generator).random(n)
-    a, b = both[:, :dimensions], both[:, dimensions:]
-    crossed = [np.where(np.arange(dimensions) == i, b, a) for i in range(dimensions)]
-    return np.concatenate([a, b, *crossed])
-
-
-def _in_pieces(trials: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[tuple[int, int], ...]]:
-    while piece := tuple(itertools.islice(trials, size)):
-        yield piece
-
-
 def _power_near(n: int) -> int:
     return 2 ** max(1, round(math.log2(max(n, 2))))
+
+
+def counted(n: int, what: str) -> str:
+    """Such as `1 world`, `2 worlds`."""
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"

@@ -10,9 +10,9 @@ from cmg_mj.errors import InputError
 from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.sweeps.axes import parse_axis
-from cmg_mj.sweeps.cells import Trials, as_table, cells_of
-from cmg_mj.sweeps.indices import index_rows
-from cmg_mj.sweeps.order import order_rows
+from cmg_mj.sweeps.cells import Trials, cells_in_blocks
+from cmg_mj.sweeps.indices import index_rows, index_table
+from cmg_mj.sweeps.order import order_rows, order_table
 from cmg_mj.sweeps.study import Design, Study, check_values
 from cmg_mj.sweeps.trials import table_of
 from cmg_mj.sweeps.work import compute
@@ -79,15 +79,17 @@ def sweep(
         for field, said in vary.items()
     )
     study = Study(of, axes, tuple(observers or (of.observer.kind,)), worlds, design, sample or sobol or 0, tuple(order))
+    import pyarrow as pa
+
     check_values(study)
     table = all_trials(study)
-    trials = Trials(study, table)
+    trials = Trials(study, [table])
     return Swept(
         study,
         table,
-        as_table(cells_of(trials)),
-        as_table(order_rows(trials)) if study.order else None,
-        as_table(index_rows(trials)) if design == "sobol" else None,
+        pa.concat_tables(cells_in_blocks(trials)),
+        order_table(study, order_rows(trials)) if study.order else None,
+        index_table(index_rows(trials)) if design == "sobol" else None,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,11 +25,17 @@ def schema_of(study: Study) -> pa.Schema:
     """The columns: the point's number, what is varied, who ran and how it ended, the figures."""
     import pyarrow as pa
 
-    varied = [
-        (field, _type_of([axis.low] if axis.is_range else axis.values)) for axis in study.axes for field in axis.fields
-    ]
     known = [(name, FIRST[name]) for name in COLUMNS]
-    return pa.schema([("point", "int64"), *varied, *known, *((name, "float64") for name in FIGURES)])
+    return pa.schema([*point_columns(study), *known, *((name, "float64") for name in FIGURES)])
+
+
+def point_columns(study: Study) -> list[tuple[str, str]]:
+    """What every table of a sweep begins with: the point's number, what is varied."""
+    types = [_type_of([axis.low] if axis.is_range else axis.values) for axis in study.axes]
+    return [
+        ("point", "int64"),
+        *((field, kind) for axis, kind in zip(study.axes, types, strict=True) for field in axis.fields),
+    ]
 
 
 def _type_of(values: Sequence[Any]) -> str:
@@ -42,11 +49,15 @@ def _type_of(values: Sequence[Any]) -> str:
 
 
 def table_of(study: Study, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
-    """Rows as a table; a figure that a trial does not have is null."""
+    """Rows of trials as a table; a figure that a trial does not have is null."""
+    return as_table(rows, schema_of(study))
+
+
+def as_table(rows: Iterable[Mapping[str, Any]], schema: pa.Schema) -> pa.Table:
+    """Rows as a table; what a row does not have is null, and a value that no column can hold is its text."""
     import pyarrow as pa
 
     kept = list(rows)
-    schema = schema_of(study)
     texts = {field.name for field in schema if str(field.type) == "string"}
 
     def column(name: str) -> list[Any]:
@@ -61,11 +72,13 @@ def table_of(study: Study, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
 
 
 def write_table(path: Path, table: pa.Table) -> None:
-    """Write Parquet, whole or not at all."""
+    """Write Parquet, whole or not at all; a power cut is too late for it, too."""
     import pyarrow.parquet as pq
 
     with whole_file(path) as temporary, temporary.open("wb") as file:
         pq.write_table(table, file)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def as_bytes(table: pa.Table) -> bytes:
@@ -86,10 +99,10 @@ def from_bytes(sent: bytes) -> pa.Table:
         return stream.read_all()
 
 
-def merge(parts: Sequence[Path], path: Path) -> None:
-    """Write many files of the same columns as one, a row group each, without holding them all."""
+def write_tables(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
+    """Write tables of the same columns as one Parquet file, a row group each, without holding them all."""
     import pyarrow.parquet as pq
 
-    with path.open("wb") as file, pq.ParquetWriter(file, pq.read_schema(parts[0])) as writer:
-        for part in parts:
-            writer.write_table(pq.read_table(part))
+    with path.open("wb") as file, pq.ParquetWriter(file, schema) as writer:
+        for table in tables:
+            writer.write_table(table)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from cmg_mj.errors import InputError, raised
 from cmg_mj.experiment import Experiment, prepare, run_together
 from cmg_mj.pool import structure
-from cmg_mj.sweeps.study import Chunk, Point, Study
+from cmg_mj.sweeps.points import Point, Points
+from cmg_mj.sweeps.study import Chunk, Study
 from cmg_mj.worlds_table import FIRST
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def compute(
     chunk: Chunk,
     on_progress: Callable[[float], None] | None = None,
     *,
-    points: Mapping[int, Point] | None = None,
+    points: Points | Mapping[int, Point] | None = None,
     threads: int = 0,
 ) -> list[dict[str, Any]]:
     """Run the trials of a chunk.

@@ -29,4 +29,4 @@ def made_up(varied: dict[str, str], observers: tuple[str, ...], worlds: int, err
                 found = error(point, observer, world)
                 row = {"point": number, **point, "observer": observer, "world": world, "seed": 0}
                 rows.append(row | {"outcome": "fell" if found is None else "done", VELOCITY: found})
-    return Trials(study, table_of(study, rows))
+    return Trials(study, [table_of(study, rows)])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.sweeps.indices import LOG_RATIO, LOST, Indices, index_rows, indices
-from cmg_mj.sweeps.study import Study, _sampled
+from cmg_mj.sweeps.points import sampled
+from cmg_mj.sweeps.study import Study
 from tests.sweeps.made_up import BIAS, NOISE, VELOCITY, made_up
 
 
@@ -21,14 +22,14 @@ def test_the_indices_of_a_known_function() -> None:
     """Ishigami's: 0.314, 0.442, 0 and 0.558, 0.442, 0.244 in closed form."""
     first, total = np.array([0.3139, 0.4424, 0.0]), np.array([0.5576, 0.4424, 0.2437])
     n = 1024
-    found = indices(ishigami(_sampled(3, n, 1, indices=True)), n, 0)
+    found = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
     np.testing.assert_allclose(found.first, first, atol=0.03)
     np.testing.assert_allclose(found.total, total, atol=0.03)
     for low, of, high in ((found.first_low, first, found.first_high), (found.total_low, total, found.total_high)):
         assert (low <= of).all()
         assert (of <= high).all()
         assert (high - low < 0.4).all()
-    again = indices(ishigami(_sampled(3, n, 1, indices=True)), n, 0)
+    again = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
     assert all(np.array_equal(a, b) for a, b in zip(found, again, strict=True))
 
 
@@ -52,7 +53,7 @@ def test_the_indices_of_a_list() -> None:
 @pytest.mark.parametrize(("weights", "decisive"), [((4.0, 1.0), [True, False]), ((1.0, 1.0), [False, False])])
 def test_decisive_only_where_intervals_part(weights: tuple[float, float], decisive: list[bool]) -> None:
     n = 256
-    assert indices(_sampled(2, n, 3, indices=True) @ np.array(weights), n, 0).decisive.tolist() == decisive
+    assert indices(sampled(2, n, 3, indices=True) @ np.array(weights), n, 0).decisive.tolist() == decisive
 
 
 def test_an_estimate_above_an_interval_is_not_decisive_if_its_own_reaches_down() -> None:
@@ -123,7 +124,7 @@ def test_refused_with_counts_where_a_world_fell() -> None:
 
 def made_up_points() -> list[dict[str, Any]]:
     trials = made_up({BIAS: "0:1", NOISE: "100:200"}, ("linear",), 1, lambda *_: 1.0, design="sobol", n=64)
-    return trials.study.points
+    return list(trials.study.points)
 
 
 def test_the_same_everywhere_depends_on_nothing() -> None:
