@@ -34,7 +34,8 @@ class Pace:
         if passed < SOON_S or new <= 0.0:
             return ""
         rate = new / passed
-        return f"{f'{rate:.0f}' if rate >= 10.0 else f'{rate:.2g}'} {self.unit} a second, {_time((self.total - done) / rate)} left"
+        speed = f"{rate:.0f}" if rate >= 10.0 else f"{rate:.2g}"
+        return f"{speed} {self.unit} a second, {_time((self.total - done) / rate)} left"
 
     def line(self, done: float) -> str | None:
         """A line of its own, if one is due: one a minute."""

@@ -134,7 +134,7 @@ def show(value: Any, table: Any, as_json: bool) -> None:
 
 @contextmanager
 def progress(label: str, total: float, ctrl_c: CtrlC | None = None, pace: Pace | None = None) -> Iterator[OnProgress]:
-    """A progress bar on standard error, gone when done; elsewhere than on a terminal a line a minute of a pace, or none.
+    """A progress bar on standard error, gone when done; where there is no terminal a line a minute of a pace, or none.
 
     Args:
         label: What is going on.
