@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -15,6 +16,11 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from cmg_mj.errors import InputError
+from cmg_mj.scenario import load_scenario
+from cmg_mj.sweeps.axes import parse_axis
+from cmg_mj.sweeps.on_worker import computed, part_of
+from cmg_mj.sweeps.study import Study
 from tests.command import COMMAND, ROOT, Said, cmg_mj, cmg_mj_process, environment
 
 distributed = pytest.mark.skipif(
@@ -180,6 +186,14 @@ def test_what_is_no_cluster_is_one_line(tmp_path: Path, address: str, complaint:
     said = sweep(tmp_path, "out", "--cluster", address)
     assert f"--cluster {address}: {complaint}" in said.complaint
     assert not (tmp_path / "out").exists()
+
+
+def test_a_worker_of_another_version_is_refused() -> None:
+    study = Study(load_scenario("push_recovery"), (parse_axis(BIAS, "0", BIAS),), ("linear",), 1)
+    part = part_of(study, study.chunks[0])
+    other = dataclasses.replace(part, versions={**part.versions, "mujoco": "2.0"})
+    with pytest.raises(InputError, match=r"^worker tcp://there: mujoco \S+ there, 2\.0 here; they must be the same$"):
+        computed(other, 1, "tcp://there")
 
 
 def test_without_distributed_it_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

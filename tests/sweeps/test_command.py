@@ -70,16 +70,39 @@ def test_a_design_for_indices(tmp_path: Path) -> None:
     out = tmp_path / "out"
     varied = ["--vary", f"{BIAS}=-1:1", "--vary", "sensors.accelerometer.noise_density_ug_rthz=log:100:800"]
     arguments = ["sweep", "push_recovery", *varied, "--sobol", "16", "--worlds", "2", *SHORT, "--out", str(out)]
-    assert cmg_mj(*arguments, "--observers", "linear").status == 0
+    said = cmg_mj(*arguments, "--observers", "linear")
+    assert said.status == 0
     rows = pq.read_table(out / "indices.parquet").to_pylist()
     of = {row["field"]: row for row in rows if row["figure"] == "velocity_rms_error_rad_s"}
     noise = of["sensors.accelerometer.noise_density_ug_rthz"]
     assert noise["total_low"] < noise["total"] < noise["total_high"]
     assert not any("push" in row["figure"] for row in rows)
+    in_short = f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]"
+    assert "| total index, velocity RMS error |" in " ".join(said.out.split())
+    assert in_short in said.out
     report = (out / "report.md").read_text(encoding="utf-8")
     assert f"| linear     | {BIAS} " in report
     assert f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]" in report
     assert not list(out.glob("*.png"))
+
+
+def test_one_world_is_shown_without_an_interval(tmp_path: Path) -> None:
+    arguments = [*SMALL[:-1], "1", *SHORT, "--order", "gyro_free,linear"]
+    said = cmg_mj(*arguments, "--out", str(tmp_path / "out"))
+    trials = pq.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
+    cells = pq.read_table(tmp_path / "out" / "cells.parquet").to_pylist()
+    for cell in cells:
+        (trial,) = (row for row in trials if (row["point"], row["observer"]) == (cell["point"], cell["observer"]))
+        error = trial["velocity_rms_error_rad_s"]
+        assert cell["velocity_rms_error_rad_s"] == error
+        assert (cell["velocity_rms_error_rad_s_low"], cell["velocity_rms_error_rad_s_high"]) == (None, None)
+        assert f" {error:.4f} |" in said.out
+    assert "The order gyro_free < linear: By the means over the worlds it holds at 2 of 2 points" in said.out
+    report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "2 points, 2 observers, 1 world: 4 trials." in report
+    assert cmg_mj(*arguments, "--plan").out.startswith(
+        "2 points x 2 observers x 1 world = 4 trials in 2 chunks; about "
+    )
 
 
 def test_a_plan_runs_nothing(tmp_path: Path) -> None:
