@@ -46,7 +46,7 @@ def test_top_level(given: str, fragments: list[str]) -> None:
 
 
 @table(
-    ("typo", "modl = 'x'", "plant.modl: no such field; did you mean 'model'? allowed: equilibrium_bias_deg, "),
+    ("typo", "modl = 'x'", "plant.modl: no such field; did you mean 'model'? allowed: accelerometer_inner_m, "),
     ("a number for text", "model = 3", "plant.model = 3: must be text in quotes"),
     (
         "typo in a model's name",
