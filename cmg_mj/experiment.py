@@ -72,15 +72,16 @@ class Experiment:
         Args:
             worlds: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
             processor: What takes its decisions in its place.
-            **others: `law`, `sensors`, `tilt` and `backlash` instead of the scenario's.
+            **others: `observer`, `law`, `sensors`, `tilt` and `backlash` instead of the scenario's.
 
         Returns:
             The controller.
         """
         settings = self.scenario.controller
+        given = {"law": self.law, "sensors": self.scenario.sensors} | others
         return self.plant.controller(
-            self.design.observer(),
-            **{"law": self.law, "sensors": self.scenario.sensors} | others,
+            given.pop("observer", None) or self.design.observer(),
+            **given,
             seed=self.scenario.seed,
             worlds=worlds,
             feedback=settings.feedback,
@@ -95,11 +96,11 @@ class Experiment:
         if driver == "board":
             with on_a_board(self.controller()) as board:
                 return self.run_on(board, world, **options)
-        return self._simulate(self.plant, self.controller(int(world)), driver=driver, **options)
+        return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
 
     def run_on(self, processor: Processor, world: int = 0, **options: Any) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
-        result = self._simulate(self.plant, self.controller(int(world), processor), **options)
+        result = self.simulate(self.plant, self.controller(int(world), processor), **options)
         return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
 
     def run_many(
@@ -131,7 +132,7 @@ class Experiment:
             return run_together(self.varied(vary), numbers, **options)
         rigs = [self.plant] * len(numbers) if plants is None else list(plants)
         _require_alike([self.plant, *rigs], len(rigs), len(numbers))
-        return self._simulate(rigs, self.controller(numbers, **_of_the_rigs(rigs)), **options)
+        return self.simulate(rigs, self.controller(numbers, **_of_the_rigs(rigs)), **options)
 
     def varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
         """The scenario with other settings in each world; worlds with equal settings share one.
@@ -182,13 +183,24 @@ class Experiment:
         scenario = parse_scenario(fields, f"{self.scenario._where} with {settings}".strip())
         return prepare(scenario, load_rig(scenario, self.plant))
 
-    def _simulate(
+    def simulate(
         self,
         plant: Plant | Sequence[Plant],
         controller: Controller,
         pushes: Sequence[Push] | None = None,
         **options: Any,
     ) -> Result:
+        """Run a controller on one rig or several, for the scenario's time and judged by its settings.
+
+        Args:
+            plant: The rig, or one a world.
+            controller: A fresh one.
+            pushes: Instead of the scenario's.
+            **options: Those of `simulate`.
+
+        Returns:
+            The result.
+        """
         scenario = self.scenario
         return simulate(
             plant,
@@ -266,12 +278,29 @@ def run_together(experiments: Sequence[Experiment], worlds: Sequence[int], **opt
         field = differs(common, structure(other.scenario, other.design))
         if field:
             raise InputError(f"run_many: {field} differs, which worlds of one batch must have in common")
+    rigs, controller, pushes = of_one_batch(experiments, worlds)
+    return first.simulate(rigs, controller, pushes, **options)
+
+
+def of_one_batch(
+    experiments: Sequence[Experiment], worlds: Sequence[int], **others: Any
+) -> tuple[list[Plant], Controller, Sequence[Push]]:
+    """What a batch of different experiments is run with: a rig a world, a controller and the pushes of all worlds.
+
+    Args:
+        experiments: One a world.
+        worlds: Their numbers.
+        **others: What the controller has instead of the first experiment's: see `Experiment.controller`.
+
+    Returns:
+        For `Experiment.simulate`.
+    """
     law, sensors, pushes = pooled(
         [(each.law, each.scenario.sensors, tuple(each.scenario.push)) for each in experiments]
     )
     rigs = [each.plant for each in experiments]
-    controller = first.controller(worlds, law=law, sensors=sensors, **_of_the_rigs(rigs))
-    return first._simulate(rigs, controller, pushes, **options)
+    given = {"law": law, "sensors": sensors} | _of_the_rigs(rigs) | others
+    return rigs, experiments[0].controller(worlds, **given), pushes
 
 
 def _of_the_rigs(rigs: Sequence[Plant]) -> dict[str, Any]:

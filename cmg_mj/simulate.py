@@ -7,7 +7,7 @@ import math
 import statistics
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -148,20 +148,18 @@ class Result:
         if count == 1:
             return [self]
         size = worlds // count
-        parts = [slice(i * size, (i + 1) * size) for i in range(count)]
-        return [
-            Result(
-                self.outcomes[part],
-                self.summaries[part],
-                None if self.trajectory is None else self.trajectory.of_worlds(part),
-                max(outcome.time_s for outcome in self.outcomes[part]),
-                self.observers,
-                self.seed,
-                self.worlds[part],
-                self.driver,
-            )
-            for part in parts
-        ]
+        return [self.part(slice(i * size, (i + 1) * size)) for i in range(count)]
+
+    def part(self, worlds: slice) -> Result:
+        """Some of the worlds, that stand beside each other."""
+        return replace(
+            self,
+            outcomes=self.outcomes[worlds],
+            summaries=self.summaries[worlds],
+            trajectory=None if self.trajectory is None else self.trajectory.of_worlds(worlds),
+            seconds=max(outcome.time_s for outcome in self.outcomes[worlds]),
+            worlds=self.worlds[worlds],
+        )
 
 
 def _moments(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, Scalar]]:
