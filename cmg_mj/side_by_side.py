@@ -94,10 +94,13 @@ def run_side_by_side(runs: Sequence[Run], **options: Any) -> list[Result]:
     """
     found: dict[int, Result] = {}
     for batch in _batches(runs):
-        shared = _shared([runs[i] for i in batch], options) if len(batch) > 1 else None
-        if shared is None:
-            shared = [run_together(*runs[i], **options) for i in batch]
-        found |= zip(batch, shared, strict=True)
+        results: list[Result] = []
+        if len(batch) > 1:
+            results = _shared([runs[i] for i in batch], options)
+        if not results or any(outcome.kind == "stopped" for result in results for outcome in result.outcomes):
+            # An observer that raises stops all worlds of its batch: what the others do is seen without it.
+            results = [run_together(*runs[i], **options) for i in batch]
+        found |= zip(batch, results, strict=True)
     return [found[i] for i in range(len(runs))]
 
 
@@ -145,20 +148,17 @@ def _of_observer(name: str) -> bool:
     return name.split(".")[0] == "observer" or name.startswith(TOLD)
 
 
-def _shared(runs: Sequence[Run], options: dict[str, Any]) -> list[Result] | None:
-    """Results of runs in one batch; None if something stopped, as an observer that raises would stop them all."""
-    experiments = [each for run in runs for each in run.experiments]
-    numbers = [int(number) for run in runs for number in run.worlds]
-    observers = []
+def _shared(runs: Sequence[Run], options: dict[str, Any]) -> list[Result]:
+    """Results of runs in one batch."""
+    parts = []
     # Neighbours with the same observer, told the same, are one part.
     for _, group in groupby(runs, key=lambda run: repr(_structure(run.experiments[0]))):
         of = list(group)
-        observers.append((of[0].experiments[0].design.observer(), sum(len(run.worlds) for run in of)))
-    first = experiments[0]
-    rigs, controller, pushes = of_one_batch(experiments, numbers, observer=SideBySide(observers))
-    whole = first.simulate(rigs, controller, pushes, **options)
-    if any(outcome.kind == "stopped" for outcome in whole.outcomes):
-        return None
+        parts.append((of[0].experiments[0].design.observer(), sum(len(run.worlds) for run in of)))
+    experiments = [each for run in runs for each in run.experiments]
+    numbers = [int(number) for run in runs for number in run.worlds]
+    rigs, controller, pushes = of_one_batch(experiments, numbers, observer=SideBySide(parts))
+    whole = experiments[0].simulate(rigs, controller, pushes, **options)
     ends = np.cumsum([len(run.worlds) for run in runs]).tolist()
     return [
         _renamed(whole.part(slice(end - len(run.worlds), end)), run.experiments[0].scenario.observer.kind)

@@ -6,7 +6,7 @@ are fitted on one set of worlds and scored on another.
 
 from cmg_mj.tuning.logged import LogStudy, tune_on_logs
 from cmg_mj.tuning.logged_written import figures_of_logs, logs_table, save_log_study
-from cmg_mj.tuning.recorded import Recorded, record
+from cmg_mj.tuning.recorded import Recorded, halves, record, recorder
 from cmg_mj.tuning.study import BestNoise, Level, Study, best_noise, tune, tuned_scenario
 from cmg_mj.tuning.written import figures_of, files_of_study, save_study, tuning_table
 
@@ -20,8 +20,10 @@ __all__ = [
     "figures_of",
     "figures_of_logs",
     "files_of_study",
+    "halves",
     "logs_table",
     "record",
+    "recorder",
     "save_log_study",
     "save_study",
     "tune",

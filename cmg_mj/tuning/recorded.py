@@ -16,6 +16,8 @@ from cmg_mj.observers import Observer
 from cmg_mj.push import Window, inside, push_windows
 from cmg_mj.replay import replay
 from cmg_mj.schema import ObserverSettings, Scenario
+from cmg_mj.side_by_side import Run, run_side_by_side
+from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 
 WARM_UP_S = 2.0
@@ -115,33 +117,37 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     )
 
 
-def record(
-    scenario: Scenario,
-    worlds: Sequence[int],
-    *,
-    noise_ug_rthz: float | None = None,
-    warm_up_s: float = WARM_UP_S,
-    on_share: Callable[[float], None] | None = None,
-) -> Recorded:
-    """Run the tuning experiment.
+Wanted = tuple[Scenario, Sequence[int], float | None]
+"""A scenario, the worlds' numbers, and another noise density of the accelerometers [ug/sqrt(Hz)]."""
+
+
+def record_all(
+    wanted: Sequence[Wanted], *, warm_up_s: float = WARM_UP_S, on_share: Callable[[float], None] | None = None
+) -> list[Recorded]:
+    """Run tuning experiments, those that can in one batch.
 
     Args:
-        scenario: The experiment; `tuning_scenario` says what is changed in it.
-        worlds: Their numbers: noise depends on (seed, number) alone.
-        noise_ug_rthz: Another noise density of the accelerometers [ug/sqrt(Hz)].
+        wanted: The scenarios, whose noise depends on (seed, world's number) alone; `tuning_scenario` says what is
+            changed in them.
         warm_up_s: How much of the time before the window is kept [s].
         on_share: Called now and then with the share done.
 
     Returns:
-        The worlds that stood.
+        The worlds that stood, of each.
 
     Raises:
         InputError: Fewer than two did.
         KeyboardInterrupt: The user interrupted.
     """
-    experiment: Experiment = prepare(tuning_scenario(scenario, noise_ug_rthz))
-    duration = experiment.scenario.duration_s
-    result = experiment.run_many(list(worlds), on_progress=on_share and (lambda time: on_share(time / duration)))
+    experiments = [prepare(tuning_scenario(scenario, noise)) for scenario, _, noise in wanted]
+    runs = [Run([each] * len(worlds), worlds) for each, (_, worlds, _) in zip(experiments, wanted, strict=True)]
+    duration = max(each.scenario.duration_s for each in experiments)
+    results = run_side_by_side(runs, on_progress=on_share and (lambda time: on_share(min(time / duration, 1.0))))
+    return [_kept(*each, warm_up_s) for each in zip(wanted, experiments, results, strict=True)]
+
+
+def _kept(wanted: Wanted, experiment: Experiment, result: Result, warm_up_s: float) -> Recorded:
+    scenario, duration = wanted[0], experiment.scenario.duration_s
     if any(outcome.kind == "interrupted" for outcome in result.outcomes):
         raise KeyboardInterrupt
     stood = np.array([outcome.kind == "done" for outcome in result.outcomes])
@@ -154,3 +160,44 @@ def record(
     assert result.trajectory is not None
     kept = result.trajectory.of_worlds(stood).between(window[0] - warm_up_s, window[1])
     return Recorded(kept, window, int((~stood).sum()), windows_of(scenario))
+
+
+def record(
+    scenario: Scenario,
+    worlds: Sequence[int],
+    *,
+    noise_ug_rthz: float | None = None,
+    warm_up_s: float = WARM_UP_S,
+    on_share: Callable[[float], None] | None = None,
+) -> Recorded:
+    """The same for one experiment."""
+    return record_all([(scenario, worlds, noise_ug_rthz)], warm_up_s=warm_up_s, on_share=on_share)[0]
+
+
+def recorder(wanted: Sequence[Wanted], *, warm_up_s: float = WARM_UP_S) -> Callable[..., Recorded]:
+    """Recordings made once, all that several calls of `tune` will ask for: it takes this as `recorded`.
+
+    Args:
+        wanted: The recordings; the observer takes no part in them.
+        warm_up_s: How much of the time before the window is kept [s].
+
+    Returns:
+        What hands them out.
+    """
+    once = list({_key(*each): each for each in wanted}.values())
+    kept = {_key(*each): made for each, made in zip(once, record_all(once, warm_up_s=warm_up_s), strict=True)}
+
+    def recorded(scenario: Scenario, worlds: Sequence[int], *, noise_ug_rthz: float, warm_up_s: float) -> Recorded:
+        return kept[_key(scenario, worlds, noise_ug_rthz)]
+
+    return recorded
+
+
+def halves(scenario: Scenario, worlds: int, noise_ug_rthz: Sequence[float]) -> list[Wanted]:
+    """What `tune` records: worlds that are fitted and as many that are held out, at every noise."""
+    spans = range(worlds), range(worlds, 2 * worlds)
+    return [(scenario, span, density) for density in noise_ug_rthz for span in spans]
+
+
+def _key(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None) -> tuple:
+    return tuple(worlds), noise_ug_rthz, scenario.seed, scenario.plant, tuple(scenario.push)

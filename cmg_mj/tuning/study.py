@@ -16,7 +16,7 @@ from cmg_mj.intervals import Interval, PairedVerdict, paired_verdict, ratio_inte
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.schema import ObserverSettings, Scenario
 from cmg_mj.tuning.parameters import Number, narrowed, numbers_of, parameters_of, replaced
-from cmg_mj.tuning.recorded import WARM_UP_S, Recorded, Window, record
+from cmg_mj.tuning.recorded import WARM_UP_S, Recorded, Window, halves, recorder
 from cmg_mj.tuning.search import crossing, evaluations, idle, search
 
 DIGITS = 4
@@ -148,7 +148,7 @@ def tune(
     noise_ug_rthz: Sequence[float] = (),
     warm_up_s: float = WARM_UP_S,
     starts: int = 2,
-    recorded: Callable[..., Recorded] = record,
+    recorded: Callable[..., Recorded] | None = None,
     on_share: OnShare | None = None,
 ) -> Study:
     """Fit the parameters of the scenario's observer to the gyro.
@@ -163,7 +163,7 @@ def tune(
         noise_ug_rthz: Noise densities of the accelerometers; by default the scenario's [ug/sqrt(Hz)].
         warm_up_s: How much is replayed before the window [s].
         starts: Starts of a search in several dimensions.
-        recorded: Makes the recordings; for those who keep them.
+        recorded: Hands out the recordings, for those who keep them; left out, they are made here, all at once.
         on_share: Called now and then with the share done.
 
     Returns:
@@ -187,6 +187,7 @@ def tune(
     levels: list[Level] = []
     still: list[Number] = []
     window: Window = (0.0, 0.0)
+    recorded = recorded or recorder(halves(scenario, worlds, densities), warm_up_s=warm_up_s)
     for i, density in enumerate(densities):
 
         def share(done: float, i: int = i) -> None:

@@ -58,7 +58,8 @@ MUTANTS = [
            "_range([panel for panel in panels[:6] if", LOOP + "test_the_three_pictures_share_their_scales"),
     # --- aranovskiy2020 ---
     Mutant("Figs 5 to 7: runs taken from another observer", R + "figures_5_to_7.py",
-           "results[angles][name] = in_the_loop(name,", 'results[angles][name] = in_the_loop("ltv",', FIGURES_5_TO_7),
+           "zip(observers, run_side_by_side(runs), strict=True)",
+           "zip(observers, run_side_by_side(runs)[1:2] * 3, strict=True)", FIGURES_5_TO_7),
     Mutant("Figs 5 to 7: the other kind of angles", R + "figures_5_to_7.py", "{angles: results[angles][name] for",
            '{angles: results["measured"][name] for', FIGURES_5_TO_7),
     Mutant("Figs 5 to 7: settling does not count", R + "figures_5_to_7.py", "min(settled.values()) == 1.0",

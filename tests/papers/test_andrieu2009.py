@@ -345,7 +345,7 @@ def test_escape_is_found_below_1_and_missed_beyond() -> None:
 
 def test_on_the_rig() -> None:
     """Three worlds of `high_gain` in the loop: it stands, and its gain does not move."""
-    result = on_the_rig.in_the_loop("high_gain", 3, 90_000)
+    result = on_the_rig.in_the_loop(["high_gain"], 3, 90_000)["high_gain"]
     errors = result.values("velocity_rms_error_rad_s")
     assert np.isfinite(errors).all()
     assert 0.05 < errors.mean() < 0.085

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
@@ -70,7 +70,7 @@ def test_an_order_is_one_beyond_chance_in_both_steps() -> None:
 
 @pytest.mark.parametrize("angles", ANGLES)
 def test_order_of_the_observers_in_the_loop(angles: Angles) -> None:
-    found = comparison.measured({angles: {name: in_the_loop(name, angles, 6, SEED, 8.0) for name in OBSERVERS}})
+    found = comparison.measured({angles: in_the_loop(list(OBSERVERS), angles, 6, SEED, 8.0)})
     print({m.key: {name: v.mean() for name, v in m.numbers[angles].items()} for m in found})
     orders = {measure.key: measure.orders[angles] for measure in found}
     assert orders["velocity_rms_error_rad_s"] == orders["command_rms_rad_s"] == "holds"
@@ -110,19 +110,22 @@ def result_of(observer: str, angles: Angles, error: float, *, fell: int = 0, set
         "settle_time_s": 1.0 if settles else None,
     }
     outcomes = [Outcome("fell", 1.0)] * fell + [Outcome("done", 3.0)] * (3 - fell)
-    return Result(outcomes, [summary] * 3, in_the_loop(observer, angles, 3, SEED, 3.0).trajectory)
+    return Result(outcomes, [summary] * 3, in_the_loop([observer], angles, 3, SEED, 3.0)[observer].trajectory)
 
 
 def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """A number of its own for every observer and kind of angles: each must come out in its own place."""
     sizes = {"linear": 0.11, "ltv": 0.07, "homogeneous": 0.05}
 
-    def made(name: str, angles: Angles, worlds: int, seed: int) -> Result:
-        return result_of(name, angles, sizes[name] + (0.001 if angles == "estimated" else 0.0))
+    def made(names: Sequence[str], angles: Angles, worlds: int, seed: int) -> dict[str, Result]:
+        more = 0.001 if angles == "estimated" else 0.0
+        return {name: result_of(name, angles, sizes[name] + more) for name in names}
 
     monkeypatch.setattr(figures_5_to_7, "in_the_loop", made)
     by_euler = {TEN_BY_EULER: 0.09, TEN_EXACT_GAIN: 0.088, ELEVEN_BY_EULER: 0.051}
-    monkeypatch.setattr(second_place, "errors_of", lambda form, worlds, seed: np.full(3, by_euler[form]))
+    monkeypatch.setattr(
+        second_place, "errors_of", lambda forms, worlds, seed: {form: np.full(3, by_euler[form]) for form in forms}
+    )
     *figures, order, cause = figures_5_to_7.claims(lambda share: None)
     assert [claim.place for claim in figures] == ["Fig. 5", "Fig. 6", "Fig. 7"]
     for claim, name in zip(figures, ("linear", "ltv", "homogeneous"), strict=True):
@@ -130,7 +133,7 @@ def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> Non
         assert claim.figures["velocity_rms_error_measured_angles_rad_s"].mean == pytest.approx(sizes[name])
         assert claim.figures["velocity_rms_error_estimated_angles_rad_s"].mean == pytest.approx(sizes[name] + 0.001)
         rates = claim.pictures[0].panels[2].lines
-        truth = in_the_loop(name, "measured", 3, SEED, 3.0).trajectory
+        truth = in_the_loop([name], "measured", 3, SEED, 3.0)[name].trajectory
         assert truth is not None
         np.testing.assert_array_equal(rates[0].y, truth.world(0)[f"estimate/{name}/x2_rad_s"])
     axes = [[panel.y_range for panel in claim.pictures[0].panels] for claim in figures]
@@ -187,6 +190,6 @@ def test_the_cause_is_not_partly_the_method(exact: float, euler: float, scatter:
 
 
 def test_euler_makes_ten_worse_in_the_loop_and_eleven_hardly() -> None:
-    found = {form: second_place.errors_of(form, 4, SEED) for form in (TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER)}
+    found = second_place.errors_of((TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER), 4, SEED)
     assert mean_interval(found[TEN_BY_EULER] / found[TEN]).low > 1.15
     assert abs(mean_interval(found[ELEVEN_BY_EULER] / found[ELEVEN]).mean - 1.0) < 0.05

@@ -22,16 +22,16 @@ STANDS, FALLS = ti.Fate(0.0, 0.05), ti.Fate(1.0, None)
 
 
 def test_the_predecessors_observer_falls_from_half_a_degree() -> None:
-    found = ti.fates_of(*ti.observer_of((PREDECESSOR, LINEAR)), (0.25, 0.5), 6, SEED, 6.0)
+    found = ti.fates_of([ti.observer_of((PREDECESSOR, LINEAR))], (0.25, 0.5), 6, SEED, 6.0)[0]
     assert found[0.25].fell == 0.0
     assert found[0.5].fell == 1.0
     assert found[0.5].error is None
-    assert ti.fates_of(*ti.observer_of((PREDECESSOR, MEASURED)), (0.5,), 3, SEED, 6.0)[0.5].fell == 0.0
+    assert ti.fates_of([ti.observer_of((PREDECESSOR, MEASURED))], (0.5,), 3, SEED, 6.0)[0][0.5].fell == 0.0
 
 
 def test_ten_with_a_frozen_gain_is_as_good_as_ten() -> None:
-    frozen = ti.fates_of(*ti.observer_of((FROZEN, MEASURED)), (0.5,), 3, SEED, 6.0)[0.5]
-    whole = ti.fates_of("ltv", [], (0.5,), 3, SEED, 6.0)[0.5]
+    frozen = ti.fates_of([ti.observer_of((FROZEN, MEASURED))], (0.5,), 3, SEED, 6.0)[0][0.5]
+    whole = ti.fates_of([("ltv", [])], (0.5,), 3, SEED, 6.0)[0][0.5]
     assert frozen.fell == whole.fell == 0.0
     assert frozen.error == pytest.approx(whole.error, rel=0.02)
 

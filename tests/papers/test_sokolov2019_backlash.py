@@ -36,6 +36,7 @@ def test_cycles_on_mujoco_are_those_of_the_linear_loop() -> None:
         assert foreseen is not None
         assert found.ends[name].amplitude_deg == pytest.approx(foreseen.amplitude_deg, rel=0.15)
         assert found.ends[name].frequency_hz == pytest.approx(foreseen.frequency_hz, rel=0.25)
-        assert not backlash.cycle_of(name, 0.0).sustained
-    half = backlash.cycle_of("linear", 10.0)
+    releases = [backlash.released(name, gap) for name, gap in (("linear", 0.0), ("luenberger", 0.0), ("linear", 10.0))]
+    *without, half = backlash.cycles_of(releases)
+    assert not any(cycle.sustained for cycle in without)
     assert half.amplitude_deg == pytest.approx(found.ends["linear"].amplitude_deg / 2.0, rel=0.05)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cmg_mj.experiment import Experiment, prepare
@@ -13,6 +15,7 @@ from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.scenario import load_scenario
+from cmg_mj.side_by_side import run_of, run_side_by_side
 from cmg_mj.simulate import Result
 from cmg_mj.summary_keys import written
 
@@ -32,10 +35,8 @@ VELOCITY, TILT = "velocity_rms_error_rad_s", "tilt_rms_deg"
 
 def claims(on_share: OnShare) -> list[Claim]:
     """Velocity RMS errors beside those of aranovskiy2020's observers; how idle the update of the gain is."""
-    found = {}
-    for i, label in enumerate(KINDS):
-        on_share(i / len(KINDS))
-        found[label] = in_the_loop(label, WORLDS, SEED)
+    on_share(0.0)
+    found = in_the_loop(list(KINDS), WORLDS, SEED)
     return [compared(found), idle(found["high_gain"])]
 
 
@@ -45,9 +46,11 @@ def experiment(label: str, seed: int) -> Experiment:
     return prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], kind))
 
 
-def in_the_loop(label: str, worlds: int, seed: int) -> Result:
-    """Run one of `KINDS`; the trajectories of `high_gain` alone are kept."""
-    return experiment(label, seed).run_many(worlds, keep_trajectory=label == "high_gain")
+def in_the_loop(labels: Sequence[str], worlds: int, seed: int) -> dict[str, Result]:
+    """Run some of `KINDS`."""
+    return dict(
+        zip(labels, run_side_by_side([run_of(experiment(label, seed), worlds) for label in labels]), strict=True)
+    )
 
 
 def compared(found: dict[str, Result]) -> Claim:

@@ -11,7 +11,8 @@ from cmg_mj.papers.aranovskiy2020.rig import push_recovery
 from cmg_mj.papers.claim import OnShare
 from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
-from cmg_mj.tuning import Level, Recorded, Study, record, tune
+from cmg_mj.side_by_side import run_of, run_side_by_side
+from cmg_mj.tuning import Level, Recorded, Study, halves, recorder, tune
 
 SEED = 74_000
 WORLDS = 12
@@ -79,17 +80,8 @@ Studies = Mapping[str, Mapping[str, Study]]
 """Words of the push -> observer -> its study."""
 
 
-def recorder() -> Callable[..., Recorded]:
-    """Recordings of the tuning experiment that are made once and serve every observer."""
-    kept: dict[tuple, Recorded] = {}
-
-    def recorded(scenario: Scenario, worlds: range, *, noise_ug_rthz: float, warm_up_s: float) -> Recorded:
-        key = (worlds, noise_ug_rthz, scenario.seed, scenario.plant, tuple(scenario.push))
-        if key not in kept:
-            kept[key] = record(scenario, worlds, noise_ug_rthz=noise_ug_rthz, warm_up_s=warm_up_s)
-        return kept[key]
-
-    return recorded
+def _scenario(case: Tuned, push: Push, seed: int) -> Scenario:
+    return load_scenario("observer_tuning", [f"seed={seed}", *push.settings], case.observer)
 
 
 def study_of(
@@ -107,20 +99,20 @@ def study_of(
         push: The experiment, and at which noises.
         seed: Of the noise.
         worlds: How many are fitted, and as many held out.
-        recorded: Makes the recordings.
+        recorded: Hands out the recordings.
         on_share: Called with the share done.
 
     Returns:
         The study.
     """
     return tune(
-        load_scenario("observer_tuning", [f"seed={seed}", *push.settings], case.observer),
+        _scenario(case, push, seed),
         worlds=worlds,
         parameters=case.parameters,
         noise_ug_rthz=push.noise_ug_rthz,
         warm_up_s=WARM_UP_S,
         starts=1,
-        recorded=recorded or recorder(),
+        recorded=recorded,
         on_share=on_share,
     )
 
@@ -130,7 +122,8 @@ def all_studies(
 ) -> dict[str, dict[str, Study]]:
     """Tune every observer on the same recordings of every push."""
     studies: dict[str, dict[str, Study]] = {}
-    recorded, done = recorder(), 0.0
+    wanted = [each for p in pushes for each in halves(_scenario(cases[0], p, seed), worlds, p.noise_ug_rthz)]
+    recorded, done = recorder(wanted, warm_up_s=WARM_UP_S), 0.0
     for push in pushes:
         studies[push.words] = {}
         for case in cases:
@@ -154,15 +147,14 @@ def worth_it(level: Level) -> bool:
     return float(level.rms.mean()) < level.zero_rms
 
 
-def in_the_loop(case: Tuned, level: Level, push: Push, worlds: int, seed: int) -> Interval:
+def in_the_loop(tried: Sequence[tuple[Tuned, Level, Push]], worlds: int, seed: int) -> list[Interval]:
     """Velocity RMS error in the closed loop, Table 2's by the tuned, world by world, under that push and noise."""
-    noise = f"sensors.accelerometer.noise_density_ug_rthz={level.noise_ug_rthz}"
-    names = dict.fromkeys(name.partition("[")[0] for name in level.sizes)
-    tuned = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
-    given_error, tuned_error = (
-        push_recovery(case.observer, seed, [*push.settings, noise, *settings])
-        .run_many(worlds, keep_trajectory=False)
-        .values("velocity_rms_error_rad_s")
-        for settings in ([], tuned)
-    )
-    return ratio_interval(given_error, tuned_error)
+    runs = []
+    for case, level, push in tried:
+        noise = f"sensors.accelerometer.noise_density_ug_rthz={level.noise_ug_rthz}"
+        names = dict.fromkeys(name.partition("[")[0] for name in level.sizes)
+        tuned = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
+        for settings in ([], tuned):
+            runs.append(run_of(push_recovery(case.observer, seed, [*push.settings, noise, *settings]), worlds))
+    found = [result.values("velocity_rms_error_rad_s") for result in run_side_by_side(runs, keep_trajectory=False)]
+    return [ratio_interval(given, tuned) for given, tuned in zip(found[::2], found[1::2], strict=True)]

@@ -8,8 +8,9 @@ import numpy as np
 
 from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.papers.aranovskiy2020.rig import push_recovery
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import plus_minus
+from cmg_mj.side_by_side import run_of, run_side_by_side
 
 _HERE = "cmg_mj.papers.aranovskiy2020.by_euler"
 TEN, ELEVEN = "(10)", "(11)"
@@ -27,24 +28,16 @@ Errors = Mapping[str, np.ndarray]
 """Which form -> velocity RMS error in the loop, (n_worlds,) [rad/s]; NaN for a world that did not stand."""
 
 
-def errors_of(form: str, worlds: int, seed: int) -> np.ndarray:
-    """Close the loop on one of `CASES`, the push and noise of Figs 5 to 7, the law on measured angles."""
-    observer, settings = CASES[form]
-    return (
-        push_recovery(observer, seed, settings)
-        .run_many(worlds, keep_trajectory=False)
-        .values("velocity_rms_error_rad_s")
-    )
+def errors_of(forms: Sequence[str], worlds: int, seed: int) -> dict[str, np.ndarray]:
+    """Close the loop on some of `CASES`, the push and noise of Figs 5 to 7, the law on measured angles."""
+    prepared = [push_recovery(observer, seed, settings) for observer, settings in (CASES[form] for form in forms)]
+    results = run_side_by_side([run_of(each, worlds) for each in prepared], keep_trajectory=False)
+    return {form: result.values("velocity_rms_error_rad_s") for form, result in zip(forms, results, strict=True)}
 
 
-def all_errors(known: Errors, worlds: int, seed: int, on_share: OnShare) -> dict[str, np.ndarray]:
+def all_errors(known: Errors, worlds: int, seed: int) -> dict[str, np.ndarray]:
     """The errors of every form, those that are known among them."""
-    found = dict(known)
-    missing = [form for form in CASES if form not in known]
-    for i, form in enumerate(missing):
-        found[form] = errors_of(form, worlds, seed)
-        on_share((i + 1) / len(missing))
-    return found
+    return dict(known) | errors_of([form for form in CASES if form not in known], worlds, seed)
 
 
 def cause(errors: Errors) -> Claim:

@@ -11,7 +11,7 @@ from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import listed_and
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.simulate import Result
+from cmg_mj.side_by_side import Run, run_side_by_side
 from cmg_mj.summary_keys import written
 
 SEED = 72_002
@@ -71,24 +71,35 @@ class Fate(NamedTuple):
 
 
 def fates_of(
-    observer: str,
-    settings: Sequence[str],
+    observers: Sequence[tuple[str, Sequence[str]]],
     biases_deg: Sequence[float],
     worlds: int,
     seed: int,
     duration_s: float = DURATION_S,
-) -> dict[float, Fate]:
-    """Close the loop on an observer at several biases, in the same worlds each, with the push of Figs 5 to 7."""
-    experiment = push_recovery(observer, seed, settings, duration_s)
-    result: Result = experiment.run_many(
-        [*range(worlds)] * len(biases_deg),
-        vary={"equilibrium_bias_deg": [e for e in biases_deg for _ in range(worlds)]},
-        keep_trajectory=False,
-    )
-    return {
-        e: Fate(float(group.fell.mean()), group.mean("velocity_rms_error_rad_s"))
-        for e, group in zip(biases_deg, result.groups(len(biases_deg)), strict=True)
-    }
+) -> list[dict[float, Fate]]:
+    """Close the loop on observers with their settings at several biases, with the push of Figs 5 to 7.
+
+    Args:
+        observers: Names and settings.
+        biases_deg: The biases e [deg].
+        worlds: How many a bias, the same ones at each and for every observer.
+        seed: Of the noise.
+        duration_s: Simulated time [s].
+
+    Returns:
+        For each of them what became of the worlds at each bias.
+    """
+    biases = {"equilibrium_bias_deg": [e for e in biases_deg for _ in range(worlds)]}
+    numbers = [*range(worlds)] * len(biases_deg)
+    prepared = [push_recovery(observer, seed, settings, duration_s) for observer, settings in observers]
+    results = run_side_by_side([Run(each.varied(biases), numbers) for each in prepared], keep_trajectory=False)
+    return [
+        {
+            e: Fate(float(group.fell.mean()), group.mean("velocity_rms_error_rad_s"))
+            for e, group in zip(biases_deg, result.groups(len(biases_deg)), strict=True)
+        }
+        for result in results
+    ]
 
 
 def observer_of(cell: Cell) -> tuple[str, list[str]]:
@@ -239,16 +250,14 @@ def _picture(found: Factorial) -> Picture:
     )
 
 
-def factorial(worlds: int, seed: int, on_share: OnShare, duration_s: float = DURATION_S) -> Factorial:
+def factorial(worlds: int, seed: int, duration_s: float = DURATION_S) -> Factorial:
     """Run every cell, and (10)."""
     cells = [(gain, model) for gain in GAINS for model in MODELS]
-    found: dict[Cell, dict[float, Fate]] = {}
-    for i, cell in enumerate(cells):
-        found[cell] = fates_of(*observer_of(cell), BIASES_DEG, worlds, seed, duration_s)
-        on_share((i + 1) / (len(cells) + 1))
-    return Factorial(found, fates_of("ltv", [], BIASES_DEG, worlds, seed, duration_s))
+    observers = [*(observer_of(cell) for cell in cells), ("ltv", [])]
+    *found, whole = fates_of(observers, BIASES_DEG, worlds, seed, duration_s)
+    return Factorial(dict(zip(cells, found, strict=True)), whole)
 
 
 def claims(on_share: OnShare) -> list[Claim]:
     """The remark."""
-    return [remark(factorial(WORLDS, SEED, on_share))]
+    return [remark(factorial(WORLDS, SEED))]

@@ -44,11 +44,9 @@ def loops_of(studies: Studies, together: Together, on_share: OnShare) -> list[Tr
     found, chosen = [], [default] + [together] * (together.words != default.words)
     for i, tried in enumerate(chosen):
         push = next(push for push in PUSHES if push.words == tried.push)
-        loop = {}
-        for j, case in enumerate(CASES):
-            loop[case.observer] = in_the_loop(case, tried.levels[case.observer], push, LOOP_WORLDS, SEED + 1)
-            on_share((len(CASES) * i + j + 1) / (len(CASES) * len(chosen)))
-        found.append(Tried(tried, loop))
+        loops = in_the_loop([(case, tried.levels[case.observer], push) for case in CASES], LOOP_WORLDS, SEED + 1)
+        found.append(Tried(tried, dict(zip((case.observer for case in CASES), loops, strict=True))))
+        on_share((i + 1) / len(chosen))
     return found
 
 

@@ -13,6 +13,7 @@ from cmg_mj.papers.recorded import rms, trajectory_of
 from cmg_mj.push import Push
 from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
+from cmg_mj.side_by_side import Run, run_side_by_side
 from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 
@@ -95,11 +96,14 @@ def velocity_errors(
         Observer -> errors, (n_biases, worlds) [rad/s].
     """
     each = np.repeat(biases_deg, worlds).tolist()
-    found = {}
+    runs = []
     for name in observers:
-        result = run(without_push(seed, f"observer.kind={name}"), each, keep_trajectory=False)
-        found[name] = errors(result, "velocity_rms_error_rad_s").reshape(len(biases_deg), worlds)
-    return found
+        prepared = prepare(without_push(seed, f"observer.kind={name}"))
+        runs.append(Run(prepared.varied({"equilibrium_bias_deg": each}), range(len(each))))
+    return {
+        name: errors(result, "velocity_rms_error_rad_s").reshape(len(biases_deg), worlds)
+        for name, result in zip(observers, run_side_by_side(runs, keep_trajectory=False), strict=True)
+    }
 
 
 def gait(amplitude_n_m: float, frequency_hz: float, piece_s: float = 0.005) -> list[Push]:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmg_mj.experiment import Experiment
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.release import RELEASE, is_sustained
 from cmg_mj.papers.sokolov2019.rig import experiment
+from cmg_mj.side_by_side import run_of, run_side_by_side
+from cmg_mj.trajectory import Trajectory
 
 GAP_ARCMIN = 20.0
 """Backlash of the Dynamixel MX-106 (Robotis e-Manual, MX-106: 20 arcmin), from one side of the gap to the other."""
@@ -34,8 +38,8 @@ class Cycle(NamedTuple):
         return f"goes on oscillating by {self.amplitude_deg:.2f} deg to either side at {self.frequency_hz:.1f} Hz"
 
 
-def cycle_of(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Cycle:
-    """Let the rig go with a gap.
+def released(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Experiment:
+    """The rig let go with a gap.
 
     Args:
         observer: In the loop.
@@ -43,11 +47,19 @@ def cycle_of(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Cy
         **parameters: The observer's, where they are not Table II's.
 
     Returns:
-        The cycle that it ends in.
+        The experiment.
     """
     changed = [f"observer.{name}={value}" for name, value in parameters.items()]
     gap = f"plant.gimbal_backlash_arcmin={arcmin}"
-    trajectory = trajectory_of(experiment([*RELEASE, f"duration_s={RELEASE_S}", gap, *changed], observer).run_many(1))
+    return experiment([*RELEASE, f"duration_s={RELEASE_S}", gap, *changed], observer)
+
+
+def cycles_of(releases: Sequence[Experiment]) -> list[Cycle]:
+    """The cycles that rigs let go end in, one world each."""
+    return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(each, 1) for each in releases])]
+
+
+def _cycle(trajectory: Trajectory) -> Cycle:
     last = trajectory.between(RELEASE_S - WINDOW_S, RELEASE_S)
     x2, t = last["x2_rad_s"][:, 0], last["time_s"]
     spectrum = np.abs(np.fft.rfft((x2 - x2.mean()) * np.hanning(len(x2)), 8 * len(x2)))

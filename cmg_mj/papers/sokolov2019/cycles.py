@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from cmg_mj.papers.sokolov2019.backlash import Cycle, cycle_of
+from cmg_mj.papers.sokolov2019.backlash import Cycle, cycles_of, released
 from cmg_mj.papers.sokolov2019.figure_3 import L1, WITH_Y2, stiffness
 from cmg_mj.papers.sokolov2019.gap_prediction import Foreseen, foreseen_cycle
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
@@ -22,8 +22,9 @@ class Cycles(NamedTuple):
 
 def cycles() -> Cycles:
     """All of them."""
-    ends = {name: cycle_of(name) for name in OBSERVERS}
+    releases = {name: released(name) for name in OBSERVERS}
     # (9) but for J2, cos y2 and the sine: see `figure_3.nine_with_y2`.
     nine = {"k1": L1, "k2": stiffness(experiment().plant.reduced), "alpha": 1.0}
-    ends[WITH_Y2] = cycle_of("homogeneous", **nine)
+    releases[WITH_Y2] = released("homogeneous", **nine)
+    ends = dict(zip(releases, cycles_of(list(releases.values())), strict=True))
     return Cycles(ends, {name: foreseen_cycle(name) for name in ("linear", "luenberger")})

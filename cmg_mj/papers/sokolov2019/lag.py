@@ -17,9 +17,9 @@ from cmg_mj.papers.sokolov2019.release import (
     LARGEST_LATENCY_STEPS,
     Sweep,
     Threshold,
-    lag_threshold,
+    lag_thresholds,
     latency_threshold,
-    sweep,
+    sweeps,
 )
 from cmg_mj.papers.sokolov2019.rig import FINE, estimator, experiment, servo_of
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
@@ -124,16 +124,14 @@ class Lags(NamedTuple):
 
 def lags(on_share: OnShare) -> Lags:
     """Sweep, sharpen, and predict."""
-    sweeps: dict[str, Sweep] = {}
-    thresholds: dict[str, Threshold] = {}
+    swept = sweeps(list(OBSERVERS))
+    thresholds = lag_thresholds(swept)
     latencies: dict[str, Threshold] = {}
     for i, name in enumerate(OBSERVERS):
-        sweeps[name] = sweep(name)
-        thresholds[name] = lag_threshold(name, sweeps[name])
         latencies[name] = latency_threshold(name)
         on_share((i + 1) / 4.0)
     predictions = {name: predicted(name) for name in ("linear", "luenberger")} | {"truth": predicted(None)}
-    return Lags(sweeps, thresholds, latencies, predictions, largest_tau(), float(sweeps["linear"].lags_s[0]))
+    return Lags(swept, thresholds, latencies, predictions, largest_tau(), float(swept["linear"].lags_s[0]))
 
 
 def in_ms(seconds: float | None, otherwise: str = "none") -> str:

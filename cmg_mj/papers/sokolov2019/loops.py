@@ -14,6 +14,7 @@ from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment
 from cmg_mj.papers.words import plus_minus
+from cmg_mj.side_by_side import Run, run_side_by_side
 from cmg_mj.simulate import Result
 
 SEED, WORLDS = 83_000, 20
@@ -48,22 +49,22 @@ class Loops(NamedTuple):
 
 
 def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s: float = DURATION_S) -> Loops:
-    """Run them all; the worlds of an observer at once, the same seeds at every bias and with the gap."""
+    """Run them all; those with noise at once, the same seeds for every observer, at every bias and with the gap."""
     settings = [f"seed={seed}", f"duration_s={duration_s}", f"plant.equilibrium_bias_deg={SHOWN_DEG}"]
     by_bias: dict[float, dict[str, Result]] = {e: {} for e in BIASES_DEG}
     gap: dict[str, Result] = {}
     quiet: dict[str, Result] = {}
-    for i, name in enumerate(OBSERVERS):
-        prepared = experiment(settings, name)
-        biases = np.repeat([*BIASES_DEG, SHOWN_DEG], worlds)
-        cases = len(BIASES_DEG) + 1
-        gaps = np.repeat([*[0.0] * len(BIASES_DEG), GAP_ARCMIN], worlds)
-        varied = {"equilibrium_bias_deg": biases, "gimbal_backlash_arcmin": gaps}
-        *own, gap[name] = prepared.run_many([*range(worlds)] * cases, vary=varied).groups(cases)
+    cases = len(BIASES_DEG) + 1
+    gaps = np.repeat([*[0.0] * len(BIASES_DEG), GAP_ARCMIN], worlds)
+    varied = {"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds), "gimbal_backlash_arcmin": gaps}
+    runs = [Run(experiment(settings, name).varied(varied), [*range(worlds)] * cases) for name in OBSERVERS]
+    for name, result in zip(OBSERVERS, run_side_by_side(runs), strict=True):
+        *own, gap[name] = result.groups(cases)
         for e, found in zip(BIASES_DEG, own, strict=True):
             by_bias[e][name] = found
+    on_share(0.8)
+    for name in OBSERVERS:
         quiet[name] = experiment([*settings, *NO_NOISE], name).run()
-        on_share((i + 1) / (len(OBSERVERS) + 0.3))
     return Loops(by_bias, gap, quiet, experiment(settings, feedback="fog").run_many(worlds), worlds)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, experiment, rig_with, servo_of
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
+from cmg_mj.side_by_side import Run, run_side_by_side
 from cmg_mj.trajectory import Trajectory
 
 RELEASE = (
@@ -46,11 +48,20 @@ def is_sustained(trajectory: Trajectory, window_s: float = WINDOW_S) -> np.ndarr
     return ~np.isfinite(x2[-1]) | ((last > FLOOR_RAD_S) & (last >= STEADY * before))
 
 
+def releases(servos: Mapping[str, Sequence[Servo]], settings: Sequence[str] = ()) -> dict[str, Trajectory]:
+    """Let the rig go without noise, with each observer in the loop: one world a servo of its own."""
+    runs = []
+    for observer, own in servos.items():
+        prepared = experiment([*RELEASE, FINE, *settings], observer)
+        rigs = [replace(prepared, plant=rig_with(prepared.scenario.plant, servo)) for servo in own]
+        runs.append(Run(rigs, range(len(rigs))))
+    results = run_side_by_side(runs)
+    return {observer: trajectory_of(result) for observer, result in zip(servos, results, strict=True)}
+
+
 def release(observer: str, servos: Sequence[Servo], settings: Sequence[str] = ()) -> Trajectory:
-    """Let the rig go without noise, one world a servo."""
-    prepared = experiment([*RELEASE, FINE, *settings], observer)
-    plants = [rig_with(prepared.scenario.plant, servo) for servo in servos]
-    return trajectory_of(prepared.run_many(len(plants), plants=plants))
+    """The same for one observer."""
+    return releases({observer: servos}, settings)[observer]
 
 
 class Sweep(NamedTuple):
@@ -68,13 +79,17 @@ class Sweep(NamedTuple):
         return bool(self.sustained[np.argmin(np.abs(self.lags_s - lag_s))])
 
 
-def sweep(observer: str) -> Sweep:
+def sweeps(observers: Sequence[str]) -> dict[str, Sweep]:
     """Release the rig with the model's servo and with slower ones, as stiff."""
     servo = servo_of(experiment().plant)
     lags = np.array([servo.lag_s, *LAGS_S])
-    trajectory = release(observer, [servo.damped(lag) for lag in lags])
-    t, x1 = trajectory["time_s"], trajectory["x1_rad"]
-    return Sweep(lags, is_sustained(trajectory), np.degrees(np.abs(x1[t > t[-1] - WINDOW_S]).max(axis=0)))
+    servos = [servo.damped(lag) for lag in lags]
+    found = {}
+    for observer, trajectory in releases(dict.fromkeys(observers, servos)).items():
+        t, x1 = trajectory["time_s"], trajectory["x1_rad"]
+        amplitude = np.degrees(np.abs(x1[t > t[-1] - WINDOW_S]).max(axis=0))
+        found[observer] = Sweep(lags, is_sustained(trajectory), amplitude)
+    return found
 
 
 class Threshold(NamedTuple):
@@ -89,18 +104,23 @@ class Threshold(NamedTuple):
         return None if self.high is None else (self.low + self.high) / 2.0
 
 
-def lag_threshold(observer: str, found: Sweep, parts: int = 10) -> Threshold:
-    """The least servo lag at which the loop oscillates by itself, as stiff, to a tenth of the sweep's spacing [s]."""
-    first = np.flatnonzero(found.sustained)
-    if not len(first):
-        return Threshold(float(found.lags_s[-1]), None)
-    if first[0] == 0:
-        return Threshold(0.0, float(found.lags_s[0]))
-    grid = np.linspace(found.lags_s[first[0] - 1], found.lags_s[first[0]], parts + 1)
+def lag_thresholds(found: Mapping[str, Sweep], parts: int = 10) -> dict[str, Threshold]:
+    """The least servo lag at which each loop oscillates by itself, as stiff, to a tenth of the sweep's spacing [s]."""
+    thresholds, grids = {}, {}
+    for observer, of in found.items():
+        first = np.flatnonzero(of.sustained)
+        if not len(first):
+            thresholds[observer] = Threshold(float(of.lags_s[-1]), None)
+        elif first[0] == 0:
+            thresholds[observer] = Threshold(0.0, float(of.lags_s[0]))
+        else:
+            grids[observer] = np.linspace(of.lags_s[first[0] - 1], of.lags_s[first[0]], parts + 1)
     servo = servo_of(experiment().plant)
-    between = is_sustained(release(observer, [servo.damped(lag) for lag in grid[1:]]))
-    i = int(np.argmax(between))  # the last of them is the sweep's own
-    return Threshold(float(grid[i]), float(grid[i + 1]))
+    between = releases({observer: [servo.damped(lag) for lag in grid[1:]] for observer, grid in grids.items()})
+    for observer, grid in grids.items():
+        i = int(np.argmax(is_sustained(between[observer])))  # the last of them is the sweep's own
+        thresholds[observer] = Threshold(float(grid[i]), float(grid[i + 1]))
+    return {observer: thresholds[observer] for observer in found}
 
 
 def latency_threshold(observer: str, largest_steps: int = LARGEST_LATENCY_STEPS) -> Threshold:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from cmg_mj import markdown
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
-from cmg_mj.tuning import Level, tune
+from cmg_mj.schema import Scenario
+from cmg_mj.tuning import Level, Recorded, halves, recorder, tune
 
 SEED, WORLDS = 85_000, 10
 WARM_UP_S = 0.5
@@ -27,20 +28,43 @@ Tuned = Mapping[str, Mapping[str, Sequence[Level]]]
 """Push -> observer -> what came out, one a noise."""
 
 
-def levels_of(name: str, settings: Sequence[str], worlds: int, seed: int, noises: Sequence[float]) -> Sequence[Level]:
-    """Tune one estimator at several sensor noises."""
-    scenario = experiment([f"seed={seed}", "duration_s=3.0", *settings], name, feedback="fog").scenario
+def scenario_of(name: str, settings: Sequence[str], seed: int) -> Scenario:
+    """What an estimator is tuned in."""
+    return experiment([f"seed={seed}", "duration_s=3.0", *settings], name, feedback="fog").scenario
+
+
+def levels_of(
+    name: str,
+    settings: Sequence[str],
+    worlds: int,
+    seed: int,
+    noises: Sequence[float],
+    recorded: Callable[..., Recorded] | None = None,
+) -> Sequence[Level]:
+    """Tune one estimator at several sensor noises, on recordings that `recorded` hands out or that are made."""
     return tune(
-        scenario, worlds=worlds, parameters=NUMBERS[name], noise_ug_rthz=noises, warm_up_s=WARM_UP_S, starts=1
+        scenario_of(name, settings, seed),
+        worlds=worlds,
+        parameters=NUMBERS[name],
+        noise_ug_rthz=noises,
+        warm_up_s=WARM_UP_S,
+        starts=1,
+        recorded=recorded,
     ).levels
 
 
 def tuned(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> dict[str, dict[str, Sequence[Level]]]:
     """Tune all three under both pushes."""
     found: dict[str, dict[str, Sequence[Level]]] = {push: {} for push in PUSHES}
+    wanted = [
+        each
+        for settings, noises in PUSHES.values()
+        for each in halves(scenario_of(next(iter(OBSERVERS)), settings, seed), worlds, noises)
+    ]
+    recorded = recorder(wanted, warm_up_s=WARM_UP_S)
     for i, (push, (settings, noises)) in enumerate(PUSHES.items()):
         for j, name in enumerate(OBSERVERS):
-            found[push][name] = levels_of(name, settings, worlds, seed, noises)
+            found[push][name] = levels_of(name, settings, worlds, seed, noises, recorded)
             on_share((3 * i + j + 1) / 6.0)
     return found
 
