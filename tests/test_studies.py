@@ -1,10 +1,15 @@
-"""Scripts of docs/studies whose tables the documentation and the changelog name."""
+"""Scripts of docs/studies whose tables the documentation and the changelog name; its study files."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
+
+from tests.command import cmg_mj
 
 STUDIES = Path(__file__).resolve().parents[1] / "docs/studies"
 STEPS = STUDIES / "steps.py"
@@ -34,3 +39,19 @@ def test_the_tables_of_gyro_free() -> None:
     done = subprocess.run([sys.executable, study, *arguments.split()], capture_output=True, text=True, check=True)
     assert "| 400       |      0.01406 |     0.01268 |  9.8 % |" in done.stdout
     assert done.stdout.count("as in the tables") == 3
+
+
+@pytest.mark.parametrize("study", sorted(path.name for path in STUDIES.glob("*.toml")))
+def test_a_study_file_can_be_run(study: str) -> None:
+    said = cmg_mj("sweep", STUDIES / study, "--plan")
+    assert said.status == 0, said.err
+    assert " trials in " in said.out
+
+
+@pytest.mark.parametrize("place", ["docs", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "cmg_mj"])
+def test_files_of_studies_that_are_named_are_there(place: str) -> None:
+    root = STUDIES.parents[1]
+    pages = [root / place] if place.endswith(".md") else [*(root / place).rglob("*.md"), *(root / place).rglob("*.py")]
+    named = {name for page in pages for name in re.findall(r"docs/studies/(\w+\.\w+)", page.read_text("utf-8"))}
+    assert named
+    assert not {name for name in named if not (STUDIES / name).is_file()}

@@ -4,35 +4,50 @@ For every seed and sign, the range of e is cut into eight twice, until the limit
 the scenario's 15 s counts.
 True feedback (the exact rate in the law) and the gyro stand beside the observers.
 
-Run it (about three minutes on two quiet cores): python docs/studies/bias_limits.py
+Run it (about a minute on two quiet cores): python docs/studies/bias_limits.py
 """
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from cmg_mj import load_scenario, markdown, prepare
 from cmg_mj.observers import OBSERVERS
+from cmg_mj.side_by_side import Run, run_side_by_side
 
 SEED, WORLDS, LARGEST_DEG, CUTS, PARTS = 30_000, 5, 4.0, 2, 8
 
 
-def limits(overrides: list[str], observer: str) -> np.ndarray:
-    """Largest e at which a world stands, (2, WORLDS) for the signs - and + [deg]; negative if it falls at 0."""
-    experiment = prepare(load_scenario("push_recovery", [f"seed={SEED}", *overrides], observer))
+class Case(NamedTuple):
+    """What the loop is closed on."""
+
+    observer: str
+    overrides: Sequence[str] = ()
+
+
+def limits(cases: Sequence[Case]) -> list[np.ndarray]:
+    """Largest e at which a world stands, (2, WORLDS) a case, for the signs - and + [deg]; negative if it falls at 0."""
+    experiments = [prepare(load_scenario("push_recovery", [f"seed={SEED}", *more], name)) for name, more in cases]
     signs = np.repeat([-1.0, 1.0], WORLDS)
-    low, width = np.zeros(len(signs)), LARGEST_DEG
+    lows, width = [np.zeros(len(signs)) for _ in cases], LARGEST_DEG
     for cut in range(CUTS):
         # In the first cut, e = 0 itself is tried too: a world may fall without any bias.
         parts = np.arange(1 if cut else 0, PARTS) * width / PARTS
-        tried = low[:, None] + parts
-        biases = (signs[:, None] * tried).ravel().tolist()
         worlds = np.repeat(np.arange(len(signs)) % WORLDS, len(parts)).tolist()
-        result = experiment.run_many(worlds, vary={"equilibrium_bias_deg": biases}, keep_trajectory=False)
-        stands = result.stood.reshape(tried.shape)
-        first_fall = np.where(stands.all(axis=1), len(parts), np.argmin(stands, axis=1))
-        standing = np.column_stack([low if cut else np.full(len(signs), -1.0), tried])
-        low, width = standing[np.arange(len(signs)), first_fall], width / PARTS
-        low = np.where(low < 0.0, -LARGEST_DEG, low)
-    return low.reshape(2, WORLDS)
+        tried = [low[:, None] + parts for low in lows]
+        runs = [
+            Run(experiment.varied({"equilibrium_bias_deg": (signs[:, None] * of).ravel()}), worlds)
+            for experiment, of in zip(experiments, tried, strict=True)
+        ]
+        for i, result in enumerate(run_side_by_side(runs, keep_trajectory=False)):
+            stands = result.stood.reshape(tried[i].shape)
+            first_fall = np.where(stands.all(axis=1), len(parts), np.argmin(stands, axis=1))
+            standing = np.column_stack([lows[i] if cut else np.full(len(signs), -1.0), tried[i]])
+            low = standing[np.arange(len(signs)), first_fall]
+            lows[i] = np.where(low < 0.0, -LARGEST_DEG, low)
+        width /= PARTS
+    return [low.reshape(2, WORLDS) for low in lows]
 
 
 def cell(values: np.ndarray) -> str:
@@ -45,13 +60,15 @@ def cell(values: np.ndarray) -> str:
 
 def main() -> None:
     """Print the table of docs/results.md."""
-    cases = [(f"`{name}`", [], name) for name in OBSERVERS]
-    cases += [("gyro feedback", ['controller.feedback="fog"'], "homogeneous")]
-    cases += [("true feedback", ['controller.feedback="truth"'], "homogeneous")]
-    rows = []
-    for label, overrides, observer in cases:
-        pushed, quiet = (limits([*overrides, *more], observer) for more in ([], ["push=[]"]))
-        rows.append((label, *(cell(values) for values in (*pushed, *quiet))))
+    cases = {f"`{name}`": Case(name) for name in OBSERVERS}
+    cases["gyro feedback"] = Case("homogeneous", ['controller.feedback="fog"'])
+    cases["true feedback"] = Case("homogeneous", ['controller.feedback="truth"'])
+    pushed = limits(list(cases.values()))
+    quiet = limits([Case(name, [*more, "push=[]"]) for name, more in cases.values()])
+    rows = [
+        (label, *(cell(values) for values in (*with_push, *without)))
+        for label, with_push, without in zip(cases, pushed, quiet, strict=True)
+    ]
     print(markdown.table(("in the loop", "e < 0, push", "e > 0, push", "e < 0, no push", "e > 0, no push"), rows))
 
 

@@ -1,6 +1,6 @@
 """Which observer for which robot: README's table.
 
-python docs/studies/for_a_builder.py [--worlds 20] (about four minutes on two quiet cores)
+python docs/studies/for_a_builder.py [--worlds 20] (about two minutes on two quiet cores)
 
 Errors are those of `cmg-mj compare push_recovery`: the same worlds and noise for every observer, each in its own loop.
 How much bias a loop bears is `bias_limits.py`'s, under the same push. Instructions are those of `cmg-mj bench --board`;
@@ -10,7 +10,7 @@ without the tools for that they are left out.
 import argparse
 
 import numpy as np
-from bias_limits import limits
+from bias_limits import Case, limits
 
 from cmg_mj import load_scenario, markdown, prepare
 from cmg_mj.board.cost import counted_on, measure
@@ -18,6 +18,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.intervals import mean_interval
 from cmg_mj.observers import OBSERVERS, needs, observer_class
 from cmg_mj.references import REFERENCES
+from cmg_mj.side_by_side import run_of, run_side_by_side
 from cmg_mj.simulate import Result
 
 ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
@@ -35,9 +36,9 @@ def errors(result: Result, companion: str | None = None) -> list[str]:
     return cells
 
 
-def bears(observer: str) -> str:
+def bears(limit: np.ndarray) -> str:
     """The range of e in which it stands, to 1/16 degree, median over worlds."""
-    below, above = np.median(limits([], observer), axis=1)
+    below, above = np.median(limit, axis=1)
     return f"-{below:.2f} to {above:.2f}" if min(below, above) >= 0.0 else "falls at 0"
 
 
@@ -57,16 +58,15 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=20)
     worlds = parser.parse_args().worlds
     counted = instructions()
-    results = {
-        name: prepare(load_scenario("push_recovery", [], name)).run_many(worlds, keep_trajectory=False)
-        for name in OBSERVERS
-    }
+    runs = [run_of(prepare(load_scenario("push_recovery", [], name)), worlds) for name in OBSERVERS]
+    results = dict(zip(OBSERVERS, run_side_by_side(runs, keep_trajectory=False), strict=True))
+    borne = dict(zip(OBSERVERS, limits([Case(name) for name in OBSERVERS]), strict=True))
     rows = []
     for name, result in results.items():
         asked = [WORDS[need] for need in needs(observer_class(name))]
         fell = f"{100.0 * result.fell.mean():.0f}%"
         rows.append(
-            [f"`{name}`", *errors(result), fell, bears(name), counted.get(name, "-"), ", ".join(["y1", *asked])]
+            [f"`{name}`", *errors(result), fell, bears(borne[name]), counted.get(name, "-"), ", ".join(["y1", *asked])]
         )
     stood = {name: mean for name, r in results.items() if r.stood.all() and (mean := r.mean(ERROR)) is not None}
     best = min(stood, key=stood.__getitem__)

@@ -14,7 +14,7 @@ SEED = 910_000
 
 def test_the_rig_rests_at_zero_with_a_biased_observer() -> None:
     case = "(10), estimated angles"
-    found = rest.rest_of(case, 4, SEED)
+    (found,) = rest.rests_of([(case, 4, ())], SEED)
     expected = rest.expected_integrator(case, rest.BIAS_DEG, math.radians(0.4), SEED)
     assert found.x2_estimated.high < -0.01  # biased it is
     assert found.at_zero(expected)

@@ -17,6 +17,7 @@ from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
+from cmg_mj.side_by_side import run_of, run_side_by_side
 from cmg_mj.trajectory import Trajectory
 
 SEED = 73_000
@@ -65,12 +66,20 @@ class Rest(NamedTuple):
         return abs(self.x1.mean) < BIAS_DEG / 20.0 and abs(self.x_e.mean / expected_x_e - 1.0) < 0.05
 
 
-def rest_of(case: str, worlds: int, seed: int, extra: Sequence[str] = ()) -> Rest:
-    """Let the rig come to rest, without a push."""
-    observer, settings, *_ = CASES[case]
+def rests_of(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list[Rest]:
+    """Let the rig come to rest, without a push: a case of `CASES`, how many worlds, and settings beside its own."""
     still = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
-    experiment = push_recovery(observer, seed, [*still, *settings, *extra], DURATION_S)
-    trajectory = trajectory_of(experiment.run_many(worlds))
+    runs = []
+    for case, worlds, extra in cases:
+        observer, settings, *_ = CASES[case]
+        runs.append(run_of(push_recovery(observer, seed, [*still, *settings, *extra], DURATION_S), worlds))
+    results = run_side_by_side(runs)
+    return [
+        _rest(CASES[case].observer, trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)
+    ]
+
+
+def _rest(observer: str, trajectory: Trajectory) -> Rest:
     late = trajectory["time_s"] >= DURATION_S - AVERAGED_S
 
     def mean(name: str, factor: float = 1.0) -> Interval:
@@ -196,9 +205,8 @@ def _picture(rests: Mapping[str, Rest]) -> Picture:
 
 def claims(on_share: OnShare) -> list[Claim]:
     """The laws with the true rate, then with observers."""
-    rests: dict[str, Rest] = {}
-    for i, case in enumerate(CASES):
-        rests[case] = rest_of(case, WORLDS, SEED)
-        on_share((i + 1) / (len(CASES) + 1))
-    static = rest_of(TRUE_RATE, 2, SEED, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
+    without_integrator = (TRUE_RATE, 2, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
+    *found, static = rests_of([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
+    on_share(0.9)
+    rests = dict(zip(CASES, found, strict=True))
     return [laws_claim(rests[TRUE_RATE], static), observers_claim(rests)]
