@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -46,12 +45,3 @@ def test_a_study_file_can_be_run(study: str) -> None:
     said = cmg_mj("sweep", STUDIES / study, "--plan")
     assert said.status == 0, said.err
     assert " trials in " in said.out
-
-
-@pytest.mark.parametrize("place", ["docs", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "cmg_mj"])
-def test_files_of_studies_that_are_named_are_there(place: str) -> None:
-    root = STUDIES.parents[1]
-    pages = [root / place] if place.endswith(".md") else [*(root / place).rglob("*.md"), *(root / place).rglob("*.py")]
-    named = {name for page in pages for name in re.findall(r"docs/studies/(\w+\.\w+)", page.read_text("utf-8"))}
-    assert named
-    assert not {name for name in named if not (STUDIES / name).is_file()}
