@@ -97,7 +97,7 @@ def test_one_world_is_shown_without_an_interval(tmp_path: Path) -> None:
         assert cell["velocity_rms_error_rad_s"] == error
         assert (cell["velocity_rms_error_rad_s_low"], cell["velocity_rms_error_rad_s_high"]) == (None, None)
         assert f" {error:.4f} |" in said.out
-    assert "The order gyro_free < linear: By the means over the worlds it holds at 2 of 2 points" in said.out
+    assert "The order gyro_free < linear: by the velocity RMS error [rad/s] it holds at 2 of 2 points" in said.out
     report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "2 points, 2 observers, 1 world: 4 trials." in report
     assert cmg_mj(*arguments, "--plan").out.startswith(
