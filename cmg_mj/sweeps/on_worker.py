@@ -16,6 +16,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.resolved import versions
 from cmg_mj.resources import folder
 from cmg_mj.sweeps.points import Point
+from cmg_mj.sweeps.memory import give_back
 from cmg_mj.sweeps.study import Chunk, Study
 from cmg_mj.sweeps.trials import as_bytes, table_of
 from cmg_mj.sweeps.work import compute
@@ -84,6 +85,7 @@ def computed(part: Part, threads: int, where: str) -> bytes:
             rows = compute(study, part.chunk, points=part.points, threads=threads)
         except InputError as error:
             raise InputError(f"worker {where}: {error}") from None
+        give_back()
         return as_bytes(table_of(study, rows))
 
 

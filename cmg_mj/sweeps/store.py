@@ -15,6 +15,7 @@ import tomli_w
 
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.experiment import prepare
+from cmg_mj.sweeps.memory import give_back
 from cmg_mj.sweeps.study import Study
 from cmg_mj.sweeps.trials import schema_of, table_of, write_table, write_tables
 from cmg_mj.sweeps.work import compute
@@ -115,6 +116,7 @@ def run(store: Store, on_progress: Callable[[float], None] | None = None) -> Non
         size = chunks.size(number)
         tick = None if on_progress is None else partial(_inside, on_progress, done, size)
         store.keep(number, table_of(study, compute(study, chunks[number], tick)))
+        give_back()
         done += size
         if on_progress:
             on_progress(done)
