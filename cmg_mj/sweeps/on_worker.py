@@ -15,8 +15,8 @@ from typing import Any
 from cmg_mj.errors import InputError
 from cmg_mj.resolved import versions
 from cmg_mj.resources import folder
-from cmg_mj.sweeps.points import Point
 from cmg_mj.sweeps.memory import give_back
+from cmg_mj.sweeps.points import Point
 from cmg_mj.sweeps.study import Chunk, Study
 from cmg_mj.sweeps.trials import as_bytes, table_of
 from cmg_mj.sweeps.work import compute
