@@ -11,10 +11,11 @@ from cmg_mj.sweeps.work import compute
 
 TRIALS, SECONDS = 256, 1.5
 """Of each observer's piece: so many trials stand for a chunk, and are run for so long once they have begun."""
-MB_AT_LEAST, MB_A_WORLD, MB_A_POINT, BYTES_A_TRIAL = 230.0, 0.015, 0.12, 200.0
-"""Of the process with its pictures; of each of a chunk's trials, and of its points; of all trials, for the tables.
+MB_AT_LEAST, MB_A_WORLD, MB_A_WORLD_S, MB_A_POINT, BYTES_A_TRIAL = 230.0, 0.015, 0.008, 0.12, 200.0
+"""Of the process with its pictures; of each of a chunk's trials and its seconds, and of its points; of all trials.
 
-By the peaks (VmHWM) of three sweeps on Linux: 2 points x 50 worlds, 1,000 x 100, 5,000 x 1: 232, 252 and 372 MB.
+By the peaks (VmHWM) of four sweeps on Linux: of 0.05 s, 2 points x 50 worlds, 1,000 x 100, 5,000 x 1: 232, 252 and
+372 MB; of 15 s, 1 x 1,024: 365 MB.
 """
 
 
@@ -34,7 +35,10 @@ def expected(study: Study) -> dict[str, Any]:
         "trials": study.trials,
         "chunks": len(study.chunks),
         "minutes": seconds * len(study.points) * study.worlds / 60.0,
-        "memory_mb": MB_AT_LEAST + MB_A_WORLD * of_a_chunk + MB_A_POINT * rigs + BYTES_A_TRIAL * study.trials / 2**20,
+        "memory_mb": MB_AT_LEAST
+        + (MB_A_WORLD + MB_A_WORLD_S * study.scenario.duration_s) * of_a_chunk
+        + MB_A_POINT * rigs
+        + BYTES_A_TRIAL * study.trials / 2**20,
     }
 
 
