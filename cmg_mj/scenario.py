@@ -58,7 +58,7 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
     where = " ".join([name, *(["with"] if changes else []), *changes])
     scenario = parse_scenario(fields, where)
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in overrides):
-        scenario = _find_model(scenario, path.parent)
+        scenario = find_model(scenario, path.parent)
     return scenario
 
 
@@ -94,7 +94,7 @@ def base_of(scenario: Scenario) -> Scenario | None:
     return load_scenario(str(folder("scenarios") / f"{scenario.based_on}.toml"))
 
 
-def _find_model(scenario: Scenario, beside: Path) -> Scenario:
+def find_model(scenario: Scenario, beside: Path) -> Scenario:
     """The same with the path of its model, which a scenario file names relative to itself."""
     try:
         model = find("models", scenario.plant.model, ".xml", "plant.model =", beside)

@@ -137,9 +137,7 @@ def _study(
     if fields is None:
         scenario = chosen.scenario()
     else:
-        if chosen.settings:
-            raise InputError("--set: change the study file's [scenario] instead")
-        scenario = scenario_of(chosen.name, fields)
+        scenario = scenario_of(chosen.name, fields, chosen.settings)
         if chosen.seed is not None:
             scenario = scenario.model_copy(update={"seed": chosen.seed})
         asked = fields.get("sweep", {})

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.overrides import override
 from cmg_mj.resources import bundled, find
-from cmg_mj.scenario import load_scenario, parse_scenario
+from cmg_mj.scenario import find_model, load_scenario, parse_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.sweeps.axes import Axis, parse_axis
 from cmg_mj.sweeps.study import Design
@@ -46,14 +48,21 @@ def study_file(name: str) -> dict[str, Any] | None:
     return fields
 
 
-def scenario_of(name: str, fields: Mapping[str, Any]) -> Scenario:
-    """A study file's scenario: a table, or a name."""
+def scenario_of(name: str, fields: Mapping[str, Any], settings: Sequence[str] = ()) -> Scenario:
+    """A study file's scenario, a table or a name, with settings `section.field=value` that replace its own."""
     given = fields.get("scenario")
     if isinstance(given, str):
-        return load_scenario(given)
+        return load_scenario(given, settings)
     if not isinstance(given, dict):
         raise InputError(f"{name}: scenario: must be there, as a table or as a scenario's name")
-    return parse_scenario({key: value for key, value in given.items() if key != "versions"}, name)
+    changed = copy.deepcopy({key: value for key, value in given.items() if key != "versions"})
+    for setting in settings:
+        override(changed, setting)
+    where = " ".join([name, *(["with"] if settings else []), *(f"--set {setting}" for setting in settings)])
+    scenario = parse_scenario(changed, where)
+    if any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
+        return scenario
+    return find_model(scenario, find("scenarios", name, ".toml", "scenario").parent)
 
 
 def axes_of(name: str, fields: Mapping[str, Any]) -> list[Axis]:

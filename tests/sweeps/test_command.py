@@ -7,12 +7,14 @@ import os
 import signal
 import subprocess
 import time
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from cmg_mj.resources import folder
 from tests.command import COMMAND, ROOT, cmg_mj
 
 BIAS = "plant.equilibrium_bias_deg"
@@ -103,6 +105,25 @@ def test_one_world_is_shown_without_an_interval(tmp_path: Path) -> None:
     assert cmg_mj(*arguments, "--plan").out.startswith(
         "2 points x 2 observers x 1 world = 4 trials in 2 chunks; about "
     )
+
+
+def test_a_study_file_with_settings_and_its_own_model(tmp_path: Path) -> None:
+    """The model is beside the file, `--set` changes the file's scenario, options its design."""
+    for name in ("scissored_pair.xml", "cube.xml"):
+        (tmp_path / name.replace("scissored_pair", "mine")).write_text(
+            (folder("models") / name).read_text(encoding="utf-8"), encoding="utf-8"
+        )
+    (tmp_path / "s.toml").write_text(
+        f'[scenario]\nduration_s = 0.2\nplant.model = "mine.xml"\n[sweep]\nworlds = 2\n[vary]\n"{BIAS}" = [0, 0.5]\n',
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    said = cmg_mj("sweep", tmp_path / "s.toml", "--set", "controller.feedback=truth", "--worlds", 3, "--out", out)
+    assert said.status == 0
+    fields = tomllib.loads((out / "study.toml").read_text(encoding="utf-8"))
+    assert (fields["scenario"]["controller"]["feedback"], fields["sweep"]["worlds"]) == ("truth", 3)
+    wrong = cmg_mj("sweep", tmp_path / "s.toml", "--set", "controller.feedbak=truth", "--plan")
+    assert (wrong.status, "controller.feedbak: no such field" in wrong.complaint) == (2, True)
 
 
 def test_a_plan_runs_nothing(tmp_path: Path) -> None:
