@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from typing import Any
 
+from cmg_mj.pool import pools
 from cmg_mj.sweeps.study import CHUNK, Chunk, Study
 from cmg_mj.sweeps.work import compute
 
-TRIALS, SECONDS = 256, 1.5
-"""Of each observer's piece: so many trials stand for a chunk, and are run for so long once they have begun."""
+TRIALS, SECONDS, STRETCHES = 256, 1.5, 8
+"""So many trials stand for a chunk and are run for so long once they have begun, in so many places."""
 MB_AT_LEAST, MB_A_WORLD, MB_A_WORLD_S, MB_A_POINT, BYTES_A_TRIAL = 230.0, 0.015, 0.008, 0.12, 200.0
 """Of the process with its pictures; of each of a chunk's trials and its seconds, and of its points; of all trials.
 
@@ -25,7 +25,7 @@ class _Enough(KeyboardInterrupt):
 
 def expected(study: Study) -> dict[str, Any]:
     """Points, trials, chunks; minutes on this machine and memory, as far as a piece of every observer can say."""
-    seconds = sum(_seconds_a_trial(study, place) for place in range(len(study.observers)))
+    seconds = sum(_seconds_a_trial(study, observer) for observer in study.observers)
     of_a_chunk = min(CHUNK, len(study.points) * study.worlds)
     rigs = min(len(study.points), -(-of_a_chunk // study.worlds))
     return {
@@ -42,13 +42,19 @@ def expected(study: Study) -> dict[str, Any]:
     }
 
 
-def _seconds_a_trial(study: Study, place: int) -> float:
-    """Of an observer, by the first trials of its middle chunk: what it takes to make them ready, and their pace."""
-    chunks = study.chunks
-    of_one = len(chunks) // len(study.observers)
-    whole: Chunk = chunks[place * of_one + of_one // 2]
-    piece = dataclasses.replace(whole, trials=whole.trials[:TRIALS])
-    start = time.perf_counter()
+def _seconds_a_trial(study: Study, observer: str) -> float:
+    """Of an observer, by some of its trials; by several stretches of them if not all can run in one batch."""
+    trials = len(study.points) * study.worlds
+    pooled = all(pools(field) for axis in study.axes for field in axis.fields)
+    stretches = 1 if pooled else min(STRETCHES, trials)
+    count = min(TRIALS, trials // stretches)
+    starts = [trials * i // stretches for i in range(stretches)]
+    taken = [_seconds(study, Chunk(0, observer, study.chunks.stretch(first, count))) for first in starts]
+    return sum(taken) / len(taken) / count
+
+
+def _seconds(study: Study, piece: Chunk) -> float:
+    """What a piece takes, by what makes it ready and by its pace once it has begun."""
     begun: list[tuple[float, float]] = []
 
     def tick(share: float) -> None:
@@ -57,12 +63,12 @@ def _seconds_a_trial(study: Study, place: int) -> float:
         if now - begun[0][0] > SECONDS:
             raise _Enough
 
+    start = time.perf_counter()
     try:
         compute(study, piece, tick)
-        taken = time.perf_counter() - start
     except KeyboardInterrupt:
         (first, at), (last, to) = begun[0], begun[-1]
         if last - first <= SECONDS:  # Ctrl-C
             raise
-        taken = first - start + (last - first) / (to - at)
-    return taken / len(piece.trials)
+        return first - start + (last - first) / (to - at)
+    return time.perf_counter() - start

@@ -67,10 +67,14 @@ class Chunks:
         if not 0 <= number < len(self):
             raise IndexError(number)
         observer, piece = divmod(number, self._of_one)
-        first = piece * CHUNK
+        trials = self.stretch(piece * CHUNK, self.size(number))
+        return Chunk(number, self.study.observers[observer], trials)
+
+    def stretch(self, first: int, count: int) -> tuple[tuple[int, int], ...]:
+        """So many of an observer's trials from one on, in the order in which they are run."""
         order, worlds = self.study._order, self.study.worlds
-        places = (divmod(place, worlds) for place in range(first, first + self.size(number)))
-        return Chunk(number, self.study.observers[observer], tuple((int(order[at]), world) for at, world in places))
+        places = (divmod(place, worlds) for place in range(first, first + count))
+        return tuple((int(order[at]), world) for at, world in places)
 
     def size(self, number: int) -> int:
         """How many trials a chunk has."""
