@@ -12,7 +12,7 @@ from cmg_mj.summary_keys import KEYS, heading
 from cmg_mj.sweeps.cells import Trials
 from cmg_mj.sweeps.drawn import SHOWN
 from cmg_mj.sweeps.indices import FEWEST, LOG_RATIO, LOST
-from cmg_mj.sweeps.order import JUDGED, Held, figures_of, order_of_points, pairs_of
+from cmg_mj.sweeps.order import JUDGED, Held, by_quarters, figures_of, order_of_points, pairs_of
 from cmg_mj.sweeps.study import Study
 
 ABOUT_MAPS = (
@@ -62,7 +62,8 @@ def order(trials: Trials, rows: Sequence[dict[str, Any]], most: int) -> list[str
         markdown.table(headings, table, text_columns=2),
     ]
     if study.design != "grid":
-        return [*parts, "Every point is in order.parquet."]
+        quarters = _quarters(trials) if study.design == "sample" else []
+        return [*parts, *quarters, "Every point is in order.parquet."]
     fields = [axis.field for axis in study.axes]
     rows = [row for row in rows if row["figure"] == JUDGED[0]]
     table = [
@@ -73,6 +74,22 @@ def order(trials: Trials, rows: Sequence[dict[str, Any]], most: int) -> list[str
     parts.append(markdown.table([*fields, "worlds", *HEADINGS_OF_A_SHARE], table, text_columns=0))
     more = len(rows) - most
     return parts if more <= 0 else [*parts, f"{more} points more are in order.parquet."]
+
+
+def _quarters(trials: Trials) -> list[str]:
+    """Where in the fields' ranges the order holds."""
+    key = figures_of(trials)[0]
+    table = [
+        [
+            field,
+            f"{low:.4g} to {high:.4g}" if low < high else f"{low:.4g}",
+            f"{held.times} of {held.of}",
+            *_interval(held.share),
+        ]
+        for field, low, high, held in by_quarters(trials, key)
+    ]
+    said = f"By the {heading(key)}, by each quarter of a field's range, or each value of a list:"
+    return [said, markdown.table(["field", "values", "points", *HEADINGS_OF_A_SHARE], table, text_columns=2)]
 
 
 def _points(held: Held, study: Study) -> list[str]:

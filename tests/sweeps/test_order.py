@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.sweeps.order import order_of_points, order_rows
+from cmg_mj.sweeps.order import by_quarters, order_of_points, order_rows
 from cmg_mj.sweeps.report_parts import order as said
-from tests.sweeps.made_up import BIAS, VELOCITY, made_up
+from tests.sweeps.made_up import BIAS, NOISE, VELOCITY, made_up
 
 NAMES = ("linear", "ltv", "homogeneous")
 ORDER = ("homogeneous", "ltv", "linear")
@@ -64,6 +64,25 @@ def test_points_by_their_means() -> None:
     assert order_of_points(trials, VELOCITY, ORDER) == (1, 3)
     assert order_of_points(trials, VELOCITY, ("homogeneous", "ltv")) == (3, 3)  # a fall is worse
     assert order_of_points(trials, VELOCITY, ("ltv", "linear")) == (1, 3)
+
+
+def test_by_quarters_of_a_range_and_values_of_a_list() -> None:
+    """It holds where a field is above its lower half; the other one does not matter."""
+    trials = made_up(
+        {BIAS: "0:4", NOISE: "100,200"},
+        NAMES,
+        2,
+        lambda p, name, _: float(ORDER.index(name) if p[BIAS] > 2.0 else -ORDER.index(name)),
+        order=ORDER,
+        design="sample",
+        n=64,
+    )
+    rows = by_quarters(trials, VELOCITY)
+    assert [row[0] for row in rows] == [BIAS] * 4 + [NOISE] * 2
+    assert [row[3] for row in rows[:4]] == [(0, 16), (0, 16), (16, 16), (16, 16)]
+    assert rows[0][2] <= 1.0 <= rows[1][1]
+    assert [(row[1], row[2], row[3].of) for row in rows[4:]] == [(100, 100, 32), (200, 200, 32)]
+    assert "quarter" in said(trials, order_rows(trials), 60)[-3]
 
 
 @pytest.mark.parametrize(
