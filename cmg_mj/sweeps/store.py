@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import tomli_w
 
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.experiment import prepare
+from cmg_mj.sweeps.identity import resolved
 from cmg_mj.sweeps.memory import give_back
 from cmg_mj.sweeps.study import Study
 from cmg_mj.sweeps.trials import schema_of, table_of, write_table, write_tables
@@ -129,19 +129,6 @@ def _inside(on_progress: Callable[[float], None], done: int, size: int, share: f
 def merged(store: Store, path: Path) -> None:
     """Write all trials of a finished sweep as one file."""
     write_tables(path, schema_of(store.study), store.tables())
-
-
-def resolved(study: Study) -> dict[str, Any]:
-    """The study with every default of its scenario written out: it reruns from that."""
-    fields = prepare(study.scenario).resolved()
-    for field in (field for axis in study.axes for field in axis.fields):
-        section, _, name = field.rpartition(".")
-        if field == "plant.timestep_s" or section != "plant":
-            continue
-        fields["plant"].pop(name, None)
-    if study.scenario.plant.timestep_s is None:
-        fields["plant"].pop("timestep_s", None)
-    return study.as_fields(fields)
 
 
 def _write(path: Path, fields: Mapping[str, Any]) -> None:

@@ -49,6 +49,28 @@ def test_the_files_of_a_sweep(tmp_path: Path) -> None:
     assert "12 of 12 trials are there from before" in goes_on.err
 
 
+WEIGHTS = "controller.lqr.state_cost"
+
+
+@pytest.mark.parametrize(
+    "varied",
+    [
+        ["--set", f"{WEIGHTS}=[286, 3, 0, 0.08]", "--vary", "plant.flywheel_speed_rad_s=200,314"],
+        ["--vary", f"{WEIGHTS}=[286,3,0,0.08],[500,3,0,0.08]"],
+        ["--set", f"{WEIGHTS}=[286, 3, 0, 0.08]", "--vary", "controller.lqr.input_cost=1,3"],
+    ],
+)
+def test_gains_that_are_solved_for_rerun_from_their_weights(tmp_path: Path, varied: list[str]) -> None:
+    out, again = tmp_path / "out", tmp_path / "again"
+    pushed = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2", "--worlds", 2]
+    assert cmg_mj("sweep", "push_recovery", *varied, *pushed, "--out", out).status == 0
+    assert cmg_mj("sweep", out / "study.toml", "--out", again).status == 0
+    first = pq.read_table(out / "trials.parquet")
+    assert first.equals(pq.read_table(again / "trials.parquet"))
+    commands = first["command_rms_rad_s"].to_pylist()
+    assert commands[0] != commands[2]
+
+
 def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
     """Another order is no other study, and none leaves none behind."""
     out = tmp_path / "out"
