@@ -23,25 +23,29 @@ LARGEST_COUNT = 10_000
 """Of copies of an element and of a picture's pixels in a row; MuJoCo makes all of them before it looks at them."""
 
 
-def check_files(path: Path) -> None:
+def check_files(path: Path) -> list[Path]:
     """Refuse a model that names what is no ordinary file, or that contains itself.
 
     Args:
         path: The model's file.
 
+    Returns:
+        The file and those it names, as far as they are there.
+
     Raises:
         InputError: It does.
     """
-    _check(path, path, ())
+    return list(dict.fromkeys(_checked(path, path, ())))
 
 
-def _check(path: Path, root: Path, within: tuple[Path, ...]) -> None:
+def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[Path]:
     here = path.resolve()
     if here in within:
         raise InputError(
             f"{root}: contains itself: {' in '.join(p.name for p in (*within[within.index(here) :], here))}"
         )
     text = _COMMENT.sub("", _text(path, root))
+    yield path
     for element, name, count in _COUNT.findall(text):
         if math.prod(int(number) for number in re.findall(r"\d{1,20}", count)) > LARGEST_COUNT:
             raise InputError(f"{root}: <{element} {name}={count!r}>: at most {LARGEST_COUNT} are allowed")
@@ -56,8 +60,10 @@ def _check(path: Path, root: Path, within: tuple[Path, ...]) -> None:
             if file.exists() and not file.is_file():
                 raise InputError(f"{root}: <{element} {name}={value!r}>: is no ordinary file")
             if element in _XML and file.is_file():
-                _check(file, root, (*within, here))
+                yield from _checked(file, root, (*within, here))
                 break
+            if file.is_file():
+                yield file
 
 
 def _places(value: str, path: Path, root: Path, folders: list[str]) -> Iterator[Path]:

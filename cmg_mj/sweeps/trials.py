@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from cmg_mj.summary_keys import KEYS
 from cmg_mj.sweeps.study import Study
@@ -71,14 +72,21 @@ def as_table(rows: Iterable[Mapping[str, Any]], schema: pa.Schema) -> pa.Table:
     return pa.table({name: column(name) for name in schema.names}, schema=schema)
 
 
-def write_table(path: Path, table: pa.Table) -> None:
-    """Write Parquet, whole or not at all; a power cut is too late for it, too."""
-    import pyarrow.parquet as pq
-
+@contextmanager
+def lasting(path: Path) -> Iterator[BinaryIO]:
+    """A file to write, whole or not at all; a power cut is too late for it, too."""
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        pq.write_table(table, file)
+        yield file
         file.flush()
         os.fsync(file.fileno())
+
+
+def write_table(path: Path, table: pa.Table) -> None:
+    """Write Parquet that lasts."""
+    import pyarrow.parquet as pq
+
+    with lasting(path) as file:
+        pq.write_table(table, file)
 
 
 def as_bytes(table: pa.Table) -> bytes:
