@@ -48,11 +48,13 @@ class Outcome:
         kind: `done`, `fell`, `stopped` (observer or plant failed) or `interrupted`.
         time_s: When [s].
         reason: In words, for `stopped`.
+        with_others: Whether what stopped it stopped all worlds of its batch that still ran: it may be another's fault.
     """
 
     kind: Literal["done", "fell", "stopped", "interrupted"]
     time_s: float
     reason: str = ""
+    with_others: bool = False
 
     @property
     def fell(self) -> bool:
@@ -283,7 +285,8 @@ def simulate(
                     if on_progress:
                         on_progress((step + count) * timestep)
     except RunStopped as error:
-        ends = [end or Outcome("stopped", step * timestep, str(error)) for end in ends]
+        shared = len(ends) > 1
+        ends = [end or Outcome("stopped", step * timestep, str(error), shared) for end in ends]
     except KeyboardInterrupt:
         ends = [end or Outcome("interrupted", step * timestep) for end in ends]
     rows.flush()

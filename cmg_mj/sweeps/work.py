@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -97,16 +97,55 @@ def _run(
     trials: Sequence[tuple[int, int]],
     tick: Callable[[float], None] | None,
     threads: int,
-) -> Iterable[dict[str, Any]]:
-    worlds = [world for _, world in trials]
+) -> list[dict[str, Any]]:
+    """Rows of trials that run in one batch; where one raises, those that it stopped run again, without it at last.
+
+    They are halved until each of them is through or has raised by itself, so that no row depends on another's.
+    """
+    rows: dict[int, dict[str, Any]] = {}
+    onward = _onward(tick) if tick else None
+    parts = [list(range(len(trials)))]
+    while parts:
+        part = parts.pop()
+        own = _run_once([experiments[i] for i in part], [trials[i][1] for i in part], onward, threads)
+        rows |= {i: row for i, row in zip(part, own, strict=True) if row is not None}
+        again = [i for i in part if i not in rows]
+        half = (len(again) + 1) // 2
+        parts += [some for some in (again[half:], again[:half]) if some]
+    return [rows[i] for i in range(len(trials))]
+
+
+def _run_once(
+    experiments: Sequence[Experiment],
+    worlds: Sequence[int],
+    tick: Callable[[float], None] | None,
+    threads: int,
+) -> list[dict[str, Any] | None]:
+    """Rows of one batch; None for a trial that may have been stopped by another one."""
     try:
         result: Result = run_together(experiments, worlds, keep_trajectory=False, on_progress=tick, threads=threads)
     except Exception as error:  # a user's observer may fail in any way
-        return [_unfinished("stopped", raised(error)) for _ in trials]
+        alone = len(worlds) == 1
+        return [_unfinished("stopped", raised(error)) if alone else None for _ in worlds]
     if any(outcome.kind == "interrupted" for outcome in result.outcomes):
         raise KeyboardInterrupt
     taken = {"observer", "rides_along_in", "world", "seed"}
-    return [{key: value for key, value in row.items() if key not in taken} for row in result.rows()]
+    return [
+        None if outcome.with_others else {key: value for key, value in row.items() if key not in taken}
+        for outcome, row in zip(result.outcomes, result.rows(), strict=True)
+    ]
+
+
+def _onward(tick: Callable[[float], None]) -> Callable[[float], None]:
+    """The same, told of no time before the latest: what runs again is no step back."""
+    latest = 0.0
+
+    def told(time: float) -> None:
+        nonlocal latest
+        latest = max(latest, time)
+        tick(latest)
+
+    return told
 
 
 def _pool_of(experiment: Experiment) -> str:

@@ -11,10 +11,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.experiment import prepare
+from cmg_mj.experiment import Experiment, prepare, run_together
 from cmg_mj.observers import Estimate, Measurement
 from cmg_mj.scenario import load_scenario
+from cmg_mj.simulate import Result
 from cmg_mj.sweeps import study as study_module
+from cmg_mj.sweeps import work
 from cmg_mj.sweeps.axes import parse_axis
 from cmg_mj.sweeps.store import Store, merged, run
 from cmg_mj.sweeps.study import Study
@@ -104,7 +106,7 @@ def test_values_that_do_not_fit_are_rows_with_a_reason() -> None:
 
 
 class Fails:
-    """Raises where a rig is tilted far."""
+    """Raises where any rig is tilted far; loses itself where one is tilted farther."""
 
     def __init__(self, dt: float, model: object) -> None:
         pass
@@ -113,18 +115,57 @@ class Fails:
         return None
 
     def step(self, state: None, y: Measurement, u: float) -> tuple[None, Estimate]:
-        if np.any(np.abs(y.y1) > 0.1):
+        if np.any((np.abs(y.y1) > 0.06) & (np.abs(y.y1) < 0.12)):
             raise ZeroDivisionError("too far")
-        return None, Estimate(y.y1, 0.0 * y.y1, y.y2)
+        return None, Estimate(y.y1, np.where(np.abs(y.y1) < 0.12, 0.0, np.nan) * y.y1, y.y2)
+
+
+FAILS = "tests.sweeps.test_trials:Fails"
 
 
 def test_an_observer_that_raises_costs_its_own_trials_alone() -> None:
-    of = study({"plant.initial_tilt_deg": "0,15"}, ("tests.sweeps.test_trials:Fails", "linear"))
-    rows = all_trials(of).to_pylist()
-    outcomes = {(row["observer"], row["outcome"]) for row in rows}
-    assert ("linear", "done") in outcomes
-    assert ("tests.sweeps.test_trials:Fails", "stopped") in outcomes
-    assert any("too far" in (row["reason"] or "") for row in rows)
+    """Its neighbours in the batch have the figures, and the ends, of their own runs."""
+    tilts = {"plant.initial_tilt_deg": "0,5,0.5,10,1"}
+    rows = all_trials(study(tilts, (FAILS,), 3)).to_pylist()
+    assert [row["outcome"] for row in rows[::3]] == ["done", "stopped", "done", "stopped", "done"]
+    for number, row in enumerate(rows):
+        tilt = tilts["plant.initial_tilt_deg"].split(",")[number // 3]
+        alone = all_trials(study({"plant.initial_tilt_deg": tilt}, (FAILS,), 3)).to_pylist()[number % 3]
+        assert row == alone | {"point": number // 3}
+    assert all("raised ZeroDivisionError: too far at t = " in row["reason"] for row in rows[3:6])
+    assert all("not finite" in row["reason"] for row in rows[9:12])
+
+
+def test_an_observer_that_raises_at_a_rig_that_lies_costs_nothing() -> None:
+    """It goes on being told of a world of its batch that has fallen."""
+    scenario = load_scenario("push_recovery", [*SETTINGS, "metrics.fall_angle_deg=3"])
+    tilt = "plant.initial_tilt_deg"
+    rows = all_trials(Study(scenario, (parse_axis(tilt, "0,5", tilt),), (FAILS,), 1)).to_pylist()
+    assert [row["outcome"] for row in rows] == ["done", "fell"]
+
+
+def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    batches = []
+
+    def fails(experiments: list[Experiment], worlds: list[int], **options: object) -> Result:
+        batches.append(len(worlds))
+        if any(each.scenario.plant.initial_tilt_deg == 5.0 for each in experiments):
+            raise MemoryError("not in there")
+        return run_together(experiments, worlds, **options)
+
+    monkeypatch.setattr(work, "run_together", fails)
+    told = []
+    of = study({"plant.initial_tilt_deg": "0,5,1,2"}, ("linear",), 1)
+    rows = work.compute(of, of.chunks[0], told.append)
+    assert [(row["outcome"], row["reason"] or "") for row in rows] == [
+        ("done", ""),
+        ("stopped", "MemoryError: not in there"),
+        ("done", ""),
+        ("done", ""),
+    ]
+    assert batches == [4, 2, 1, 1, 2]
+    assert told == sorted(told)  # what runs again is no step back
+    assert told[-1] == pytest.approx(1.0)
 
 
 def test_columns_are_those_of_a_worlds_table() -> None:
