@@ -105,7 +105,7 @@ def index_rows(trials: Trials) -> list[dict[str, Any]]:
     fields = [axis.field for axis in study.axes]
     rows = []
     for figure, observer, values, outcome in _quantities(trials):
-        why = _refused(values, outcome)
+        why = _refused(values, outcome, study.n)
         found = None if why else indices(values.mean(axis=1), study.n, study.scenario.seed)
         for i, field in enumerate(fields):
             row: dict[str, Any] = {"figure": figure, "observer": observer, "field": field}
@@ -123,7 +123,7 @@ def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarr
     observers = trials.study.observers
     for key in FIGURES:
         values = trials.figure(key)
-        if np.isfinite(values.mean(axis=2)).any() or not trials.stood.any():  # not an error in the window of no push
+        if np.isfinite(values).any() or not trials.stood.any():  # not an error in the window of no push
             for place, observer in enumerate(observers):
                 yield key, observer, values[:, place], trials.outcome[:, place]
     for place, observer in enumerate(observers):
@@ -136,11 +136,20 @@ def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarr
             yield f"{LOG_RATIO}{key}", f"{better} / {worse}", log_ratio(trials, key, better, worse), outcome
 
 
-def _refused(values: np.ndarray, outcome: np.ndarray) -> str | None:
-    """Why a quantity has no indices, with counts."""
+def _refused(values: np.ndarray, outcome: np.ndarray, n: int) -> str | None:
+    """Why a quantity has no indices, with counts; of a design of n rows."""
     means = values.mean(axis=1)
     if np.isfinite(means).all():
-        return None if np.ptp(means) > 0.0 else "the same at every point"
+        if np.ptp(means) == 0.0:
+            return "the same at every point"
+        independent = 2 * n  # A and B, of which the variance is taken
+        if np.ptp(means[:independent]) > 0.0:
+            return None
+        others = int((means[independent:] != means[0]).sum())
+        return (
+            f"the same at all {independent} independent points of the design: no variance to share out "
+            f"(another value at {others} of the {len(means) - independent} made of them; take more rows)"
+        )
     fell = int((outcome == "fell").sum())
     stopped = int(((outcome != "done") & (outcome != "fell")).sum())
     none = int((~np.isfinite(values) & (outcome == "done")).sum())

@@ -122,6 +122,33 @@ def test_refused_with_counts_where_a_world_fell() -> None:
     assert 0 < fell < 256
 
 
+def test_refused_with_counts_where_every_point_has_lost_one_of_its_worlds() -> None:
+    rows = sobol(lambda point, _, world: None if world else point[BIAS])
+    assert {row["observer"] for row in rows} == {"linear", "ltv"}
+    assert {row["refused"] for row in rows} == {"no value at 256 of 256 points: of 512 trials 256 fell"}
+
+
+def test_refused_where_only_points_of_the_crossed_blocks_differ() -> None:
+    """The variance is that of A and B: with none there indices would be 0, from 0 to 0."""
+    points = made_up_points()
+    lost = points[-1]
+    assert lost not in points[:128]
+    trials = made_up(
+        {BIAS: "0:1", NOISE: "100:200"},
+        ("linear",),
+        1,
+        lambda point, *_: None if point == lost else 1.0,
+        design="sobol",
+        n=64,
+    )
+    for row in (row for row in index_rows(trials) if row["figure"] == LOST):
+        assert row["total"] is None
+        assert row["refused"] == (
+            "the same at all 128 independent points of the design: no variance to share out "
+            "(another value at 1 of the 128 made of them; take more rows)"
+        )
+
+
 def made_up_points() -> list[dict[str, Any]]:
     trials = made_up({BIAS: "0:1", NOISE: "100:200"}, ("linear",), 1, lambda *_: 1.0, design="sobol", n=64)
     return list(trials.study.points)
