@@ -18,11 +18,11 @@ from cmg_mj.sweeps.trials import as_table, point_columns
 if TYPE_CHECKING:
     import pyarrow as pa
 
-FIGURES = [key for key, of in KEYS.items() if of.compared and of.better and not key.endswith("_fraction")]
+COMPARED = [key for key, of in KEYS.items() if of.compared and of.better and not key.endswith("_fraction")]
 """Of which a cell has the mean, and how far it is behind the best observer's."""
 
 
-COLUMNS = ["point", "observer", "world", "outcome", *FIGURES]
+COLUMNS = ["point", "observer", "world", "outcome", *COMPARED]
 """Of the trials, by which cells are made."""
 BLOCK = 1024
 """Cells whose rows are held together."""
@@ -45,7 +45,7 @@ class Trials:
         self.study = study
         shape = (len(study.points), len(study.observers), study.worlds)
         self.outcome = np.full(shape, "", dtype=object)
-        self._figures = {key: np.full(shape, math.nan) for key in FIGURES}
+        self._figures = {key: np.full(shape, math.nan) for key in COMPARED}
         place = {name: i for i, name in enumerate(study.observers)}
         for table in tables:
             observers = _texts(table["observer"])
@@ -54,6 +54,11 @@ class Trials:
             for key, values in self._figures.items():
                 values[at] = table[key].to_numpy(zero_copy_only=False)
         self.stood = self.outcome == "done"
+
+    @property
+    def fell(self) -> np.ndarray:
+        """Whether each fell, (n_points, n_observers, n_worlds); one refused or stopped neither fell nor stood."""
+        return self.outcome == "fell"
 
     def figure(self, key: str) -> np.ndarray:
         """A figure of every trial, (n_points, n_observers, n_worlds); NaN where the rig did not stand to the end."""
@@ -79,19 +84,21 @@ def cells_of(trials: Trials) -> Iterator[dict[str, Any]]:
     """A row a cell, point by point: how many stood and fell, every figure's mean, and how far it is behind the best.
 
     The best observer of a point is that of the smallest (or largest, where more is better) mean among those that stood
-    in every world; differences are taken world by world.
+    in every world; differences are taken world by world. The share of falls is that among those that fell or stood;
+    a cell of which all trials were refused or stopped has none.
     """
-    figures = {key: trials.figure(key) for key in FIGURES}
+    fallen = trials.fell
+    figures = {key: trials.figure(key) for key in COMPARED}
     for number, point in enumerate(trials.study.points):
         best = {key: _best(values[number], key) for key, values in figures.items()}
         for place, observer in enumerate(trials.study.observers):
-            outcome = trials.outcome[number, place]
-            n, fell = len(outcome), int((outcome == "fell").sum())
-            stood = int((outcome == "done").sum())
-            share = fell_interval(fell, n)
+            n = trials.study.worlds
+            fell, stood = int(fallen[number, place].sum()), int(trials.stood[number, place].sum())
+            share = fell_interval(fell, fell + stood) if fell + stood else None
             row: dict[str, Any] = {"point": number, **point, "observer": observer, "trials": n, "stood": stood}
             row |= {"fell": fell, "stopped": n - stood - fell}
-            row |= {"fell_share": share.mean, "fell_low": share.low, "fell_high": share.high}
+            mean, low, high = share or (None, None, None)
+            row |= {"fell_share": mean, "fell_low": low, "fell_high": high}
             for key, values in figures.items():
                 row |= _with_ends(key, values[number, place])
                 leader = best[key]
@@ -127,7 +134,7 @@ def cells_schema(study: Study) -> pa.Schema:
     ends = ("", "_low", "_high")
     figures = [
         column
-        for key in FIGURES
+        for key in COMPARED
         for column in [
             *((f"{of}{end}", "float64") for of in (key, f"{key}_behind_best") for end in ends),
             (f"{key}_best", "string"),

@@ -14,7 +14,7 @@ from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.summary_keys import heading
 from cmg_mj.sweeps.cells import Trials, fell_interval
-from cmg_mj.sweeps.drawn import SHOWN, fall_shares, round_values, scale_of, ticks_of, title_of
+from cmg_mj.sweeps.drawn import ERRORS, fall_counts, fall_shares, round_values, scale_of, ticks_of, title_of
 
 CURVES = "curves"
 LOGARITHMIC = 10.0
@@ -38,7 +38,7 @@ def curves(trials: Trials, field: str) -> Picture:
         x_ticks=ticks_of(x) if study.design == "grid" else None,
     )
     panels = []
-    for key in SHOWN:
+    for key in ERRORS:
         values = trials.figure(key)[order]
         if np.isfinite(values).any():
             lines = _error_lines(study.observers, x, values)
@@ -46,8 +46,8 @@ def curves(trials: Trials, field: str) -> Picture:
             far = np.nanmin(drawn) > 0.0 and np.nanmax(drawn) > LOGARITHMIC * np.nanmin(drawn)
             more: dict[str, Any] = {"y_scale": "log", "y_ticks": round_values(drawn)} if far else {}
             panels.append(panel(heading(key), lines, **more))
-    if (trials.outcome == "fell").any():
-        lines = _fall_lines(trials, x, fall_shares(trials)[order], scale)
+    if trials.fell.any():
+        lines = _fall_lines(trials, x, order, scale)
         panels.append(panel("share of falls", lines, y_range=(-0.03, 1.03)))
     names = [*study.observers, *([""] * len(panels[0].lines))] if panels else []
     labelled = [replace(line, label=name) for line, name in zip(panels[0].lines, names, strict=False)] if panels else []
@@ -84,16 +84,18 @@ def _around(found: Sequence[Interval]) -> np.ndarray:
     return np.array([[of.mean - of.low for of in found], [of.high - of.mean for of in found]])
 
 
-def _fall_lines(trials: Trials, x: np.ndarray, shares: np.ndarray, scale: Literal["linear", "log"]) -> list[Line]:
-    """A line an observer, of shares (n_points, n_observers); beside each other, as many are 0 or 1 together."""
-    worlds = trials.study.worlds
+def _fall_lines(trials: Trials, x: np.ndarray, order: np.ndarray, scale: Literal["linear", "log"]) -> list[Line]:
+    """A line an observer over x, of points in that order; beside each other, as many are 0 or 1 together."""
+    counts = [found[order] for found in fall_counts(trials)]
+    shares = fall_shares(*counts)
     lines = []
     on_axis = np.log(x) if scale == "log" else x
     step = np.diff(on_axis).min(initial=math.inf)
     for place, name in enumerate(trials.study.observers):
         aside = ASIDE * (step if math.isfinite(step) else 0.0) * (place / max(1, len(trials.study.observers) - 1) - 0.5)
         at = np.exp(on_axis + aside) if scale == "log" else on_axis + aside
-        of = shares[:, place]
-        found = [UNKNOWN if math.isnan(share) else fell_interval(round(share * worlds), worlds) for share in of]
-        lines.append(Line(at, of, style=".-", color=name, spread=_around(found), bars=True))
+        found = [
+            fell_interval(fell, of) if of else UNKNOWN for fell, of in zip(*(n[:, place] for n in counts), strict=True)
+        ]
+        lines.append(Line(at, shares[:, place], style=".-", color=name, spread=_around(found), bars=True))
     return lines

@@ -10,8 +10,8 @@ import numpy as np
 
 from cmg_mj.sweeps.cells import Trials
 
-SHOWN = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
-"""Figures that are drawn, where a trial has them."""
+ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
+"""Figures that are drawn, and whose indices are shown, where a trial has them; the first is that of the tables."""
 MOST_TICKS = 10
 
 
@@ -52,10 +52,15 @@ def round_values(values: np.ndarray) -> tuple[float, ...]:
     return tuple(levels[:: math.ceil(len(levels) / 7)]) if levels else ()
 
 
-def fall_shares(trials: Trials) -> np.ndarray:
-    """Shares of falls, (n_points, n_observers); NaN where a world stopped, which says neither."""
-    known = (trials.stood | (trials.outcome == "fell")).all(axis=2)
-    return np.where(known, (trials.outcome == "fell").mean(axis=2), math.nan)
+def fall_counts(trials: Trials) -> tuple[np.ndarray, np.ndarray]:
+    """How many worlds fell, and of how many that fell or stood, (n_points, n_observers) each."""
+    fell = trials.fell
+    return fell.sum(axis=2), (fell | trials.stood).sum(axis=2)
+
+
+def fall_shares(fell: np.ndarray, of: np.ndarray) -> np.ndarray:
+    """Shares of falls of such counts; NaN where every world was refused or stopped, which says neither."""
+    return np.divide(fell, of, out=np.full(fell.shape, math.nan), where=of > 0)
 
 
 def title_of(trials: Trials, shown: str = "") -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cmg_mj.intervals import CONFIDENCE
-from cmg_mj.sweeps.cells import FIGURES, Trials
+from cmg_mj.sweeps.cells import COMPARED, Trials
 from cmg_mj.sweeps.order import figures_of, log_ratio, pairs_of
 from cmg_mj.sweeps.trials import as_table
 
@@ -121,7 +121,7 @@ def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarr
     Every observer's figures; how often it did not stand; and by a named order the logarithm of the ratio of two errors.
     """
     observers = trials.study.observers
-    for key in FIGURES:
+    for key in COMPARED:
         values = trials.figure(key)
         if np.isfinite(values).any() or not trials.stood.any():  # not an error in the window of no push
             for place, observer in enumerate(observers):

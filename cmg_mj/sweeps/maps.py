@@ -10,9 +10,9 @@ from cmg_mj.intervals import known_interval
 from cmg_mj.picture import Map, Panel, Picture
 from cmg_mj.summary_keys import heading
 from cmg_mj.sweeps.cells import Trials, fell_interval
-from cmg_mj.sweeps.drawn import SHOWN, fall_shares, round_values, scale_of, ticks_of, title_of
+from cmg_mj.sweeps.drawn import ERRORS, fall_counts, fall_shares, round_values, scale_of, ticks_of, title_of
 
-MAPS = {SHOWN[0]: "map_velocity_error", SHOWN[1]: "map_push_error", "fell": "map_falls"}
+MAPS = {ERRORS[0]: "map_velocity_error", ERRORS[1]: "map_push_error", "fell": "map_falls"}
 """Figure -> its picture."""
 
 
@@ -27,15 +27,16 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
         """(n_points, ...) -> (n_y, n_x, ...); points go through the second field first."""
         return of.reshape(len(x), len(y), *of.shape[1:]).swapaxes(0, 1)[y_order][:, x_order]
 
-    shares = gridded(fall_shares(trials))
+    fell, of = (gridded(counts) for counts in fall_counts(trials))
+    shares = fall_shares(fell, of)
     halves = {name: shares[:, :, i] for i, name in enumerate(study.observers)}
-    boundaries = {name: of for name, of in halves.items() if (of < 0.5).any() and (of > 0.5).any()}
+    boundaries = {name: half for name, half in halves.items() if (half < 0.5).any() and (half > 0.5).any()}
     found = []
     for key, name in MAPS.items():
         if key == "fell":
-            if not (trials.outcome == "fell").any():
+            if not trials.fell.any():
                 continue
-            best, sure, least = _least_falls(shares, study.worlds)
+            best, sure, least = _least_falls(fell, of)
             label, value, levels, nobody = "share of falls", "share", (0.1, 0.9), "several alike"
         else:
             figure = gridded(trials.figure(key))
@@ -74,16 +75,17 @@ def _least_error(figure: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return best, sure, least
 
 
-def _least_falls(shares: np.ndarray, worlds: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _least_falls(fell: np.ndarray, of: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Who falls the least, unless several do, (n_y, n_x, n_observers) -> (n_y, n_x) each.
 
     Surely, if its Wilson interval is below those of all others.
     """
+    shares = fall_shares(fell, of)
     best, least = _smallest(shares)
     best[(shares == least[:, :, None]).sum(axis=2) > 1] = -1
     sure = np.zeros(best.shape, dtype=bool)
     for at in zip(*np.nonzero(best >= 0), strict=True):
-        found = [fell_interval(round(share * worlds), worlds) for share in shares[at] if np.isfinite(share)]
+        found = [fell_interval(n, known) for n, known in zip(fell[at], of[at], strict=True) if known]
         low = sorted(found, key=lambda interval: interval.mean)
         sure[at] = all(low[0].high < other.low for other in low[1:])
     return best, sure, least

@@ -10,7 +10,7 @@ from cmg_mj.intervals import Interval
 from cmg_mj.picture import Picture
 from cmg_mj.summary_keys import KEYS, heading
 from cmg_mj.sweeps.cells import Trials
-from cmg_mj.sweeps.drawn import SHOWN
+from cmg_mj.sweeps.drawn import ERRORS
 from cmg_mj.sweeps.indices import FEWEST, LOG_RATIO, LOST
 from cmg_mj.sweeps.order import JUDGED, Held, by_quarters, figures_of, order_of_points, pairs_of
 from cmg_mj.sweeps.study import Study
@@ -32,7 +32,7 @@ def pictures(trials: Trials, drawn: Sequence[Picture]) -> list[str]:
     if not drawn:
         return []
     is_map = any(panel.map is not None for picture in drawn for panel in picture.panels)
-    falls = [] if (trials.outcome == "fell").any() else ["No world fell."]
+    falls = [] if trials.fell.any() else ["No world fell."]
     return [
         *(f"![{picture.title}]({picture.name}.png)" for picture in drawn),
         ABOUT_MAPS if is_map else ABOUT_CURVES,
@@ -122,7 +122,7 @@ def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
     if study.n < FEWEST:
         about += f" Of fewer than {FEWEST} rows the intervals are too narrow, and nothing is called decisive."
     parts = ["## What the errors depend on: Sobol indices", about]
-    titles = {key: heading(key) for key in SHOWN} | {LOST: "share of worlds that fell or stopped"}
+    titles = {key: heading(key) for key in ERRORS} | {LOST: "share of worlds that fell or stopped"}
     titles |= {f"{LOG_RATIO}{key}": f"logarithm of the ratio: {heading(key)}" for key in JUDGED}
     for key, title in titles.items():
         of = [row for row in rows if row["figure"] == key]
@@ -140,7 +140,7 @@ def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
 
 def indices_in_short(rows: Sequence[dict[str, Any]]) -> str:
     """The total indices of those figures, or why there are none."""
-    columns = [(key, f"total index, {KEYS[key].label}") for key in SHOWN if any(row["figure"] == key for row in rows)]
+    columns = [(key, f"total index, {KEYS[key].label}") for key in ERRORS if any(row["figure"] == key for row in rows)]
     of = {(row["observer"], row["field"], row["figure"]): row for row in rows}
     table = [
         [observer, field, *(_total(of[observer, field, key]) for key, _ in columns)]

@@ -12,7 +12,7 @@ import pytest
 from cmg_mj.map_plot import edges
 from cmg_mj.picture import Map, Picture
 from cmg_mj.plots import draw
-from cmg_mj.sweeps.cells import Trials
+from cmg_mj.sweeps.cells import Trials, fell_interval
 from cmg_mj.sweeps.drawn import is_logarithmic, round_values
 from cmg_mj.sweeps.pictures import NAMES, pictures_of
 from tests.sweeps.made_up import BIAS, NOISE, RATE, made_up
@@ -63,13 +63,29 @@ def test_a_map_has_the_best_of_every_cell() -> None:
 
 
 def test_a_stop_is_no_share_of_falls() -> None:
-    """A world that stopped neither fell nor stood: its cell has no share."""
+    """A world that stopped neither fell nor stood: the share is that of the others, and of none there is none."""
     trials = on_a_grid()
-    trials.outcome[0, 0, 0] = "stopped"
+    trials.outcome[0, 0, :] = "stopped"
+    trials.outcome[3, 1, 0] = "stopped"  # one of the three of four that fell at 1 degree and 400
     trials.stood = trials.outcome == "done"
     drawn = the_map(pictures_of(trials)[0])
     assert math.isnan(drawn.boundaries["linear"][2, 0])
     assert drawn.best[2, 0] == 1
+    assert drawn.boundaries["ltv"][2, 1] == pytest.approx(2.0 / 3.0)
+
+
+def test_a_curve_of_falls_is_of_those_that_fell_or_stood() -> None:
+    """The interval, too."""
+    trials = made_up({NOISE: "100,200"}, OBSERVERS, 4, lambda p, name, w: error({BIAS: 1, **p}, name, w))
+    trials.outcome[0, 1, 0] = "stopped"
+    trials.outcome[1, 1, :] = "refused"
+    trials.stood = trials.outcome == "done"
+    (picture,) = pictures_of(trials)
+    line = picture.panels[-1].lines[1]
+    assert np.asarray(line.y) == pytest.approx([2.0 / 3.0, math.nan], nan_ok=True)
+    below, above = np.asarray(line.spread)[:, 0]
+    interval = fell_interval(2, 3)
+    assert (2.0 / 3.0 - below, 2.0 / 3.0 + above) == pytest.approx((interval.low, interval.high))
 
 
 def test_one_field_makes_curves() -> None:
