@@ -47,17 +47,20 @@ def order_at(trials: Trials, key: str) -> list[Held]:
 
     Args:
         trials: The trials.
-        key: The figure that decides. A fall or a stop is worse than any.
+        key: The figure that decides. A fall is worse than any.
 
     Returns:
-        A point each. A world in which two next to each other did not stand cannot tell, unless the others break
-        the order.
+        A point each. A world in which two next to each other fell cannot tell, unless the others break the order;
+        nor can one in which a trial was refused or stopped, whatever the others are: that is no merit of theirs.
     """
     return [_held(values) for values in _errors(trials, key, trials.study.order)]
 
 
 def order_of_points(trials: Trials, key: str, order: Sequence[str]) -> Held:
-    """At how many points it holds for the means over the worlds; one that did not stand in every world has none."""
+    """At how many points it holds for the means over the worlds.
+
+    One that fell in some world is worse than any mean; a point with a trial that was refused or stopped cannot tell.
+    """
     return _held(_errors(trials, key, order).mean(axis=2).T)
 
 
@@ -75,14 +78,14 @@ def log_ratio(trials: Trials, key: str, better: str, worse: str) -> np.ndarray:
 
 
 def _errors(trials: Trials, key: str, order: Sequence[str]) -> np.ndarray:
-    """Of an order's observers, (n_points, n_order, n_worlds); infinite where one did not stand."""
+    """Of an order's observers, (n_points, n_order, n_worlds); infinite where one fell, NaN where nothing is known."""
     places = [trials.study.observers.index(name) for name in order]
-    values = trials.figure(key)[:, places]
-    return np.where(np.isnan(values), np.inf, values)
+    return np.where(trials.fell[:, places], np.inf, trials.figure(key)[:, places])
 
 
 def _held(errors: np.ndarray) -> Held:
-    """Of errors (n_order, n)."""
+    """Of errors (n_order, n); those with a NaN cannot tell."""
+    errors = errors[:, ~np.isnan(errors).any(axis=0)]
     better, worse = errors[:-1], errors[1:]
     holds = (better < worse).all(axis=0)
     broken = ((better >= worse) & np.isfinite(worse)).any(axis=0)

@@ -58,7 +58,8 @@ def order(trials: Trials, rows: Sequence[dict[str, Any]], most: int) -> list[str
     parts = [
         f"## The order {' < '.join(study.order)}",
         "At how many points it holds by the means over the worlds, and in how many worlds. A fall is worse than any "
-        "error; where two next to each other fell nobody can tell, and such points and worlds are left out.",
+        "error. Left out are points and worlds that cannot tell: a trial was refused or stopped, or two next to each "
+        "other fell and the others do not break the order.",
         markdown.table(headings, table, text_columns=2),
     ]
     if study.design != "grid":

@@ -40,6 +40,22 @@ def test_a_world(errors: tuple[float | None, float | None, float | None], held: 
     assert counted(errors) == held
 
 
+@pytest.mark.parametrize("stopped", range(3))
+@pytest.mark.parametrize("others", [(1.0, 2.0, 3.0), (3.0, 2.0, 1.0), (None, 2.0, 3.0)])
+@pytest.mark.parametrize("how", ["stopped", "refused"])
+def test_a_stop_cannot_tell(others: tuple[float | None, ...], stopped: int, how: str) -> None:
+    """It is no error of the observer's that loses, and none of the others' that wins."""
+    errors = {0: others, 1: (1.0, 2.0, 3.0)}
+    trials = made_up({BIAS: "0"}, NAMES, 2, lambda _, name, world: errors[world][ORDER.index(name)], order=ORDER)
+    trials.outcome[0, NAMES.index(ORDER[stopped]), 0] = how
+    trials.stood = trials.outcome == "done"
+    (row,) = order_rows(trials)
+    assert (row["held"], row["worlds"]) == (1, 1)
+    assert order_of_points(trials, VELOCITY, ORDER) == (0, 0)
+    apart = [name for name in ORDER if name != ORDER[stopped]]
+    assert order_of_points(trials, VELOCITY, apart).of == 1
+
+
 def test_the_share_has_wilsons_interval() -> None:
     trials = made_up({BIAS: "0,1"}, NAMES, 10, lambda p, name, w: ORDER.index(name) * (w < 8 or p[BIAS]), order=ORDER)
     first, second = order_rows(trials)
