@@ -12,6 +12,7 @@ import numpy as np
 
 from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.summary_keys import KEYS
+from cmg_mj.sweeps.reasons import Reasons
 from cmg_mj.sweeps.study import Study
 from cmg_mj.sweeps.trials import as_table, point_columns
 
@@ -22,7 +23,7 @@ COMPARED = [key for key, of in KEYS.items() if of.compared and of.better and not
 """Of which a cell has the mean, and how far it is behind the best observer's."""
 
 
-COLUMNS = ["point", "observer", "world", "outcome", *COMPARED]
+COLUMNS = ["point", "observer", "world", "outcome", "reason", *COMPARED]
 """Of the trials, by which cells are made."""
 BLOCK = 1024
 """Cells whose rows are held together."""
@@ -39,18 +40,27 @@ class Trials:
         study: The sweep.
         outcome: How each ended, (n_points, n_observers, n_worlds).
         stood: Whether to the end.
+        reasons: Why some were refused or stopped, counted.
     """
 
     def __init__(self, study: Study, tables: Iterable[pa.Table]) -> None:
+        import pyarrow as pa
+
         self.study = study
         shape = (len(study.points), len(study.observers), study.worlds)
         self.outcome = np.full(shape, "", dtype=object)
         self._figures = {key: np.full(shape, math.nan) for key in COMPARED}
+        self.reasons = Reasons(study.axes[-1].fields[-1])
         place = {name: i for i, name in enumerate(study.observers)}
         for table in tables:
             observers = _texts(table["observer"])
             at = (table["point"].to_numpy(), np.array([place[name] for name in observers]), table["world"].to_numpy())
-            self.outcome[at] = _texts(table["outcome"])
+            outcome = _texts(table["outcome"])
+            self.outcome[at] = outcome
+            unfinished = (outcome != "done") & (outcome != "fell")
+            if unfinished.any():
+                reasons = table["reason"].filter(pa.array(unfinished)).to_pylist()
+                self.reasons.add(zip(outcome[unfinished], reasons, strict=True))
             for key, values in self._figures.items():
                 values[at] = table[key].to_numpy(zero_copy_only=False)
         self.stood = self.outcome == "done"

@@ -18,7 +18,7 @@ from cmg_mj.resources import find
 from cmg_mj.sweeps.study import Study
 
 KEY = b"cmg_mj.chunk"
-ORDER = "order"
+FREE = "order"
 """What a study file says in [sweep] that no trial depends on: another one is no other study."""
 
 
@@ -100,7 +100,7 @@ def as_read(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 def without_asides(fields: Mapping[str, Any]) -> dict[str, Any]:
     """A study's fields without those that may change without its being another."""
-    asides = {"sweep": ORDER, "scenario": "versions"}
+    asides = {"sweep": FREE, "scenario": "versions"}
     return {
         name: {key: value for key, value in part.items() if key != asides[name]} if name in asides else part
         for name, part in fields.items()

@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cmg_mj import markdown
 from cmg_mj.errors import InputError
 from cmg_mj.picture import Picture
 from cmg_mj.plots import draw
 from cmg_mj.run_folder import RunFolder, Writers, write_text
-from cmg_mj.summary_keys import heading, written
-from cmg_mj.sweeps import report_parts
-from cmg_mj.sweeps.cells import Trials, cells_in_blocks, cells_of, cells_schema
+from cmg_mj.sweeps import report_cells, report_parts
+from cmg_mj.sweeps.cells import Trials, cells_in_blocks, cells_schema
 from cmg_mj.sweeps.indices import index_rows, index_table
 from cmg_mj.sweeps.order import order_rows, order_table
 from cmg_mj.sweeps.pictures import NAMES, pictures_of
+from cmg_mj.sweeps.report_cells import CELLS, MOST_ROWS
 from cmg_mj.sweeps.store import GOES_ON, TRIALS, Store, merged
-from cmg_mj.sweeps.study import Study, counted
+from cmg_mj.sweeps.study import counted
 from cmg_mj.sweeps.trials import write_table, write_tables
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-CELLS, ORDER, INDICES, REPORT = "cells.parquet", "order.parquet", "indices.parquet", "report.md"
+ORDER, INDICES, REPORT = "order.parquet", "indices.parquet", "report.md"
 FILES = (TRIALS, CELLS, ORDER, INDICES, REPORT, *NAMES)
 """Those that may be written."""
-SHOWN = "velocity_rms_error_rad_s"
-MOST_ROWS = 60
-"""Of a table on the terminal or in the report; the files have all."""
 
 
 class Found(NamedTuple):
@@ -37,13 +32,11 @@ class Found(NamedTuple):
 
     Attributes:
         trials: Its trials.
-        first: Rows of the cells of the first points, as many as are shown.
         order: A row a point, with a named order.
         indices: A row a figure, observer and field, of a design for them.
     """
 
     trials: Trials
-    first: list[dict[str, Any]]
     order: list[dict[str, Any]]
     indices: list[dict[str, Any]]
 
@@ -53,7 +46,6 @@ def found_of(trials: Trials) -> Found:
     study = trials.study
     return Found(
         trials,
-        list(itertools.islice(cells_of(trials), MOST_ROWS * len(study.observers))),
         order_rows(trials) if study.order else [],
         index_rows(trials) if study.design == "sobol" else [],
     )
@@ -91,46 +83,23 @@ def report(found: Found, pictures: Sequence[Picture]) -> str:
         for n, what in ((len(study.points), "point"), (len(study.observers), "observer"), (study.worlds, "world"))
     )
     parts = [f"# {study.scenario.title or 'Sweep'}", f"{counts}: {counted(study.trials, 'trial')}."]
-    parts += [f"With {axis.field} go, alike: {', '.join(axis.also)}." for axis in study.axes if axis.also]
+    parts += report_cells.varied(study)
     parts += report_parts.pictures(found.trials, pictures)
     if study.order:
         parts += report_parts.order(found.trials, found.order, MOST_ROWS)
     if study.design == "sobol":
         parts += report_parts.indices(study, found.indices)
-    return "\n\n".join(
-        [*parts, "## Cells", f"Mean {heading(SHOWN)}, with the falls:", cells_markdown(study, found.first)]
-    )
+    parts += report_cells.unfinished(found.trials)
+    return "\n\n".join([*parts, *report_cells.cells(found.trials)])
 
 
 def summary(found: Found) -> str:
-    """For the terminal: the table of the cells, then in short how often the order holds, and the total indices."""
+    """For the terminal: the cells, why some trials have no figures, how often the order holds, the total indices."""
     study = found.trials.study
-    parts = [cells_markdown(study, found.first)]
+    parts = [report_cells.in_short(found.trials)]
+    parts += filter(None, [report_cells.unfinished_in_short(found.trials)])
     if study.order:
         parts.append(report_parts.order_in_short(found.trials))
     if study.design == "sobol":
         parts.append(report_parts.indices_in_short(found.indices))
     return "\n\n".join(parts)
-
-
-def cells_markdown(study: Study, cells: Sequence[dict[str, Any]]) -> str:
-    """A row a point, a column an observer."""
-    fields = [axis.field for axis in study.axes]
-    rows = []
-    for number in range(min(MOST_ROWS, len(study.points))):
-        point, first = study.points[number], number * len(study.observers)
-        of = {row["observer"]: row for row in cells[first : first + len(study.observers)]}
-        rows.append([*(_said(point[field]) for field in fields), *(_cell(of[name]) for name in study.observers)])
-    table = markdown.table([*fields, *study.observers], rows, text_columns=0)
-    more = len(study.points) - MOST_ROWS
-    return table if more <= 0 else f"{table}\n\n{more} points more are in {CELLS}."
-
-
-def _cell(row: dict[str, Any]) -> str:
-    fell = f" [{row['fell']} fell]" if row["fell"] else ""
-    stopped = f" [{row['stopped']} stopped]" if row["stopped"] else ""
-    return written(SHOWN, row[SHOWN]) + fell + stopped
-
-
-def _said(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -13,6 +13,7 @@ from cmg_mj.sweeps.cells import Trials
 from cmg_mj.sweeps.drawn import ERRORS
 from cmg_mj.sweeps.indices import FEWEST, LOG_RATIO, LOST
 from cmg_mj.sweeps.order import JUDGED, Held, by_quarters, figures_of, order_of_points, pairs_of
+from cmg_mj.sweeps.report_cells import said
 from cmg_mj.sweeps.study import Study
 
 ABOUT_MAPS = (
@@ -68,7 +69,7 @@ def order(trials: Trials, rows: Sequence[dict[str, Any]], most: int) -> list[str
     fields = [axis.field for axis in study.axes]
     rows = [row for row in rows if row["figure"] == JUDGED[0]]
     table = [
-        [*(_said(row[field]) for field in fields), f"{row['held']} of {row['worlds']}", *_share(row)]
+        [*(said(row[field]) for field in fields), f"{row['held']} of {row['worlds']}", *_share(row)]
         for row in rows[:most]
     ]
     parts.append(f"World by world, by the {heading(JUDGED[0])}:")
@@ -89,28 +90,28 @@ def _quarters(trials: Trials) -> list[str]:
         ]
         for field, low, high, held in by_quarters(trials, key)
     ]
-    said = f"By the {heading(key)}, by each quarter of a field's range, or each value of a list:"
-    return [said, markdown.table(["field", "values", "points", *HEADINGS_OF_A_SHARE], table, text_columns=2)]
+    sentence = f"By the {heading(key)}, by each quarter of a field's range, or each value of a list:"
+    return [sentence, markdown.table(["field", "values", "points", *HEADINGS_OF_A_SHARE], table, text_columns=2)]
 
 
 def _points(held: Held, study: Study) -> list[str]:
     """At how many points an order holds; of a sample with the share and its interval."""
-    said = [f"{held.times} of {held.of}"]
-    if study.design == "sample":
-        said += _interval(held.share)
-    return said
+    times = [f"{held.times} of {held.of}"]
+    return [*times, *_interval(held.share)] if study.design == "sample" else times
 
 
 def order_in_short(trials: Trials) -> str:
     """The same in a sentence, for the figure that comes first."""
     study, key = trials.study, figures_of(trials)[0]
     held = order_of_points(trials, key, study.order)
-    said = f"The order {' < '.join(study.order)}: by the {heading(key)} it holds at {held.times} of {held.of} points"
+    sentence = (
+        f"The order {' < '.join(study.order)}: by the {heading(key)} it holds at {held.times} of {held.of} points"
+    )
     if held.share is not None and study.design == "sample":  # points of a grid are no sample of anything
         share, interval = _interval(held.share)
-        said += f" ({share}, Wilson's 95 % interval {interval})"
+        sentence += f" ({share}, Wilson's 95 % interval {interval})"
     unknown = len(study.points) - held.of
-    return f"{said}; {unknown} points cannot tell." if unknown else f"{said}."
+    return f"{sentence}; {unknown} points cannot tell." if unknown else f"{sentence}."
 
 
 def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -140,20 +141,34 @@ def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def indices_in_short(rows: Sequence[dict[str, Any]]) -> str:
-    """The total indices of those figures, or why there are none."""
-    columns = [(key, f"total index, {KEYS[key].label}") for key in ERRORS if any(row["figure"] == key for row in rows)]
-    of = {(row["observer"], row["field"], row["figure"]): row for row in rows}
+    """The total indices of those figures and of the logarithms of their ratios, and why there are none of others."""
+    of: dict[tuple[str, str, str], dict[str, Any]] = {}
+    refused: dict[tuple[str, str], dict[str, None]] = {}
+    for row in rows:
+        figure = row["figure"].removeprefix(LOG_RATIO)
+        name = row["observer"] if figure == row["figure"] else f"log({row['observer']})"
+        if figure in ERRORS and row["refused"]:
+            refused.setdefault((name, row["refused"]), {})[KEYS[figure].label] = None
+        elif figure in ERRORS:
+            of[name, row["field"], figure] = row
+    columns = [key for key in ERRORS if any(figure == key for _, _, figure in of)]
     table = [
-        [observer, field, *(_total(of[observer, field, key]) for key, _ in columns)]
-        for observer, field in dict.fromkeys((row["observer"], row["field"]) for row in rows)
+        [name, field, *(_total(of.get((name, field, key))) for key in columns)]
+        for name, field in dict.fromkeys((name, field) for name, field, _ in of)
     ]
-    shown = markdown.table(["observer", "field", *(said for _, said in columns)], table, text_columns=2)
-    return f"{shown}\n\n*: decisive, its interval is above all others'."
+    parts = []
+    if table:
+        headings = ["observer", "field", *(f"total index, {KEYS[key].label}" for key in columns)]
+        parts.append(markdown.table(headings, table, text_columns=2))
+    if any(row["decisive"] for row in of.values()):
+        parts.append("*: decisive, its interval is above all others'.")
+    parts += [f"No indices of {name}, {', '.join(labels)}: {why}." for (name, why), labels in refused.items()]
+    return "\n\n".join(parts)
 
 
-def _total(row: dict[str, Any]) -> str:
-    if row["refused"]:
-        return f"refused: {row['refused']}"
+def _total(row: dict[str, Any] | None) -> str:
+    if row is None:
+        return "-"
     return f"{row['total']:.3f} [{row['total_low']:.3f}, {row['total_high']:.3f}]{'*' if row['decisive'] else ''}"
 
 
@@ -174,7 +189,3 @@ def _interval(share: Interval | None) -> list[str]:
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.1f} %"
-
-
-def _said(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
