@@ -68,6 +68,8 @@ def test_two_workers_find_what_one_process_finds(tmp_path: Path) -> None:
     assert said.status == 0, said
     assert said.err.startswith("Written to two."), said
     assert (tmp_path / "two" / "trials.parquet").read_bytes() == (tmp_path / "one" / "trials.parquet").read_bytes()
+    for chunk in (tmp_path / "one" / "chunks").iterdir():
+        assert (tmp_path / "two" / "chunks" / chunk.name).read_bytes() == chunk.read_bytes()
 
 
 @distributed
