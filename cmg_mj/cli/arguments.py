@@ -153,7 +153,12 @@ def named(out: str) -> Path:
 
 
 def names_of(observers: str) -> list[str]:
-    """Observers with commas between, or all of them; no name twice."""
+    """Observers with commas between, or all of them; one that is named again counts once."""
+    return list(dict.fromkeys(named_observers(observers)))
+
+
+def named_observers(observers: str) -> list[str]:
+    """Observers with commas between, or all of them, as they are named."""
     from cmg_mj.observers import OBSERVERS
 
     names = list(OBSERVERS) if observers == "all" else [name.strip() for name in observers.split(",") if name.strip()]
@@ -161,7 +166,7 @@ def names_of(observers: str) -> list[str]:
         raise InputError(f"--observers {observers!r}: give names with commas between, or all")
     for name in names:
         check_observer("--observers", name)
-    return list(dict.fromkeys(names))
+    return names
 
 
 def check_observer(option: str, name: str) -> None:

@@ -35,7 +35,7 @@ class Pace:
             return ""
         rate = new / passed
         speed = f"{rate:.0f}" if rate >= 10.0 else f"{rate:.2g}"
-        return f"{speed} {self.unit} a second, {_time((self.total - done) / rate)} left"
+        return f"{speed} {self.unit} a second, {in_time((self.total - done) / rate)} left"
 
     def line(self, done: float) -> str | None:
         """A line of its own, if one is due: one a minute."""
@@ -47,7 +47,8 @@ class Pace:
         return f"{int(done)} of {int(self.total)} {self.unit}" + (f", {said}" if said else "")
 
 
-def _time(left: float) -> str:
+def in_time(left: float) -> str:
+    """So many seconds in words: seconds, minutes or hours."""
     if left < 99.5:
         return f"{left:.0f} s"
     return f"{left / 60.0:.0f} min" if left < 99.5 * 60.0 else f"{left / 3600.0:.1f} h"

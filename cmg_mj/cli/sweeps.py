@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, claim, named, names_of, of_a_run
-from cmg_mj.cli.pace import Pace
+from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, claim, named, named_observers, of_a_run
+from cmg_mj.cli.pace import Pace, in_time
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code
 from cmg_mj.errors import InputError
 
@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     "varied",
     multiple=True,
     metavar="FIELD=VALUES",
-    help="A field and its values: a list 0,0.5,1; a range first:last:count, a logarithmic one log:first:last:count; for"
-    " --sample and --sobol low:high. May be given again: every combination is run.",
+    help="A field and its values: a list 0,0.5,1, also of words such as RK4,implicit; a range first:last:count, a"
+    " logarithmic one log:first:last:count; without a count, low:high, only with --sample or --sobol. Fields with +"
+    " between take the same values together. May be given again: every combination is run.",
 )
 @click.option("--observers", metavar="NAMES", help="Names with commas between, or all.  [default: the scenario's own]")
 @click.option("--worlds", type=click.IntRange(1, MOST_WORLDS), metavar="N", help="Worlds a cell.  [default: 20]")
@@ -69,6 +70,10 @@ def sweep(
     from cmg_mj.sweeps.store import Store
     from cmg_mj.sweeps.study import MOST_TRIALS, check_values, counted
 
+    if cluster is not None:
+        from cmg_mj.sweeps.cluster import local_workers
+
+        local_workers(cluster)
     study = _study(chosen, varied, observers, worlds, sample, sobol, order)
     check_values(study)
     if plan:
@@ -145,9 +150,9 @@ def _study(
     design, n = design_of(chosen.name, asked)
     if sample is not None or sobol is not None:
         design, n = ("sample", sample or 0) if sample is not None else ("sobol", sobol or 0)
-    names = asked.get("observers") or [scenario.observer.kind]
+    names = asked.get("observers", [scenario.observer.kind])
     if observers is not None:
-        names = names_of(observers)
+        names = named_observers(observers)
     expected = asked.get("order", []) if order is None else [name.strip() for name in order.split(",")]
     of_each = worlds or asked.get("worlds", WORLDS)
     return Study(scenario, tuple(axes), tuple(names), of_each, design, n, tuple(expected))
@@ -172,5 +177,10 @@ def _plan_text(takes: dict[str, Any]) -> str:
     from cmg_mj.sweeps.study import counted
 
     how_many = " x ".join(counted(takes[what], what[:-1]) for what in ("points", "observers", "worlds"))
-    how_long = f"about {takes['minutes']:.2g} minutes on this machine, {takes['memory_mb']:.0f} MB"
-    return f"{how_many} = {counted(takes['trials'], 'trial')} in {counted(takes['chunks'], 'chunk')}; {how_long}"
+    seconds = takes["minutes"] * 60.0
+    seconds, chunks = takes["minutes"] * 60.0, counted(takes["chunks"], "chunk")
+    how_long = f"{seconds:.2g} s" if seconds < 10.0 else in_time(seconds)
+    return (
+        f"{how_many} = {counted(takes['trials'], 'trial')} in {chunks}; about {how_long} on this machine, "
+        f"{takes['memory_mb']:.0f} MB"
+    )

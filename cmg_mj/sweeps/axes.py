@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, shown
 
 MOST_VALUES = 10_000
 """Of one field."""
@@ -75,8 +76,8 @@ def parse_axis(field: str, said: Any, where: str) -> Axis:
 
     Args:
         field: The field; several that take the same values with `+` between.
-        said: A list of values; or text: values with commas between, `first:last:count` for as many evenly spaced,
-            `low:high` for a range to be sampled, each also with `log:` before it.
+        said: A list of values, or a single one; or text: values with commas between, `first:last:count` for as many
+            evenly spaced, `low:high` for a range to be sampled, each also with `log:` before it.
         where: What to call it in an error.
 
     Returns:
@@ -90,7 +91,7 @@ def parse_axis(field: str, said: Any, where: str) -> Axis:
         raise InputError(f"{where}: write FIELD=VALUES, for example plant.equilibrium_bias_deg=-1.5:1.5:13")
     if isinstance(said, str) and ":" in said and not said.lstrip().startswith(("[", '"')):
         return replace(_range(field, said, where), also=tuple(also))
-    values = said if isinstance(said, list) else _listed(str(said), where)
+    values = _listed(said, where) if isinstance(said, str) else _given(said, where)
     if not values:
         raise InputError(f"{where}: no values; write FIELD=VALUES, such as plant.equilibrium_bias_deg=0,0.5")
     if len(values) > MOST_VALUES:
@@ -124,6 +125,17 @@ def _range(field: str, said: str, where: str) -> Axis:
         raise InputError(f"{where}: {count} values; a range has at least 2, at most {MOST_VALUES}")
     shares = np.linspace(0.0, 1.0, count)
     return Axis(field, tuple(Axis(field, (), low, high, log).at(shares)))
+
+
+def _given(said: Any, where: str) -> list[Any]:
+    """Values that are no text; numbers of numpy as Python's."""
+    if hasattr(said, "tolist"):
+        said = said.tolist()
+    if isinstance(said, (bool, int, float)):
+        return [said]
+    if isinstance(said, Mapping) or not isinstance(said, Iterable):
+        raise InputError(f"{where}: {shown(said)}: must be a list of values, or text such as '-1:1:5'")
+    return [value.tolist() if hasattr(value, "tolist") else value for value in said]
 
 
 def _listed(said: str, where: str) -> list[Any]:

@@ -55,7 +55,7 @@ def on_cluster(said: str, tell: Callable[[str], None]) -> Iterator[Cluster]:
     """
     if find_spec("distributed") is None:
         raise InputError('--cluster: distributed is not installed: python -m pip install "cmg_mj[cluster]"')
-    workers = _local_workers(said)
+    workers = local_workers(said)
     import distributed
 
     for name in ("distributed", "distributed.client", "distributed.gc"):  # what goes wrong is said here, in a line
@@ -70,8 +70,12 @@ def on_cluster(said: str, tell: Callable[[str], None]) -> Iterator[Cluster]:
         yield Cluster(said, client, tell)
 
 
-def _local_workers(said: str) -> int | None:
-    """How many workers to start here; None for the address of a scheduler."""
+def local_workers(said: str) -> int | None:
+    """How many workers to start here; None for the address of a scheduler.
+
+    Raises:
+        InputError: It is written as neither.
+    """
     if not said.startswith(LOCAL):
         if not ADDRESS.fullmatch(said):
             raise InputError(f"--cluster {said}: write tcp://HOST:PORT of a scheduler that is running, or {LOCAL}2")

@@ -11,13 +11,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cmg_mj.errors import InputError
 from cmg_mj.experiment import load_rig, prepare
 from cmg_mj.overrides import assign
 from cmg_mj.pool import pools
+from cmg_mj.resources import find
 from cmg_mj.scenario import as_fields, parse_scenario
 from cmg_mj.schema import ObserverSettings, Scenario
 from cmg_mj.sweeps.axes import Axis
+from cmg_mj.sweeps.checks import check_axes, check_observers, check_order, check_points, check_worlds
 from cmg_mj.sweeps.points import Points, sampled
 
 Design = Literal["grid", "sample", "sobol"]
@@ -25,6 +26,8 @@ MOST_TRIALS = 1_000_000
 """Beyond it a sweep must be asked for twice (`--yes`)."""
 CHUNK = 1024
 """Trials that are computed and kept together: so many fill a batch, and take minutes at most."""
+MOST_ALONE = 200
+"""So many values of a field that is varied alone are tried before the sweep, at 5 ms each, and the last."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +54,19 @@ class Chunks:
     @property
     def _trials(self) -> int:
         """Of one observer."""
-        return len(self.study.points) * self.study.worlds
+        return self.study.n_points * self.study.worlds
 
     @property
     def _of_one(self) -> int:
         return -(-self._trials // CHUNK)
 
-    def __len__(self) -> int:
+    @property
+    def count(self) -> int:
+        """How many there are, also where that is more than `len` can say."""
         return self._of_one * len(self.study.observers)
+
+    def __len__(self) -> int:
+        return self.count
 
     def __iter__(self) -> Iterator[Chunk]:
         return (self[number] for number in range(len(self)))
@@ -106,34 +114,17 @@ class Study:
     order: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """See that design and axes fit.
+        """See that it can be one.
 
         Raises:
-            InputError: They do not.
+            InputError: It cannot.
         """
-        if not self.axes:
-            raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
-        fields = [field for axis in self.axes for field in axis.fields]
-        twice = next((field for i, field in enumerate(fields) if field in fields[:i]), None)
-        if twice is not None:
-            raise InputError(f"--vary {twice}: given twice")
-        for axis in self.axes:
-            if axis.is_range and self.design == "grid":
-                raise InputError(
-                    f"--vary {axis.field}: a range without a count is for --sample and --sobol; write first:last:count"
-                )
-        if self.design == "sobol" and (self.n < 2 or self.n & (self.n - 1)):
-            raise InputError(f"--sobol {self.n}: must be a power of two, such as {_power_near(self.n)}")
+        check_axes(self.axes, self.design)
+        check_worlds(self.worlds)
+        check_points(self.design, self.n, len(self.axes))
+        check_observers(self.observers)
         if self.order:
-            self._check_order()
-
-    def _check_order(self) -> None:
-        said = f"--order {','.join(self.order)}"
-        if len(self.order) < 2 or len(set(self.order)) < len(self.order):
-            raise InputError(f"{said}: write two observers or more, each once, the best first")
-        for name in self.order:
-            if name not in self.observers:
-                raise InputError(f"{said}: {name} does not run here; --observers are {', '.join(self.observers)}")
+            check_order(self.order, self.observers)
 
     @cached_property
     def points(self) -> Points:
@@ -144,13 +135,16 @@ class Study:
         return Points(self.axes, shares)
 
     @property
+    def n_points(self) -> int:
+        """How many points it has, without drawing them."""
+        if self.design == "grid":
+            return math.prod(len(axis.values) for axis in self.axes)
+        return self.n * (len(self.axes) + 2 if self.design == "sobol" else 1)
+
+    @property
     def cells(self) -> int:
         """Points times observers."""
-        if self.design == "grid":
-            points = math.prod(len(axis.values) for axis in self.axes)
-        else:
-            points = self.n * (len(self.axes) + 2 if self.design == "sobol" else 1)
-        return points * len(self.observers)
+        return self.n_points * len(self.observers)
 
     @property
     def trials(self) -> int:
@@ -186,31 +180,35 @@ class Study:
 
 
 def check_values(study: Study) -> None:
-    """See that every field exists and takes each of its values by itself; an observer's own with every observer.
+    """See that every observer can run, that every field exists and takes each of its values by itself.
 
-    What does not fit together is found when it is run, and costs its own trials alone.
+    An observer's own is tried with every observer. Where nothing else is varied, a value must fit the scenario, too;
+    what does not fit together is found when it is run, and costs its own trials alone.
 
     Raises:
         InputError: One does not.
     """
-    fields = as_fields(study.scenario)
-    plant = None
+    plant = load_rig(study.scenario)
+    base = study.scenario.model_copy(update={"companions": []})
+    for observer in study.observers:
+        prepare(base.with_observer(observer), plant)
+    fields = as_fields(base)
     for axis in study.axes:
-        for value in axis.values or (axis.low, axis.high):
+        own = {field.partition(".")[2] for field in axis.fields if field.startswith("observer.")}
+        values = axis.values or (axis.low, axis.high)
+        for i, value in enumerate(values):
             changed = copy.deepcopy(fields)
             for field in axis.fields:
                 assign(changed, field, value, f"--vary {field}")
             scenario = parse_scenario(changed, f"--vary {axis.written}={value}")
-            own = {field.partition(".")[2]: value for field in axis.fields if field.startswith("observer.")}
-            if own:
-                for observer in study.observers:
-                    given = {"kind": observer, **own}
-                    plant = plant or load_rig(study.scenario)
-                    prepare(scenario.model_copy(update={"observer": ObserverSettings(**given)}), plant)
-
-
-def _power_near(n: int) -> int:
-    return 2 ** max(1, round(math.log2(max(n, 2))))
+            if "plant.model" in axis.fields:
+                find("models", str(value), ".xml", f"--vary {axis.written}: plant.model =")
+            alone = len(study.axes) == 1 and (i < MOST_ALONE or i == len(values) - 1)
+            rig = load_rig(scenario, plant) if alone else plant
+            for observer in study.observers if own else study.observers[: int(alone)]:
+                given = dict.fromkeys(own, value)
+                its = scenario.observer if observer == base.observer.kind else ObserverSettings(kind=observer, **given)
+                prepare(scenario.model_copy(update={"observer": its}), rig)
 
 
 def counted(n: int, what: str) -> str:

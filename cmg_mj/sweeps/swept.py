@@ -11,6 +11,7 @@ from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.sweeps.axes import parse_axis
 from cmg_mj.sweeps.cells import Trials, cells_in_blocks
+from cmg_mj.sweeps.checks import listed_names
 from cmg_mj.sweeps.indices import index_rows, index_table
 from cmg_mj.sweeps.order import order_rows, order_table
 from cmg_mj.sweeps.study import Design, Study, check_values
@@ -57,7 +58,7 @@ def sweep(
 
     Args:
         scenario: The scenario, or its name.
-        vary: Field, named as with `--set` -> a list of values, or text as `--vary` takes it, such as "-1:1:5".
+        vary: Field, named as with `--set` -> a list of values, or one, or text as `--vary` takes it, such as "-1:1:5".
         observers: Those in the loop; by default the scenario's own.
         worlds: Trials a cell: world i has the same noise in every cell.
         sample: So many points of a quasi-random design of the ranges and lists, instead of every combination.
@@ -68,17 +69,16 @@ def sweep(
         The trials and cells, as tables.
 
     Raises:
-        InputError: A field or its values are not written so, or do not fit the design.
+        InputError: A field or its values are not written so or do not fit the design, or an observer cannot run.
     """
     if sample is not None and sobol is not None:
         raise InputError("sample and sobol: one of them")
     design: Design = "sample" if sample is not None else "sobol" if sobol is not None else "grid"
     of = load_scenario(scenario) if isinstance(scenario, str) else scenario
-    axes = tuple(
-        parse_axis(field, said if isinstance(said, str) else list(said), f"vary: {field!r}")
-        for field, said in vary.items()
-    )
-    study = Study(of, axes, tuple(observers or (of.observer.kind,)), worlds, design, sample or sobol or 0, tuple(order))
+    axes = tuple(parse_axis(field, said, f"vary: {field!r}") for field, said in vary.items())
+    n: Any = 0 if design == "grid" else sample if design == "sample" else sobol
+    names = (of.observer.kind,) if observers is None else listed_names(observers, "observers")
+    study = Study(of, axes, names, worlds, design, n, listed_names(order, "order"))
     import pyarrow as pa
 
     check_values(study)

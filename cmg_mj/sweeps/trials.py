@@ -42,7 +42,7 @@ def point_columns(study: Study) -> list[tuple[str, str]]:
 def _type_of(values: Sequence[Any]) -> str:
     if all(isinstance(value, bool) for value in values):
         return "bool"
-    if all(type(value) is int for value in values):
+    if all(type(value) is int and -(2**63) <= value < 2**63 for value in values):
         return "int64"
     if all(type(value) in (int, float) for value in values):
         return "float64"
@@ -59,15 +59,12 @@ def as_table(rows: Iterable[Mapping[str, Any]], schema: pa.Schema) -> pa.Table:
     import pyarrow as pa
 
     kept = list(rows)
-    texts = {field.name for field in schema if str(field.type) == "string"}
+    held = {"string": (str, repr), "double": (float, float)}  # Arrow takes no whole number beyond 2**53 for a double
 
     def column(name: str) -> list[Any]:
-        values = [row.get(name) for row in kept]
-        return (
-            [value if value is None or isinstance(value, str) else repr(value) for value in values]
-            if name in texts
-            else values
-        )
+        kind, convert = held.get(str(schema.field(name).type), (object, repr))
+        values = (row.get(name) for row in kept)
+        return [value if value is None or isinstance(value, kind) else convert(value) for value in values]
 
     return pa.table({name: column(name) for name in schema.names}, schema=schema)
 

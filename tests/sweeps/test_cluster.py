@@ -41,8 +41,10 @@ class {name}(LinearDifferentiator):
         return super().step(state, y, u)
 """
 KILL = "os.kill(os.getpid(), signal.SIGKILL)"
-KILLS_ITSELF = f"pathlib.Path('cluster').exists() and {KILL}"
-KILLS_ITSELF_ONCE = f"pathlib.Path('cluster').exists() and (pathlib.Path('cluster').unlink(), {KILL})"
+NOW = "getattr(y.y1, 'ndim', 0) and pathlib.Path('cluster').exists()"
+"""In a trial, of many worlds, and not when the observer is tried before it."""
+KILLS_ITSELF = f"{NOW} and {KILL}"
+KILLS_ITSELF_ONCE = f"{NOW} and (pathlib.Path('cluster').unlink(), {KILL})"
 
 
 def sweep(cwd: Path, out: str, *arguments: str) -> Said:
