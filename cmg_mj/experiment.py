@@ -32,12 +32,9 @@ from cmg_mj.simulate import Driver, Result, simulate
 from cmg_mj.stacked import stacked
 from cmg_mj.trajectory import whole_file
 
-ON_THE_BOARD = """\
-# Run on the emulated board (docs/board.md), whose numbers are not quite the host's. To the same numbers it runs with
-#     cmg-mj run scenario.toml --driver board
-
-"""
-"""Above the scenario of a run on the board."""
+ON_THE_BOARD = "Run on the emulated board (docs/board.md), whose numbers are not quite the host's."
+ANOTHER_WORLD = "World {world}: its noise is not that of world 0."
+"""Above a scenario that does not rerun to the same numbers by itself."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -243,14 +240,19 @@ class Experiment:
             bundled = prepare(base)
         return differences(bundled.resolved(), self.resolved())
 
-    def as_toml(self, driver: Driver = "native") -> str:
-        """The resolved scenario: running it again gives the same run; its head says so if only the board does."""
-        return (ON_THE_BOARD if driver == "board" else "") + tomli_w.dumps(self.resolved())
+    def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
+        """The resolved scenario: running it again gives the same run; its head says if that needs options."""
+        said = [(ON_THE_BOARD, "--driver board")] if driver == "board" else []
+        said += [(ANOTHER_WORLD.format(world=world), f"--world {world}")] if world else []
+        lines = [" ".join([*(why for why, _ in said), "To the same numbers it runs with"])]
+        lines += [" ".join(["    cmg-mj run scenario.toml", *(option for _, option in said)])]
+        head = "".join(f"# {line}\n" for line in lines) + "\n" if said else ""
+        return head + tomli_w.dumps(self.resolved())
 
-    def save(self, path: Path, driver: Driver = "native") -> None:
+    def save(self, path: Path, driver: Driver = "native", world: int = 0) -> None:
         """Write it as TOML."""
         with whole_file(path) as temporary:
-            temporary.write_text(self.as_toml(driver), encoding="utf-8")
+            temporary.write_text(self.as_toml(driver, world), encoding="utf-8")
 
 
 def run_together(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Any) -> Result:

@@ -115,10 +115,11 @@ def comparison_note(summaries: Sequence[Mapping[str, Any]]) -> str:
 
 
 def run_title(summary: Mapping[str, Any]) -> str:
-    """Above what a run prints and draws: scenario, observer, seed, and what differs from the bundled scenario."""
+    """Above what a run prints and draws: scenario, observer, seed, world, what differs from the bundled scenario."""
     place = " on the board" if summary.get("driver") == "board" else ""
+    world = f", world {summary['world']}" if "world" in summary else ""
     differs = in_words(summary["differs"])
-    return f"{summary['scenario'] or 'Run'}: {summary['observer']}{place}, seed {summary['seed']}{differs}"
+    return f"{summary['scenario'] or 'Run'}: {summary['observer']}{place}, seed {summary['seed']}{world}{differs}"
 
 
 def summary_table(summary: Mapping[str, Any]) -> Group:

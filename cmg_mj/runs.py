@@ -30,7 +30,7 @@ def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[s
         "scenario": scenario.title,
         "observer": scenario.observer.kind,
         "seed": scenario.seed,
-        **_driver(result),
+        **_which(result, world),
         "outcome": outcome.kind,
         "end_time_s": outcome.time_s,
         "fell": outcome.fell,
@@ -67,7 +67,7 @@ def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *
     writers = (
         trajectory.save,
         lambda path: _write_json(path, summary),
-        lambda path: experiment.save(path, result.driver),
+        lambda path: experiment.save(path, result.driver, _world(result)),
         lambda path: _record(path, [(experiment, result)]),
         lambda path: _plot(path, trajectory, summary, experiment),
     )
@@ -135,13 +135,20 @@ def trajectory_with_metadata(experiment: Experiment, result: Result) -> Trajecto
     """The trajectory with what is needed to know later where it came from."""
     assert result.trajectory is not None
     outcome = dataclasses.asdict(result.outcomes[0])
-    metadata = {"outcome": outcome, **_driver(result), "scenario": experiment.resolved()}
+    metadata = {"outcome": outcome, **_which(result), "scenario": experiment.resolved()}
     return dataclasses.replace(result.trajectory, metadata=metadata)
 
 
-def _driver(result: Result) -> dict[str, str]:
-    """Who drove, where that changes the numbers."""
-    return {"driver": result.driver} if result.driver == "board" else {}
+def _world(result: Result, at: int = 0) -> int:
+    """The number of a world: of a single run, or of that at a place."""
+    return result.worlds[at] if result.worlds else at
+
+
+def _which(result: Result, at: int = 0) -> dict[str, Any]:
+    """What changes the numbers and stands in no scenario: who drove, if it was not the host, and any world but 0."""
+    driver = {"driver": result.driver} if result.driver == "board" else {}
+    world = _world(result, at)
+    return driver | ({"world": world} if world else {})
 
 
 def _plot(path: Path, trajectory: Trajectory, summary: dict[str, Any], experiment: Experiment) -> None:
@@ -173,7 +180,7 @@ def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
         pushes=scenario.push,
         settings=scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,
-        scenario_toml=experiment.as_toml(first.driver),
+        scenario_toml=experiment.as_toml(first.driver, _world(first)),
     )
 
 

@@ -193,6 +193,23 @@ def test_the_default_folder_tells_runs_apart(quick: str) -> None:
     assert sorted(os.listdir("runs")) == ["quick-Mine-0", "quick-homogeneous-3", "quick-ltv-0"]
 
 
+def test_another_world_is_named_wherever_a_run_is(quick: str) -> None:
+    said = cmg_mj("run", quick, "--world", 2)
+    assert said.out.startswith("Quick: homogeneous, seed 0, world 2\n")
+    assert os.listdir("runs") == ["quick-homogeneous-0-world2"]
+    at = Path("runs/quick-homogeneous-0-world2")
+    summary = json.loads((at / "summary.json").read_text())
+    assert summary["world"] == 2
+    head = (at / "scenario.toml").read_text().splitlines()[1]
+    assert head == "#     cmg-mj run scenario.toml --world 2"
+    again = cmg_mj("run", at / "scenario.toml", "--world", 2, "--json", "--out", "again")
+    assert json.loads(again.out) == summary
+    other = json.loads(cmg_mj("run", at / "scenario.toml", "--json", "--out", "other").out)
+    assert "world" not in other
+    assert other["velocity_rms_error_rad_s"] != summary["velocity_rms_error_rad_s"]
+    assert "--world" in cmg_mj("run", quick, "--world", -1).complaint
+
+
 def test_an_observer_and_its_parameters_from_the_command_line(quick: str) -> None:
     said = [
         cmg_mj("run", quick, "--json", "--observer", "linear", *settings).out

@@ -51,7 +51,9 @@ class Chosen:
         scenario = load_scenario(self.name, settings, observer)
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
-    def folder(self, what: str, names: Sequence[str], experiment: Experiment, driver: Driver = "native") -> RunFolder:
+    def folder(
+        self, what: str, names: Sequence[str], experiment: Experiment, driver: Driver = "native", world: int = 0
+    ) -> RunFolder:
         """The folder to write these files to: without --out it is named for what is run and what differs in it."""
         from cmg_mj.differences import in_a_name, safe_name
         from cmg_mj.run_folder import unused_folder
@@ -59,9 +61,14 @@ class Chosen:
         if self.out is not None:
             return claim(named(self.out), names)
         what = safe_name(what) + ("-board" if driver == "board" else "")
-        parts = (safe_name(Path(self.name).stem), what, str(experiment.scenario.seed))
+        parts = (
+            safe_name(Path(self.name).stem),
+            what,
+            str(experiment.scenario.seed),
+            *([f"world{world}"] if world else []),
+        )
         name = "-".join(parts) + in_a_name(experiment.differences)
-        return released_at_the_end(unused_folder(Path("runs"), name, names, experiment.as_toml(driver)))
+        return released_at_the_end(unused_folder(Path("runs"), name, names, experiment.as_toml(driver, world)))
 
 
 def _letters(argument: str) -> str:

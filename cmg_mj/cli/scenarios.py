@@ -27,6 +27,9 @@ from cmg_mj.errors import InputError, RunStopped
 if TYPE_CHECKING:
     from cmg_mj.simulate import Driver
 
+LAST_WORLD = 2**63 - 1
+"""Tables hold its number in 64 bits."""
+
 
 @click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
 @click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
@@ -39,13 +42,21 @@ if TYPE_CHECKING:
     help="Who calls the controller: the runner, or MuJoCo through its control callback; or board: it runs as C on an "
     "emulated Cortex-M7 (docs/board.md).",
 )
+@click.option(
+    "--world",
+    type=click.IntRange(0, LAST_WORLD),
+    default=0,
+    metavar="N",
+    help="Which world of the seed: N has the noise of world N of a comparison or a sweep.  [default: 0]",
+)
 @click.option("--plot", is_flag=True, help="Write plot.png as well.")
 @users_code()
-def run(chosen: Chosen, observer: str | None, driver: Driver, plot: bool) -> None:
+def run(chosen: Chosen, observer: str | None, driver: Driver, world: int, plot: bool) -> None:
     """Run a scenario and write a folder.
 
     Its files: summary.json, trajectory.parquet, recording.rrd (a rerun recording), and scenario.toml, which has every
-    default written out and reruns to the same numbers (of a run on the board, with --driver board again).
+    default written out and reruns to the same numbers (of a run on the board, with --driver board again; of another
+    world than 0, with --world again).
     """
     from cmg_mj import report, runs
     from cmg_mj.experiment import prepare
@@ -58,10 +69,10 @@ def run(chosen: Chosen, observer: str | None, driver: Driver, plot: bool) -> Non
     if scenario.compare:
         say("[compare] is for cmg-mj compare; this is one run")
     what = runs.file_name(scenario.observer.kind)
-    folder = chosen.folder(what, runs.files_of_run(plot=plot), experiment, driver)
+    folder = chosen.folder(what, runs.files_of_run(plot=plot), experiment, driver, world)
     with CtrlC() as ctrl_c:
         with progress(scenario.title or chosen.name, scenario.duration_s, ctrl_c) as on_progress:
-            result = experiment.run(driver=driver, on_progress=on_progress)
+            result = experiment.run(driver=driver, world=world, on_progress=on_progress)
         summary = runs.summary_of(experiment, result)
         try:
             place = runs.save_run(folder, experiment, result, plot=plot)

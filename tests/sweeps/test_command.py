@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.resources import folder
+from cmg_mj.sweeps.trials import FIGURES
 from tests.command import COMMAND, ROOT, cmg_mj
 
 BIAS = "plant.equilibrium_bias_deg"
@@ -69,6 +70,29 @@ def test_gains_that_are_solved_for_rerun_from_their_weights(tmp_path: Path, vari
     assert first.equals(pq.read_table(again / "trials.parquet"))
     commands = first["command_rms_rad_s"].to_pylist()
     assert commands[0] != commands[2]
+
+
+def test_a_row_reruns_alone(tmp_path: Path) -> None:
+    """Worlds 0, 1 and 2, fields that go together, a push: `cmg-mj run` with the row's values has its figures."""
+    rates, torque = ("controller.rate_hz", "sensors.accelerometer.rate_hz"), "push.0.torque_n_m"
+    varied = ["--vary", f"{'+'.join(rates)}=100,200", "--vary", f"{torque}=0.3:0.5"]
+    own = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2"]
+    how = ["--sample", "2", "--worlds", "3", "--seed", "7", "--observers", "linear,gyro_free"]
+    assert cmg_mj("sweep", "push_recovery", *varied, *own, *how, "--out", tmp_path / "out").status == 0
+    rows = pq.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
+    for row in (rows[0], rows[4], rows[8]):
+        of_row = [part for field in (*rates, torque) for part in ("--set", f"{field}={row[field]}")]
+        which = ["--observer", row["observer"], "--seed", row["seed"], "--world", row["world"]]
+        said = cmg_mj("run", "push_recovery", *own, *of_row, *which, "--json", "--out", tmp_path / "alone")
+        assert said.status == 0, said
+        alone = json.loads(said.out)
+        figures = {key for key in FIGURES if row[key] is not None}
+        assert len(figures) > 8
+        assert {key: alone[key] for key in figures} == {key: row[key] for key in figures}
+    assert [row["world"] for row in (rows[0], rows[4], rows[8])] == [0, 1, 2]
+    assert {row["observer"] for row in (rows[0], rows[8])} == {"linear", "gyro_free"}
+    errors = [row["velocity_rms_error_rad_s"] for row in rows[:3]]
+    assert len(set(errors)) == 3  # worlds differ
 
 
 def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
