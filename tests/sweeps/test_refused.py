@@ -49,10 +49,10 @@ def nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
         (["--vary", f"{BIAS}+compare.worlds=1,2"], "--vary compare.worlds: is not varied"),
         (["--vary", 'companions=["ltv"],[]'], "--vary companions: is not varied: a sweep runs without them"),
         (["--vary", f"{BIAS}=0,1", "--observers", "linear,ltv,linear"], "observers: 'linear' is there twice"),
-        (["--vary", f"{BIAS}=0,1", "--observers", "linear,mine:Broken"], "observer mine:Broken: ValueError: never"),
+        (["--vary", f"{BIAS}=0,1", "--observers", "linear,broken:Broken"], "observer broken:Broken: ValueError: never"),
         (
-            ["--vary", f"{BIAS}=0,1", "--observers", "linear,mine:None"],
-            "observer.kind = 'mine:None': cannot be imported",
+            ["--vary", f"{BIAS}=0,1", "--observers", "linear,broken:None"],
+            "observer.kind = 'broken:None': cannot be imported",
         ),
         (["--vary", f"{INNER}=0.05,0.5"], f"--vary {INNER}=0.5: .* the inner accelerometer must lie nearer"),
         (["--vary", "plant.model=nope.xml"], "--vary plant.model: plant.model = 'nope.xml': no such file"),
@@ -62,7 +62,7 @@ def nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 @pytest.mark.usefixtures("elsewhere")
 def test_on_the_command_line(arguments: list[str], complaint: str) -> None:
-    Path("mine.py").write_text(BROKEN)
+    Path("broken.py").write_text(BROKEN)
     assert_in(complaint, cmg_mj("sweep", "push_recovery", *arguments, "--out", "out").complaint)
     assert not Path("out").exists()
 
