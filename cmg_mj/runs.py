@@ -134,7 +134,7 @@ def file_name(kind: str) -> str:
 def trajectory_with_metadata(experiment: Experiment, result: Result) -> Trajectory:
     """The trajectory with what is needed to know later where it came from."""
     assert result.trajectory is not None
-    outcome = dataclasses.asdict(result.outcomes[0])
+    outcome = {key: getattr(result.outcomes[0], key) for key in ("kind", "time_s", "reason")}
     metadata = {"outcome": outcome, **_which(result), "scenario": experiment.resolved()}
     return dataclasses.replace(result.trajectory, metadata=metadata)
 

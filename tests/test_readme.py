@@ -31,6 +31,7 @@ CHEAPER = {
     "run": "",
     "compare": "--worlds 2 --set duration_s=2.5 --set push.0.start_s=1.0",
     "tune": "--worlds 2 --set duration_s=3.0",
+    "sweep": "--sample 2 --worlds 2 --set duration_s=2.5 --set push.0.start_s=1.0",
     "replay": "--observers linear",
     "export": "",
 }
@@ -80,6 +81,8 @@ def test_a_command_runs(line: str) -> None:
     command, *arguments = shlex.split(line)[1:]
     if command == "replay":
         shutil.copytree(ROOT / "examples" / "data", Path("examples", "data"))
+    if command == "sweep":
+        shutil.copytree(ROOT / "docs" / "studies", Path("docs", "studies"))
     if command == "export" or "board" in arguments:
         pytest.importorskip("casadi")
     if "board" in arguments and (gone := missing()):
