@@ -106,6 +106,7 @@ def test_a_chunk_that_kills_three_workers_is_rows_with_a_reason_and_its_neighbou
 
 @distributed
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups here")
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> None:
     """To the workers too, as at a terminal."""
     arguments = [*SWEEP, "--set", "duration_s=8", "--worlds", "60", "--observers", "all", "--cluster", "local:2"]
