@@ -177,7 +177,6 @@ def _plan_text(takes: dict[str, Any]) -> str:
     from cmg_mj.sweeps.study import counted
 
     how_many = " x ".join(counted(takes[what], what[:-1]) for what in ("points", "observers", "worlds"))
-    seconds = takes["minutes"] * 60.0
     seconds, chunks = takes["minutes"] * 60.0, counted(takes["chunks"], "chunk")
     how_long = f"{seconds:.2g} s" if seconds < 10.0 else in_time(seconds)
     return (
