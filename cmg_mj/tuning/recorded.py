@@ -200,4 +200,5 @@ def halves(scenario: Scenario, worlds: int, noise_ug_rthz: Sequence[float]) -> l
 
 
 def _key(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None) -> tuple:
-    return tuple(worlds), noise_ug_rthz, scenario.seed, scenario.plant, tuple(scenario.push)
+    """What a recording depends on: the scenario that is recorded, whole, and the worlds."""
+    return tuple(worlds), repr(tuning_scenario(scenario, noise_ug_rthz))

@@ -9,7 +9,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.experiment import prepare
 from cmg_mj.observers import make_observer
 from cmg_mj.scenario import load_scenario
-from cmg_mj.tuning import record
+from cmg_mj.tuning import record, recorder
 from cmg_mj.tuning.recorded import tuning_scenario, window_of, windows_of
 from tests.observers.reference import DT
 
@@ -73,3 +73,13 @@ def test_noise_is_that_of_the_level() -> None:
     quiet, loud = (record(load_scenario("observer_tuning"), range(2), noise_ug_rthz=n) for n in (100.0, 800.0))
     spread = [np.diff(r.trajectory["y1_rad"][:300], axis=0).std() for r in (quiet, loud)]
     assert 4.0 < spread[1] / spread[0] < 9.0
+
+
+def test_scenarios_that_differ_in_anything_that_is_recorded_have_recordings_of_their_own() -> None:
+    changes = ([], ["sensors.encoder.counts_per_revolution=360"], ["controller.rate_limit_rad_s=2"])
+    scenarios = [load_scenario("observer_tuning", ["seed=5", "duration_s=3.2", *change]) for change in changes]
+    made = recorder([(scenario, range(2), 400.0) for scenario in scenarios])
+    for scenario in scenarios:
+        asked = made(scenario, range(2), noise_ug_rthz=400.0, warm_up_s=2.0)
+        alone = record(scenario, range(2), noise_ug_rthz=400.0)
+        np.testing.assert_array_equal(asked.trajectory["y2_rad"], alone.trajectory["y2_rad"])
