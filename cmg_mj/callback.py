@@ -55,7 +55,7 @@ def _tick(plant: Plant, controller: Controller, data: mujoco.MjData, sense: Call
                 f"control() was last called at step {controller.step} and now at step {step}: call it at least every "
                 f"{controller.beat} physics steps, before the step"
             )
-    if not math.isfinite(data.qpos[plant.tilt]):
+    if not math.isfinite(plant.axis.line.lean(data.qpos)):
         raise RunStopped(f"the plant diverged at t = {data.time:g} s")
     if not controller.update(step, plant.ideal(sense().tolist(), data.qvel.tolist())):
         return False

@@ -316,7 +316,7 @@ def _require_alike(rigs: Sequence[Plant], plants: int, worlds: int) -> None:
         raise InputError(f"run_many: {worlds} worlds and {plants} plants; give at least one, and as many of each")
     different = set(rigs)
     integrators = {int(rig.model.opt.integrator) for rig in different}
-    alike = {(rig.model.opt.timestep, *rig.joint_names) for rig in different}
+    alike = {(rig.model.opt.timestep, *rig.joint_names, rig.joint_kinds) for rig in different}
     if len(alike) > 1 or len(integrators) > 1:
         raise InputError(
             "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"

@@ -15,6 +15,11 @@ from cmg_mj.rig_check import Placement, numbers_that_are_none
 from cmg_mj.rig_parts import NEEDS, lacks
 
 
+_QPOS_SIZES = {0: 7, 1: 4, 2: 1, 3: 1}
+_QVEL_SIZES = {0: 6, 1: 3, 2: 1, 3: 1}
+"""Of a free joint, a ball, a slide and a hinge, by MuJoCo's mjtJoint."""
+
+
 def _one_line(error: Exception) -> str:
     """MuJoCo's message without what tells a user nothing."""
     text = " ".join(str(error).split()).removeprefix("Error: ")
@@ -97,7 +102,9 @@ def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
     names = [joint.name for joint in spec.joints]
     if "yaw" not in names:
         raise InputError(f"plant.lock_thrust_bearing = true: {path} has no joint 'yaw' to lock")
-    index = names.index("yaw")
+    before = spec.joints[: names.index("yaw")]
+    at = [sum(int(sizes[int(joint.type)]) for joint in before) for sizes in (_QPOS_SIZES, _QVEL_SIZES)]
     spec.delete(spec.joint("yaw"))
     for key in spec.keys:  # which may leave its rates out, or have them wrong, of which the compiler speaks
-        key.qpos, key.qvel = (np.delete(values, [index] if len(values) else []) for values in (key.qpos, key.qvel))
+        values = (key.qpos, at[0]), (key.qvel, at[1])
+        key.qpos, key.qvel = (np.delete(of, [index] if len(of) else []) for of, index in values)

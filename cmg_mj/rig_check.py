@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
 
 from cmg_mj.errors import shown
+from cmg_mj.line import HingeLine, Line, line_at_site, line_of_joint
 from cmg_mj.plausible import LARGEST
-from cmg_mj.rig_parts import KEYFRAME, SENSORS, cubes_in
+from cmg_mj.rig_parts import KEYFRAME, LINE, SENSORS, axes_in, cubes_in
 
 TRUE_DEG = 0.05
 """A keyframe that is off by more is no equilibrium: a tenth of the bias that observers are tried with [deg]."""
@@ -66,24 +67,50 @@ class Placement:
     def __init__(self, model: mujoco.MjModel) -> None:
         self.hints: list[str] = []
         self.wrong: list[str] = []
-        key, self.tilt = _id(model, "key", KEYFRAME), _id(model, "joint", "tilt")
-        if min(key, self.tilt) < 0 or any(model.jnt_type != mujoco.mjtJoint.mjJNT_HINGE):
+        self.key = _id(model, "key", KEYFRAME)
+        if self.key < 0:
             return
         self.model, self.data = model, mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, self.data, key)
+        mujoco.mj_resetDataKeyframe(model, self.data, self.key)
         mujoco.mj_forward(model, self.data)
-        self.axis = self.data.xaxis[self.tilt]
-        self.pivot = self.data.xanchor[self.tilt]
-        self.line = np.array([0.0, 0.0, 1.0])
         names = [model.joint(i).name for i in range(model.njnt)]
-        cubes = [cube for cube in cubes_in(names) if min(self._addresses(cube)) >= 0]
-        self.wrong += self._upright()
-        for cube in cubes:
-            self.wrong += self._cube(cube)
-        self.wrong += self._rest(names)
-        self.wrong += self._sensors()
+        all_cubes = []
+        for name in axes_in([*names, *(model.site(i).name for i in range(model.nsite))]):
+            cubes = [cube for cube in cubes_in(names, name) if min(self._addresses(cube)) >= 0]
+            all_cubes += cubes
+            self.wrong += self._axis(name, cubes)
+        self.wrong += self._rest()
         if "yaw" in names:
-            self._momentum(cubes)
+            self._momentum(all_cubes)
+
+    def _axis(self, name: str, cubes: Sequence[str]) -> Iterator[str]:
+        """All of one axis."""
+        model, data = self.model, self.data
+        self.prefix = f"{name}/" if name else ""
+        self.what = what = self.prefix + LINE
+        joint, site = _id(model, "joint", what), _id(model, "site", what)
+        if max(joint, site) < 0:
+            return
+        if joint >= 0:
+            if int(model.jnt_type[joint]) != int(mujoco.mjtJoint.mjJNT_HINGE):
+                return
+            self.frame, self.axis, self.pivot = int(model.jnt_bodyid[joint]), data.xaxis[joint], data.xanchor[joint]
+            self.tilt: Line | None = line_of_joint(model, joint, self.key)
+        else:
+            self.frame, self.pivot = int(model.site_bodyid[site]), data.site_xpos[site]
+            self.axis = data.site_xmat[site].reshape(3, 3)[:, 1]
+            self.tilt = line_at_site(model, data, site, self.key)
+        if self.tilt is None:
+            yield (
+                f"site {what!r} lies on no hinge that its body hangs on, along its y axis, and that body is not free: "
+                "about what it tilts cannot be told"
+            )
+            return
+        self.line = np.array([0.0, 0.0, 1.0])
+        yield from self._upright()
+        for cube in cubes:
+            yield from self._cube(cube)
+        yield from self._sensors()
 
     def _addresses(self, cube: str) -> tuple[int, int, int, int]:
         """Of gimbal, flywheel, servo and motor; negative for one that is missing."""
@@ -93,18 +120,22 @@ class Placement:
 
     def _upright(self) -> Iterator[str]:
         """The centre of mass of all that tilts lies above the tilt axis, which is horizontal."""
-        if _degrees_between(self.axis, np.array([0.0, 0.0, 1.0])) < 90.0 - MOUNTED_DEG:
-            yield "joint 'tilt' must turn about a horizontal axis"
+        assert self.tilt is not None
+        if abs(_degrees_between(self.axis, np.array([0.0, 0.0, 1.0])) - 90.0) > MOUNTED_DEG:
+            yield f"{self.what!r} must lie along a horizontal axis"
             return
-        centre = self.data.subtree_com[self.model.jnt_bodyid[self.tilt]] - self.pivot
+        centre = self.data.subtree_com[self.model.jnt_bodyid[self.tilt.joint]] - self.pivot
         self.line = centre - (centre @ self.axis) * self.axis
         side = np.cross(self.axis, (0.0, 0.0, 1.0))
         lean = math.atan2(float(centre @ side), float(centre[2]))
         if abs(math.degrees(lean)) > TRUE_DEG or not centre[2] > 0.0:
-            angle = math.remainder(float(self.data.qpos[self.tilt]) - lean, 2.0 * math.pi)
+            cure = ""
+            if isinstance(self.tilt, HingeLine):
+                angle = math.remainder(self.tilt.zero - self.tilt.sign * lean, 2.0 * math.pi)
+                cure = f" ({self.model.joint(self.tilt.joint).name!r} = {angle:.6g} would be upright)"
             yield (
                 f"at the keyframe {KEYFRAME!r} the rig must stand upright, its mass above the tilt axis; it leans by "
-                f"{math.degrees(lean):.3g} deg ('tilt' = {angle:.6g} would be upright)"
+                f"{math.degrees(lean):.3g} deg{cure}"
             )
 
     def _cube(self, cube: str) -> Iterator[str]:
@@ -112,6 +143,7 @@ class Placement:
         model, data = self.model, self.data
         gimbal, flywheel, servo, motor = self._addresses(cube)
         turns, spins = data.xaxis[gimbal], data.xaxis[flywheel]
+        angle = float(data.qpos[model.jnt_qposadr[gimbal]])
         at_keyframe = f"at the keyframe {KEYFRAME!r}"
         if not (_is_square(turns, self.axis) and _is_square(spins, turns)):
             yield (
@@ -125,10 +157,10 @@ class Placement:
             if abs(math.degrees(off)) > TRUE_DEG:
                 yield (
                     f"{at_keyframe} the axis of '{cube}/flywheel' must be at right angles to the tilt's; it is "
-                    f"{abs(math.degrees(off)):.3g} deg off ('{cube}/gimbal' = {data.qpos[gimbal] + off:.6g} would be "
+                    f"{abs(math.degrees(off)):.3g} deg off ('{cube}/gimbal' = {angle + off:.6g} would be "
                     "right)"
                 )
-        speed, start = float(data.ctrl[motor]), float(data.qvel[flywheel])
+        speed, start = float(data.ctrl[motor]), float(data.qvel[model.jnt_dofadr[flywheel]])
         if speed == 0.0:
             yield f"keyframe {KEYFRAME!r} must give '{cube}/flywheel_motor' a speed (in ctrl)"
         elif abs(start - speed) > 0.01 * abs(speed):
@@ -137,19 +169,19 @@ class Placement:
                 f"ctrl {speed:g}"
             )
         if model.actuator_dyntype[servo] == mujoco.mjtDyn.mjDYN_INTEGRATOR:
-            setpoint, angle = float(data.act[model.actuator_actadr[servo]]), float(data.qpos[gimbal])
+            setpoint = float(data.act[model.actuator_actadr[servo]])
             if abs(math.degrees(setpoint - angle)) > TRUE_DEG:
                 yield (
                     f"keyframe {KEYFRAME!r} must have the setpoint (act) of '{cube}/gimbal_servo' where its gimbal "
                     f"stands: {angle:.6g}, not {setpoint:.6g}"
                 )
 
-    def _rest(self, names: list[str]) -> Iterator[str]:
+    def _rest(self) -> Iterator[str]:
         """Nothing but the flywheels moves."""
+        model = self.model
+        joints = {model.joint(int(model.dof_jntid[dof])).name: float(self.data.qvel[dof]) for dof in range(model.nv)}
         moving = [
-            f"{name!r} ({rate:g} rad/s)"
-            for name, rate in zip(names, self.data.qvel, strict=True)
-            if rate and not name.endswith("/flywheel")
+            f"{name!r} ({rate:g} rad/s)" for name, rate in joints.items() if rate and not name.endswith("/flywheel")
         ]
         if moving:
             yield f"at the keyframe {KEYFRAME!r} only flywheels may turn, not {', '.join(moving)}"
@@ -159,12 +191,13 @@ class Placement:
         model, data = self.model, self.data
         radii = {}
         for name, kind in SENSORS.items():
+            name = self.prefix + name
             sensor = _id(model, "sensor", name)
             if sensor < 0 or model.sensor_objtype[sensor] != mujoco.mjtObj.mjOBJ_SITE:
                 continue
             site = int(model.sensor_objid[sensor])
-            if model.site_bodyid[site] != model.jnt_bodyid[self.tilt]:
-                yield f"sensor {name!r} must be at a site of the body with the joint 'tilt'"
+            if model.site_bodyid[site] != self.frame:
+                yield f"sensor {name!r} must be at a site of the body with {self.what!r}"
                 continue
             axes = data.site_xmat[site].reshape(3, 3)
             off = _degrees_between(axes[:, 1], self.axis)
@@ -190,9 +223,10 @@ class Placement:
                     f"the site of sensor {name!r} is {max(off, beside):.2g} deg off its place, which counts as an "
                     "inaccuracy of the rig"
                 )
-        inner, outer = (radii.get(name) for name in list(SENSORS)[:2])
+        inner, outer = (radii.get(self.prefix + name) for name in list(SENSORS)[:2])
         if inner is not None and outer is not None and not 0.0 < inner < outer:
-            yield "accelerometer_outer must lie farther from the tilt axis than accelerometer_inner"
+            names = [self.prefix + name for name in SENSORS]
+            yield f"{names[1]} must lie farther from the tilt axis than {names[0]}"
 
     def _momentum(self, cubes: list[str]) -> None:
         """On a free thrust bearing the flywheels' momenta must cancel, or the rig turns with every tilt."""
@@ -202,7 +236,9 @@ class Placement:
             _, flywheel, _, _ = self._addresses(cube)
             body = int(model.jnt_bodyid[flywheel])
             shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[flywheel]  # of the principal inertias
-            momenta.append(model.body_inertia[body] @ shares**2 * data.qvel[flywheel] * data.xaxis[flywheel])
+            momenta.append(
+                model.body_inertia[body] @ shares**2 * data.qvel[model.jnt_dofadr[flywheel]] * data.xaxis[flywheel]
+            )
         left = float(np.linalg.norm(np.sum(momenta, axis=0)))
         if left > 0.01 * sum(float(np.linalg.norm(momentum)) for momentum in momenta):
             self.hints.append(

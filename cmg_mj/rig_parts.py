@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +11,15 @@ import mujoco
 from cmg_mj.errors import nearest
 
 KEYFRAME = "equilibrium"
+LINE = "tilt"
+"""The hinge that a rig tilts about, or the site whose y axis lies along a line that it tilts about."""
 SENSORS = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
 NEEDS = (
-    "a rig needs the joints tilt, CUBE/gimbal, CUBE/flywheel, the actuators CUBE/gimbal_servo, CUBE/flywheel_motor, "
-    f"the sensors CUBE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe {KEYFRAME}, for one CUBE or more"
+    "a rig needs a joint or a site tilt, the joints CUBE/gimbal, CUBE/flywheel, the actuators CUBE/gimbal_servo, "
+    f"CUBE/flywheel_motor, the sensors CUBE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe {KEYFRAME}, for one "
+    "CUBE or more; of several axes each has its name before these, as roll/tilt and roll/CUBE/gimbal"
 )
+_OF_A_CUBE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
 
 
 @dataclass(frozen=True)
@@ -24,8 +28,10 @@ class Cube:
 
     Attributes:
         name: Its prefix, `cube1`.
-        gimbal: Address of the gimbal angle in qpos, and of its rate in qvel (hinges only: they agree).
-        flywheel: The same for the flywheel.
+        gimbal: Address of the gimbal angle in qpos.
+        gimbal_dof: Address of its rate in qvel; the same where a rig consists of hinges and slides alone.
+        flywheel: Address of the flywheel's angle in qpos.
+        flywheel_dof: Address of its rate in qvel.
         servo: The gimbal servo's control.
         motor: The flywheel motor's control.
         direction: +1 or -1: the sign of u its gimbal is given, so that all cubes push the same way.
@@ -35,7 +41,9 @@ class Cube:
 
     name: str
     gimbal: int
+    gimbal_dof: int
     flywheel: int
+    flywheel_dof: int
     servo: int
     motor: int
     direction: float
@@ -65,33 +73,51 @@ def lacks(spec: mujoco.MjSpec) -> list[str]:
 
     def check(kind: str, name: str, is_right: Callable[[Any], bool], what: str) -> None:
         if name not in elements[kind]:
-            missing[kind].append(name)
+            missing[kind] += [] if name in missing[kind] else [name]
         elif not is_right(elements[kind][name]):
             wrong.append(what)
 
     for joint in spec.joints:
         if not joint.name:
             wrong.append(f"the joint of body {joint.parent.name!r} has no name")
-        if int(joint.type) != int(mujoco.mjtJoint.mjJNT_HINGE):
-            wrong.append(f"joint {joint.name!r} must be a hinge")
-    check("joint", "tilt", _turns_about_y, "joint 'tilt' must turn about y (axis=\"0 1 0\")")
-    for cube in cubes_in([name for kind in elements.values() for name in kind]) or ["cube1"]:
-        for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
-            joint, drive = f"{cube}/{name}", f"{cube}/{actuator}"
-            check("joint", joint, lambda _: True, "")
-            check("actuator", drive, _drives(joint), f"actuator {drive!r} must drive the joint {joint!r}")
-        joint, encoder = f"{cube}/gimbal", f"{cube}/gimbal_encoder"
-        check("sensor", encoder, _reads(joint), f"sensor {encoder!r} must be the jointpos of {joint!r}")
-    for name, kind in SENSORS.items():
-        check("sensor", name, _is_a(kind), f"sensor {name!r} must be of the kind {kind!r}")
+    if "yaw" in elements["joint"]:
+        check("joint", "yaw", _is_hinge, "joint 'yaw' must be a hinge")
+    names = [name for kind in elements.values() for name in kind]
+    sites = {site.name for site in spec.sites}
+    for axis in axes_in([*names, *sites]) or [""]:
+        prefix = f"{axis}/" if axis else ""
+        if prefix + LINE not in sites:
+            check("joint", prefix + LINE, _turns_about_y, f'joint {prefix + LINE!r} must turn about y (axis="0 1 0")')
+            check("joint", prefix + LINE, _is_hinge, f"joint {prefix + LINE!r} must be a hinge")
+        for cube in cubes_in(names, axis) or [f"{prefix}cube1"]:
+            for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
+                joint, drive = f"{cube}/{name}", f"{cube}/{actuator}"
+                check("joint", joint, _is_hinge, f"joint {joint!r} must be a hinge")
+                check("actuator", drive, _drives(joint), f"actuator {drive!r} must drive the joint {joint!r}")
+            joint, encoder = f"{cube}/gimbal", f"{cube}/gimbal_encoder"
+            check("sensor", encoder, _reads(joint), f"sensor {encoder!r} must be the jointpos of {joint!r}")
+        for name, kind in SENSORS.items():
+            check("sensor", prefix + name, _is_a(kind), f"sensor {prefix + name!r} must be of the kind {kind!r}")
     check("keyframe", KEYFRAME, lambda _: True, "")
     return [_missing(kind, names, list(elements[kind])) for kind, names in missing.items() if names] + wrong
 
 
-def cubes_in(names: list[str]) -> list[str]:
-    """Prefixes of the modules that elements' names speak of."""
-    suffixes = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
-    return list(dict.fromkeys(name.rpartition("/")[0] for name in names if name.endswith(suffixes)))
+def axes_in(names: Iterable[str]) -> list[str]:
+    """Names of the axes that elements' names speak of; the only one of a rig need have none."""
+    of_an_axis = {LINE, *SENSORS}
+    found = [axis for name in names for axis, _, last in [name.rpartition("/")] if last in of_an_axis]
+    return list(dict.fromkeys(found))
+
+
+def cubes_in(names: Iterable[str], axis: str) -> list[str]:
+    """Prefixes of the modules of an axis that elements' names speak of, such as `cube1` or `roll/cube1`."""
+    prefixes = dict.fromkeys(name.rpartition("/")[0] for name in names if name.endswith(_OF_A_CUBE))
+    return [prefix for prefix in prefixes if prefix.rpartition("/")[0] == axis]
+
+
+def cubes_of(model: mujoco.MjModel, axis: str) -> list[str]:
+    """The same of a compiled model's joints."""
+    return cubes_in([model.joint(i).name for i in range(model.njnt)], axis)
 
 
 def _missing(kind: str, names: list[str], known: list[str]) -> str:
@@ -101,6 +127,10 @@ def _missing(kind: str, names: list[str], known: list[str]) -> str:
     listing = hints[0].rpartition("? ")[2]
     guess = f"did you mean {', '.join(dict.fromkeys(meant))}? " if meant else ""
     return f"the model has no {kind} {', '.join(map(repr, names))}; {guess}{listing}"
+
+
+def _is_hinge(joint: Any) -> bool:
+    return int(joint.type) == int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
 def _turns_about_y(joint: Any) -> bool:

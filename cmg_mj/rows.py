@@ -44,9 +44,11 @@ class Rows:
         keep: bool,
         single: bool,
     ) -> None:
-        self._rig = plants[0]
+        self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
-        self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), tuple(self._rig.joint_names))
+        self._layout = Layout(
+            tuple(observers), tuple(map(tuple, extras)), tuple(plants[0].joint_names), plants[0].joint_kinds
+        )
         self._estimated = [(*ESTIMATES, *names) for names in extras]
         self._metrics = metrics
         self._references = references
@@ -83,9 +85,9 @@ class Rows:
         y1, y2, acceleration, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
         push = np.broadcast_to(self._columns([(torque,) for torque in torques])[0], u.shape)
         estimated = [self._columns(estimate) for estimate in zip(*estimates, strict=True)]
-        x1 = q[self._rig.tilt] - self._rig.tilt_zero + self._bias
-        x2 = v[self._rig.tilt]
-        x3 = self._rig.gimbal_angle(q)
+        x1 = self._axis.line.lean(q) + self._bias
+        x2 = self._axis.line.rate(v)
+        x3 = self._axis.gimbal_angle(q)
         ended = None if self._single else ~np.array(runnings)
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)

@@ -130,7 +130,7 @@ def _common(run: Run) -> Any:
         repr(fields),
         physics.timestep,
         int(physics.integrator),
-        tuple(first.plant.joint_names),
+        (tuple(first.plant.joint_names), first.plant.joint_kinds),
         extra_signals(first.design.observer()),
     )
 

@@ -254,7 +254,7 @@ def simulate(
                     worlds.push(torque)
                     of_each = torque if single else np.broadcast_to(torque, len(plants))
                 q, v = worlds.state()
-                lean = q[rig.tilt] - rig.tilt_zero
+                lean = rig.axis.line.lean(q)
                 if single:
                     if not abs(lean) <= fall:
                         ends[0] = _fallen(lean, step * timestep)

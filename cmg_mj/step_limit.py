@@ -21,7 +21,7 @@ def largest_step(model: mujoco.MjModel, key: int, own_s: float, shaken: float = 
     """The largest physics step that is accurate enough for a rig [s].
 
     Args:
-        model: The compiled model, hinges only, with its friction and its integrator.
+        model: The compiled model, with its friction and its integrator.
         key: The keyframe at which it is judged.
         own_s: The model file's own step [s], which is never exceeded: it knows about contacts, say.
         shaken: How fast something shakes the rig, which none of its poles shows [rad/s]: an unbalanced flywheel.
@@ -38,7 +38,7 @@ def fastest_rate(model: mujoco.MjModel, key: int) -> float:
     """The largest modulus of a pole of a rig without dry friction, linearised at a keyframe by central differences.
 
     Args:
-        model: The compiled model, hinges only.
+        model: The compiled model.
         key: The keyframe.
 
     Returns:
@@ -49,16 +49,22 @@ def fastest_rate(model: mujoco.MjModel, key: int) -> float:
     data = mujoco.MjData(smooth)
     nv = smooth.nv
 
+    at = np.concatenate([np.zeros(nv), smooth.key_qvel[key], smooth.key_act[key]])
+    sizes = np.ones(len(at))  # of what the state is turned from, for the length of a difference
+    sizes[nv:] = np.maximum(1.0, np.abs(at[nv:]))
+    for joint in np.flatnonzero(smooth.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)):
+        sizes[smooth.jnt_dofadr[joint]] = max(1.0, abs(float(smooth.key_qpos[key, smooth.jnt_qposadr[joint]])))
+
     def slope(state: np.ndarray) -> np.ndarray:
         mujoco.mj_resetDataKeyframe(smooth, data, key)
-        data.qpos[:], data.qvel[:], data.act[:] = state[:nv], state[nv : 2 * nv], state[2 * nv :]
+        mujoco.mj_integratePos(smooth, data.qpos, state[:nv], 1.0)
+        data.qvel[:], data.act[:] = state[nv : 2 * nv], state[2 * nv :]
         mujoco.mj_forward(smooth, data)
         return np.concatenate([data.qvel, data.qacc, data.act_dot])
 
-    at = np.concatenate([smooth.key_qpos[key], smooth.key_qvel[key], smooth.key_act[key]])
     columns = []
-    for direction in np.eye(len(at)):
-        h = 1e-5 * max(1.0, float(np.abs(at @ direction)))
+    for direction, size in zip(np.eye(len(at)), sizes, strict=True):
+        h = 1e-5 * size
         columns.append((slope(at + h * direction) - slope(at - h * direction)) / (2.0 * h))
     jacobian = np.array(columns).T
     if not np.isfinite(jacobian).all():

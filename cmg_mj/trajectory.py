@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -32,6 +32,22 @@ ESTIMATES = ("x1_rad", "x2_rad_s", "x3_rad")
 """What every observer estimates; what it estimates beyond x comes after them."""
 
 
+POSITIONS = {
+    "hinge": ("angle/{}_rad",),
+    "slide": ("position/{}_m",),
+    "ball": tuple(f"orientation/{{}}/{part}" for part in "wxyz"),
+}
+POSITIONS["free"] = (*(f"position/{{}}/{part}_m" for part in "xyz"), *POSITIONS["ball"])
+"""Columns of a joint by its kind, in the order of MuJoCo's qpos: those of a free joint in the world's axes."""
+RATES = {
+    "hinge": ("rate/{}_rad_s",),
+    "slide": ("velocity/{}_m_s",),
+    "ball": tuple(f"rate/{{}}/{part}_rad_s" for part in "xyz"),
+}
+RATES["free"] = (*(f"velocity/{{}}/{part}_m_s" for part in "xyz"), *RATES["ball"])
+"""The same of qvel: angular velocities in the body's own axes."""
+
+
 @dataclass(frozen=True)
 class Layout:
     """Whose columns a trajectory has, in their order.
@@ -39,12 +55,27 @@ class Layout:
     Attributes:
         observers: The observer in the loop, then the companions: columns `estimate/<observer>/<signal>`.
         extra_signals: For each of them the names of what it estimates beyond x.
-        joints: In the order of qpos: columns `angle/<joint>_rad` and `rate/<joint>_rad_s`.
+        joints: In the order of qpos; a hinge has the columns `angle/<joint>_rad` and `rate/<joint>_rad_s`.
+        kinds: Of each joint `hinge`, `slide`, `ball` or `free`: see `POSITIONS` and `RATES`; none if all are hinges.
     """
 
     observers: tuple[str, ...] = ()
     extra_signals: tuple[tuple[str, ...], ...] = ()
     joints: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+
+    def positions(self) -> list[str]:
+        """Names of the columns that make up qpos, in order."""
+        return self._of_joints(POSITIONS)
+
+    def rates(self) -> list[str]:
+        """Names of the columns that make up qvel, in order."""
+        return self._of_joints(RATES)
+
+    def _of_joints(self, named: Mapping[str, Sequence[str]]) -> list[str]:
+        kinds = self.kinds or ("hinge",) * len(self.joints)
+        pairs = zip(self.joints, kinds, strict=True)
+        return [name.format(joint) for joint, kind in pairs for name in named[kind]]
 
     def columns(self) -> list[str]:
         """Names of all columns after `time_s`, in order."""
@@ -55,8 +86,8 @@ class Layout:
                 for observer, more in zip(self.observers, self.extra_signals, strict=True)
                 for name in (*ESTIMATES, *more)
             ),
-            *(f"angle/{joint}_rad" for joint in self.joints),
-            *(f"rate/{joint}_rad_s" for joint in self.joints),
+            *self.positions(),
+            *self.rates(),
         ]
 
 
@@ -96,8 +127,8 @@ class Trajectory:
         return self.layout.joints
 
     def qpos(self) -> np.ndarray:
-        """Joint angles, (n_ticks, n_joints) [rad]."""
-        return np.stack([self.columns[f"angle/{joint}_rad"] for joint in self.joints], axis=-1)
+        """Joint positions as MuJoCo has them, (n_ticks, nq) [rad, m, quaternions w, x, y, z]."""
+        return np.stack([self.columns[name] for name in self.layout.positions()], axis=-1)
 
     def world(self, index: int) -> Trajectory:
         """One world of many, up to its end."""
@@ -154,7 +185,12 @@ class Trajectory:
         try:
             stored = json.loads(text)
             kept = stored.pop("layout")
-            layout = Layout(tuple(kept["observers"]), tuple(map(tuple, kept["extra_signals"])), tuple(kept["joints"]))
+            layout = Layout(
+                tuple(kept["observers"]),
+                tuple(map(tuple, kept["extra_signals"])),
+                tuple(kept["joints"]),
+                tuple(kept.get("kinds", ())),
+            )
         except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InputError(
                 f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"

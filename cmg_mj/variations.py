@@ -10,7 +10,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from cmg_mj.axis import Axis
 from cmg_mj.errors import InputError
+from cmg_mj.line import HingeLine
 from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.rig_parts import KEYFRAME, Cube
 from cmg_mj.tilt import RadialTilt
@@ -28,9 +30,7 @@ def vary(
     model: mujoco.MjModel,
     settings: PlantSettings,
     path: Path,
-    *,
-    tilt: int,
-    cubes: Sequence[Cube],
+    axes: Sequence[Axis],
 ) -> None:
     """Change a compiled model as its settings say.
 
@@ -38,32 +38,35 @@ def vary(
         model: The model, as its file has it.
         settings: What is to differ; what is left out stays.
         path: The file, for messages.
-        tilt: The tilt joint.
-        cubes: The modules.
+        axes: What the rig tilts about.
 
     Raises:
-        InputError: The body that tilts has no mass of its own to move, or a servo is none that has what is to differ.
+        InputError: The body that tilts has no mass of its own to move or no joint for friction, or a servo is none that
+            has what is to differ.
     """
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    gimbals = [cube.gimbal for cube in cubes]
+    cubes = [cube for axis in axes for cube in axis.cubes]
+    gimbals = [cube.gimbal_dof for cube in cubes]
+    friction = settings.tilt_friction_n_m is not None or settings.tilt_damping_n_m_s is not None
+    tilts = [_hinge(axis, path) for axis in axes] if friction else []
     for field, joints, value in (
         (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),
         (model.dof_frictionloss, gimbals, settings.gimbal_friction_n_m),
         (model.dof_damping, gimbals, settings.gimbal_damping_n_m_s),
-        (model.dof_frictionloss, [tilt], settings.tilt_friction_n_m),
-        (model.dof_damping, [tilt], settings.tilt_damping_n_m_s),
+        (model.dof_frictionloss, tilts, settings.tilt_friction_n_m),
+        (model.dof_damping, tilts, settings.tilt_damping_n_m_s),
     ):
         if value is not None:
-            field[list(joints)] = value
+            field[joints] = value
     _vary_servos(model, settings, path, cubes)
-    if settings.equilibrium_bias_deg:
-        frame = int(model.jnt_bodyid[tilt])
-        model.body_ipos[frame] += bias_shift(model, tilt, math.radians(settings.equilibrium_bias_deg), path)
+    shifts = [bias_shift(model, axis, axis.bias, path) for axis in axes if axis.bias]
+    for axis, shift in zip([axis for axis in axes if axis.bias], shifts, strict=True):
+        model.body_ipos[axis.frame] += shift
     if settings.flywheel_imbalance_kg_m:
         for cube in cubes:
-            body = int(model.jnt_bodyid[cube.flywheel])
+            body = int(model.dof_bodyid[cube.flywheel_dof])
             model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
 
@@ -93,20 +96,18 @@ def at_speed(model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: floa
                 f"plant.flywheel_speed_rad_s = {speed:g}: {path}: actuator '{cube.name}/flywheel_motor' takes only "
                 f"{low:g} to {high:g} rad/s (ctrlrange)"
             )
-        model.key_qvel[key, cube.flywheel] = model.key_ctrl[key, cube.motor] = signed
+        model.key_qvel[key, cube.flywheel_dof] = model.key_ctrl[key, cube.motor] = signed
         found.append(replace(cube, speed=signed))
     return tuple(found)
 
 
-def place_accelerometers(
-    model: mujoco.MjModel, settings: PlantSettings, as_filed: RadialTilt, path: Path
-) -> RadialTilt:
-    """Move the accelerometers along the radial line.
+def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> RadialTilt:
+    """Move the accelerometers of an axis along the radial line.
 
     Args:
         model: The model, as its file has it.
         settings: Their distances from the tilt axis; what is left out stays.
-        as_filed: The tilt estimate for their places in the file.
+        axis: The axis, as its file has it.
         path: The model's file, for messages.
 
     Returns:
@@ -115,6 +116,7 @@ def place_accelerometers(
     Raises:
         InputError: The outer one is no farther out than the inner one.
     """
+    as_filed = axis.radial_tilt
     given = {
         "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
         "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
@@ -128,12 +130,12 @@ def place_accelerometers(
             f"{changed}: the inner accelerometer must lie nearer to the tilt axis than the outer one, and they are "
             f"{inner:g} and {outer:g} m away ({path})"
         )
-    tilt = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "tilt")
     for name, (to, was) in given.items():
         if to is not None:
-            site = int(model.sensor_objid[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)])
-            arm = model.site_pos[site] - model.jnt_pos[tilt]
-            model.site_pos[site] += arm * [1.0, 0.0, 1.0] * (to / was - 1.0)
+            sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, f"{axis.name}/{name}".lstrip("/"))
+            site = int(model.sensor_objid[sensor])
+            arm = model.site_pos[site] - axis.point
+            model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (to / was - 1.0)
             model.site_sameframe[site] = 0  # should it have stood where the body's frame does
     return RadialTilt(inner, outer)
 
@@ -170,34 +172,41 @@ def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, cub
             bias[2] = -damping * per_gear
 
 
-def bias_shift(model: mujoco.MjModel, tilt: int, bias: float, path: Path) -> np.ndarray:
-    """How far the frame's centre of mass moves so that the whole rig's turns about the pivot by e.
+def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np.ndarray:
+    """How far the frame's centre of mass moves so that the whole rig's turns about the line by e.
 
     The first moment of all that tilts is turned, not lengthened: gravity's torque keeps its amplitude.
 
     Args:
         model: The model, as its file has it.
-        tilt: The tilt joint, which the frame hangs on.
+        axis: The axis, on whose frame all of the shift is.
         bias: e [rad].
         path: The model's file, for messages.
 
     Returns:
-        The shift, (3,) [m].
+        The shift in the frame's axes, (3,) [m].
 
     Raises:
         InputError: The frame has no mass of its own.
     """
-    frame = int(model.jnt_bodyid[tilt])
+    frame, all_that_tilts = axis.frame, int(model.jnt_bodyid[axis.line.joint])
     if model.body_mass[frame] <= 0.0:
         raise InputError(
-            f"plant.equilibrium_bias_deg: {path}: the body with the joint 'tilt' needs a mass of its own to "
-            "move (give the model's compiler fusestatic=\"true\", so that the cubes' halves become part of it)"
+            f"plant.equilibrium_bias_deg: {path}: the body {model.body(frame).name!r}, which tilts, needs a mass of "
+            "its own to move (give the model's compiler fusestatic=\"true\", so that the cubes' halves become part of it)"
         )
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, KEYFRAME))
     mujoco.mj_forward(model, data)
     to_frame = data.xmat[frame].reshape(3, 3).T
-    centre = to_frame @ (data.subtree_com[frame] - data.xanchor[tilt])
-    c, s = math.cos(bias), math.sin(bias)
-    turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    return model.body_subtreemass[frame] / model.body_mass[frame] * (turn @ centre - centre)
+    centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point
+    radial = centre - (centre @ axis.direction) * axis.direction
+    turned = math.cos(bias) * radial + math.sin(bias) * np.cross(axis.direction, radial)
+    return model.body_subtreemass[all_that_tilts] / model.body_mass[frame] * (turned - radial)
+
+
+def _hinge(axis: Axis, path: Path) -> int:
+    """The degree of freedom that friction of the tilt acts on."""
+    if not isinstance(axis.line, HingeLine):
+        raise InputError(f"plant.tilt_friction_n_m, plant.tilt_damping_n_m_s: {path} tilts about no hinge")
+    return axis.line.dof

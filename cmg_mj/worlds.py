@@ -24,8 +24,8 @@ class OneWorld:
         self.data = plant.new_data()
         self._qpos, self._qvel, self._sensordata = self.data.qpos, self.data.qvel, self.data.sensordata
         self._ctrl, self._applied = self.data.ctrl, self.data.qfrc_applied
-        self._servos = list(zip(plant.servos, plant.directions, strict=True))
-        self._tilt = plant.tilt
+        self._servos = [list(zip(axis.servos, axis.directions, strict=True)) for axis in plant.axes]
+        self._pushes = [list(zip(*axis.line.push, strict=True)) for axis in plant.axes]
 
     def state(self) -> State:
         """Joint angles and rates as floats."""
@@ -36,15 +36,16 @@ class OneWorld:
         mujoco.mj_forward(self.model, self.data)
         return self._sensordata.tolist()
 
-    def command(self, u: Scalar) -> None:
-        """Set the gimbal rate, each cube in its direction."""
+    def command(self, u: Scalar, axis: int = 0) -> None:
+        """Set the gimbal rate of an axis, each cube in its direction."""
         ctrl = self._ctrl
-        for servo, direction in self._servos:
+        for servo, direction in self._servos[axis]:
             ctrl[servo] = direction * u
 
-    def push(self, torque: float) -> None:
-        """Set the torque on the frame."""
-        self._applied[self._tilt] = torque
+    def push(self, torque: float, axis: int = 0) -> None:
+        """Set the torque about an axis."""
+        for dof, share in self._pushes[axis]:
+            self._applied[dof] = share * torque
 
     def advance(self, steps: int) -> None:
         """Take physics steps."""
@@ -78,9 +79,9 @@ class ManyWorlds:
             data = plant.new_data()
             self._qpos[places], self._qvel[places] = data.qpos, data.qvel
             self._ctrl[places], act[places] = data.ctrl, data.act
-        self._servos = first.servos
-        self._directions = np.array(first.directions)
-        self._tilt = first.tilt
+        self._servos = [axis.servos for axis in first.axes]
+        self._directions = [np.array(axis.directions) for axis in first.axes]
+        self._pushes = [axis.line.push for axis in first.axes]
         self.running = np.ones(len(plants), dtype=bool)
         self._all_run = True
 
@@ -93,16 +94,17 @@ class ManyWorlds:
         try:
             self.batch.forward(None if self._all_run else self.running)
         except SimulationError as error:
-            self._qpos[error.ids, self._tilt] = np.nan
+            self._qpos[error.ids] = np.nan
         return self._sensordata.T.copy()
 
-    def command(self, u: Scalar) -> None:
-        """Set the gimbal rates, each cube in its direction."""
-        self._ctrl[:, self._servos] = np.multiply.outer(u, self._directions)
+    def command(self, u: Scalar, axis: int = 0) -> None:
+        """Set the gimbal rates of an axis, each cube in its direction."""
+        self._ctrl[:, self._servos[axis]] = np.multiply.outer(u, self._directions[axis])
 
-    def push(self, torque: Scalar) -> None:
-        """Set the torque on the frames, one for all or (n_worlds,)."""
-        self._applied[:, self._tilt] = torque
+    def push(self, torque: Scalar, axis: int = 0) -> None:
+        """Set the torques about an axis, one for all or (n_worlds,)."""
+        dofs, shares = self._pushes[axis]
+        self._applied[:, dofs] = np.multiply.outer(torque, shares)
 
     def stop(self, worlds: np.ndarray) -> None:
         """Step these worlds no more."""
@@ -110,8 +112,8 @@ class ManyWorlds:
         self._all_run = False
 
     def advance(self, steps: int) -> None:
-        """Take physics steps. A world in which MuJoCo raises is given a tilt that is NaN: it has diverged."""
+        """Take physics steps. A world in which MuJoCo raises is given joints that are NaN: it has diverged."""
         try:
             self.batch.step(None if self._all_run else self.running, nstep=steps)
         except SimulationError as error:
-            self._qpos[error.ids, self._tilt] = np.nan
+            self._qpos[error.ids] = np.nan

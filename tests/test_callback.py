@@ -343,7 +343,7 @@ def test_a_plant_can_be_stepped_without_the_callback_afterwards() -> None:
     of.run(driver="callback")
     data = of.plant.new_data()
     mujoco.mj_step(of.plant.model, data, 10)
-    assert data.ctrl[of.plant.servos].tolist() == [0.0, 0.0]
+    assert data.ctrl[of.plant.axis.servos].tolist() == [0.0, 0.0]
 
 
 def test_commands_reach_the_servos_in_their_directions() -> None:
@@ -353,7 +353,7 @@ def test_commands_reach_the_servos_in_their_directions() -> None:
         loop.step(lambda: control(plant, loop.controller, loop.data))
         assert loop.controller.tick is not None
         u = loop.controller.tick.u
-        assert loop.data.ctrl[plant.servos].tolist() == [u, -u]
+        assert loop.data.ctrl[plant.axis.servos].tolist() == [u, -u]
         assert loop.data.ctrl[[cube.motor for cube in plant.cubes]].tolist() == [314.0, -314.0]
 
 

@@ -106,7 +106,8 @@ def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _turned_back(plant: Plant, cube: Cube, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Turn, in the flywheel's own frame, from its true angle to the slowed one: translation and quaternion xyzw."""
     model = plant.model
-    axis, anchor = model.jnt_axis[cube.flywheel], model.jnt_pos[cube.flywheel]
+    joint = int(model.dof_jntid[cube.flywheel_dof])
+    axis, anchor = model.jnt_axis[joint], model.jnt_pos[joint]
     turn = (qpos[:, cube.flywheel] * (1.0 / FLYWHEEL_SLOWDOWN - 1.0))[:, None]
     quaternion = np.concatenate([np.sin(turn / 2.0) * axis, np.cos(turn / 2.0)], axis=1)
     along = axis * (axis @ anchor)
@@ -115,7 +116,7 @@ def _turned_back(plant: Plant, cube: Cube, qpos: np.ndarray) -> tuple[np.ndarray
 
 
 def _slowed_path(branch: str, plant: Plant, cube: Cube) -> str:
-    return f"{body_path(branch, plant, int(plant.model.jnt_bodyid[cube.flywheel]))}/slowed"
+    return f"{body_path(branch, plant, int(plant.model.dof_bodyid[cube.flywheel_dof]))}/slowed"
 
 
 def _log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float) -> None:
@@ -123,7 +124,7 @@ def _log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: floa
     model = plant.drawn_model
     parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
     for cube in plant.cubes:
-        parents[int(model.jnt_bodyid[cube.flywheel])] = _slowed_path(branch, plant, cube)
+        parents[int(model.dof_bodyid[cube.flywheel_dof])] = _slowed_path(branch, plant, cube)
     for body, name, shape in shapes(model, radius):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
         rec.log(f"{parents[body]}/{path}", shape, static=True)
@@ -151,7 +152,7 @@ def _log_push(
 def _edge(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     """The frame's upper edge on the radial line, and where a positive torque moves it, both in the frame's axes."""
     model = plant.drawn_model
-    axis, anchor = model.jnt_axis[plant.tilt], model.jnt_pos[plant.tilt]
+    axis, anchor = plant.axis.direction, plant.axis.point
     site = model.site_pos[model.sensor("accelerometer_outer").objid[0]] - anchor
     radial = site - axis * (axis @ site)
     distance = float(np.linalg.norm(radial))

@@ -52,7 +52,7 @@ def estimator(name: str, prepared: Experiment, **changed: Any) -> Observer:
 
 def servo_of(plant: Plant) -> Servo:
     """The gimbal servo that the model file describes."""
-    (servo,) = plant.servos
+    (servo,) = plant.axis.servos
     (cube,) = plant.cubes
     dof = int(plant.model.jnt_dofadr[cube.gimbal])
     return Servo(

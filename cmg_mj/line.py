@@ -1,0 +1,181 @@
+"""The line that a rig tilts about: a hinge, or, for a body that is free, a line through what it stands on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from cmg_mj.elementwise import Scalar, atan2
+
+
+@dataclass(frozen=True)
+class HingeLine:
+    """A hinge of the rig's.
+
+    Attributes:
+        joint: Its number.
+        angle: Its address in qpos.
+        dof: Its address in qvel.
+        zero: Its angle at the keyframe, where the rig stands upright [rad].
+        sign: +1, or -1 where the hinge turns against the axis.
+    """
+
+    joint: int
+    angle: int
+    dof: int
+    zero: float
+    sign: float = 1.0
+
+    def lean(self, qpos: Any) -> Scalar:
+        """Tilt from the keyframe [rad]."""
+        return self.sign * (qpos[self.angle] - self.zero)
+
+    def rate(self, qvel: Any) -> Scalar:
+        """Tilt rate [rad/s]."""
+        return self.sign * qvel[self.dof]
+
+    @property
+    def push(self) -> tuple[Sequence[int], Sequence[float]]:
+        """Addresses in qfrc_applied, and what each gets of a torque about the line."""
+        return [self.dof], [self.sign]
+
+    def motion(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+        """The joints' rates of a tilt rate of 1 rad/s, (nv,)."""
+        rates = np.zeros(model.nv)
+        rates[self.dof] = self.sign
+        return rates
+
+    def tilt(self, data: mujoco.MjData, angle: float) -> None:
+        """Tilt data, which is at the keyframe, by an angle [rad]."""
+        data.qpos[self.angle] = self.zero + self.sign * angle
+
+
+@dataclass(frozen=True)
+class SupportLine:
+    """A line through what a free body stands on, fixed to that body.
+
+    Attributes:
+        joint: The number of its free joint.
+        angle: The joint's address in qpos.
+        dof: The joint's address in qvel.
+        axes: The line's frame in the body's axes: x, y along the line, z upward at the keyframe, (3, 3), by columns.
+        point: A point of the line, in the body's frame [m].
+    """
+
+    joint: int
+    angle: int
+    dof: int
+    axes: np.ndarray
+    point: np.ndarray
+
+    def __post_init__(self) -> None:
+        # Looked up at every tick, as floats.
+        object.__setattr__(self, "_x", self.axes[:, 0].tolist())
+        object.__setattr__(self, "_y", self.axes[:, 1].tolist())
+        object.__setattr__(self, "_z", self.axes[:, 2].tolist())
+
+    _x: Sequence[float] = ()
+    _y: Sequence[float] = ()
+    _z: Sequence[float] = ()
+
+    def lean(self, qpos: Any) -> Scalar:
+        """Tilt of the line's z axis from the vertical about the line, as accelerometers see it [rad]."""
+        w, x, y, z = (qpos[self.angle + 3 + i] for i in range(4))
+        up = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)  # in the body's axes
+        return atan2(-_dot(up, self._x), _dot(up, self._z))
+
+    def rate(self, qvel: Any) -> Scalar:
+        """Angular velocity about the line [rad/s]."""
+        return _dot([qvel[self.dof + 3 + i] for i in range(3)], self._y)
+
+    @property
+    def push(self) -> tuple[Sequence[int], Sequence[float]]:
+        """Addresses in qfrc_applied, and what each gets of a torque about the line."""
+        return [self.dof + 3, self.dof + 4, self.dof + 5], self._y
+
+    def motion(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+        """The joints' rates of a tilt rate of 1 rad/s about the line, (nv,)."""
+        turn = data.xmat[int(model.jnt_bodyid[self.joint])].reshape(3, 3)
+        rates = np.zeros(model.nv)
+        rates[self.dof : self.dof + 3] = np.cross(turn @ self.axes[:, 1], turn @ -self.point)
+        rates[self.dof + 3 : self.dof + 6] = self.axes[:, 1]
+        return rates
+
+    def tilt(self, data: mujoco.MjData, angle: float) -> None:
+        """Tilt data, which is at the keyframe, by an angle [rad]."""
+        position, quaternion = data.qpos[self.angle : self.angle + 3], data.qpos[self.angle + 3 : self.angle + 7]
+        turned, moved = np.empty(4), np.empty(3)
+        axis, pivot = np.empty(3), np.empty(3)
+        mujoco.mju_rotVecQuat(axis, self.axes[:, 1].copy(), quaternion)
+        mujoco.mju_rotVecQuat(pivot, self.point, quaternion)
+        pivot += position
+        mujoco.mju_axisAngle2Quat(turned, axis, angle)
+        mujoco.mju_rotVecQuat(moved, position - pivot, turned)
+        data.qpos[self.angle : self.angle + 3] = pivot + moved
+        mujoco.mju_mulQuat(turned, turned.copy(), quaternion.copy())
+        data.qpos[self.angle + 3 : self.angle + 7] = turned / math.sqrt(float(turned @ turned))
+
+
+Line = HingeLine | SupportLine
+
+SAME_LINE_M = 1e-3
+"""A hinge whose axis passes by a site at a larger distance is not the line that the site marks [m]."""
+SAME_DIRECTION = math.cos(math.radians(1.0))
+
+
+def line_of_joint(model: mujoco.MjModel, joint: int, key: int) -> HingeLine:
+    """The axis of a hinge.
+
+    Args:
+        model: The compiled model.
+        joint: The hinge's number.
+        key: The keyframe at which the rig stands upright.
+
+    Returns:
+        The line.
+    """
+    angle = int(model.jnt_qposadr[joint])
+    return HingeLine(joint, angle, int(model.jnt_dofadr[joint]), float(model.key_qpos[key, angle]))
+
+
+def line_at_site(model: mujoco.MjModel, data: mujoco.MjData, site: int, key: int) -> Line | None:
+    """The line along a site's y axis: of the hinge there, or of the free body that carries it.
+
+    Args:
+        model: The compiled model.
+        data: The rig at the keyframe, after a forward pass.
+        site: The site's number.
+        key: The keyframe.
+
+    Returns:
+        The line; None if the body neither hangs on a hinge along it nor is free.
+    """
+    at, axes = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
+    body = int(model.site_bodyid[site])
+    while body:
+        first = int(model.body_jntadr[body])
+        for joint in range(first, first + int(model.body_jntnum[body])):
+            kind = int(model.jnt_type[joint])
+            if kind == int(mujoco.mjtJoint.mjJNT_FREE):
+                turn = data.xmat[body].reshape(3, 3).T
+                at_joint = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+                return SupportLine(joint, *at_joint, turn @ axes, turn @ (at - data.xpos[body]))
+            along = float(data.xaxis[joint] @ axes[:, 1])
+            past = np.cross(data.xanchor[joint] - at, axes[:, 1])
+            if (
+                kind == int(mujoco.mjtJoint.mjJNT_HINGE)
+                and abs(along) > SAME_DIRECTION
+                and float(np.linalg.norm(past)) < SAME_LINE_M
+            ):
+                return replace(line_of_joint(model, joint, key), sign=math.copysign(1.0, along))
+        body = int(model.body_parentid[body])
+    return None
+
+
+def _dot(a: Any, b: Sequence[float]) -> Scalar:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
