@@ -97,6 +97,22 @@ def load_rig(path: Path, *, lock: bool) -> tuple[mujoco.MjModel, list[str]]:
     return model, hints
 
 
+def check_rig(path: Path, name: Path) -> None:
+    """See that a file is a rig.
+
+    Args:
+        path: The file.
+        name: What to call it in messages.
+
+    Raises:
+        InputError: It is none.
+    """
+    try:
+        load_rig(path, lock=False)
+    except InputError as error:
+        raise InputError(str(error).replace(str(path), str(name))) from error
+
+
 def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
     """Take the yaw joint out, and its entry out of every keyframe."""
     names = [joint.name for joint in spec.joints]

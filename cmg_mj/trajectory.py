@@ -199,9 +199,17 @@ class Trajectory:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary name to write to; rename it to `path` at the end, or remove it if the writing failed."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+def whole_file(path: Path, ending: str = "") -> Iterator[Path]:
+    """Give a temporary name to write to; rename it to `path` at the end, or remove it if the writing failed.
+
+    Args:
+        path: The file.
+        ending: Of the temporary name, for readers that go by it.
+
+    Yields:
+        The temporary file.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial{ending}")
     try:
         yield temporary
         temporary.replace(path)
