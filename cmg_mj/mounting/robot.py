@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -38,23 +39,40 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
     Raises:
         InputError: It is no MJCF, does not compile, or has something switched off that mounting needs.
     """
-    if isinstance(robot, mujoco.MjSpec):
-        spec, path = robot.copy(), Path(robot.modelname or "robot")
-    else:
+    if isinstance(robot, (str, Path)):
         path = Path(robot).expanduser()
         if not path.is_file():
             raise InputError(f"{path}: no such file")
         spec = parse(path)
-    compile_model(spec, path)
+    else:
+        spec, path = robot.copy(), Path(robot.modelname or "robot")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what is deprecated in the user's file
+        compile_model(spec, path)
     off = [flag for name, flag in NEEDED.items() if spec.option.disableflags & int(getattr(mujoco.mjtDisableBit, name))]
     if off:
         raise InputError(
             f'{path}: <flag {off[0]}="disable"/> switches off what a mounted pair needs; take it out of the file'
         )
+    _bake_total_mass(spec, path)
     for body in spec.bodies:
         for i, joint in enumerate(body.joints):
             joint.name = joint.name or f"{body.name or f'body{body.id}'}_joint{i or ''}"
     return spec, path
+
+
+def _bake_total_mass(spec: mujoco.MjSpec, path: Path) -> None:
+    """Write masses out that the compiler would scale to a total: the modules are not to be scaled with them."""
+    if not spec.compiler.settotalmass > 0.0:
+        return
+    model = compile_model(spec, path)
+    spec.compiler.settotalmass = -1.0
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+    for body in spec.bodies:
+        if body.name != "world":
+            body.mass, body.inertia = float(model.body_mass[body.id]), model.body_inertia[body.id]
+            body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
+            body.explicitinertial = True
 
 
 def body_of(spec: mujoco.MjSpec, name: str, path: Path) -> mujoco.MjsBody:
