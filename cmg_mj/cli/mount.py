@@ -1,0 +1,128 @@
+"""The command that mounts a pair on a robot."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from cmg_mj.cli.arguments import named
+from cmg_mj.cli.terminal import say, say_hints, users_code
+from cmg_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from cmg_mj.mounting import Mounted
+
+
+@click.command(short_help="Mount a pair on a robot of your own: any MJCF in, a rig out.")
+@click.argument("robot", metavar="ROBOT.xml")
+@click.option("--body", required=True, metavar="NAME", help="The body that carries the pair and its sensors.")
+@click.option(
+    "--axis",
+    default="y",
+    show_default=True,
+    help="About what it tilts: a hinge's name, or a direction in the body's frame, x, y or '0.1 1 0'. Of a body that hangs "
+    "on a hinge along it, that hinge; of a free one, the line that it stands on.",
+)
+@click.option("-o", "--out", metavar="FILE", default="balanced.xml", show_default=True, help="What to write.")
+@click.option("--at", metavar="'X Y Z'", help="Where the pair's middle is, in the body's frame [m].  [default: its mass]")
+@click.option("--cubes", default=2, show_default=True, metavar="N", help="How many modules.")
+@click.option("--scale", default=1.0, show_default=True, metavar="S", help="Of the modules' lengths.")
+@click.option("--name", default="", help="Of the axis; a second one on the same robot needs one.")
+@click.option("--keyframe", metavar="NAME", help="In which the robot stands.  [default: its reference pose]")
+@click.option(
+    "--hold",
+    type=click.Choice(["constraints", "servos"]),
+    default="constraints",
+    show_default=True,
+    help="What holds the robot's other joints: constraints all of them, or its own servos those that have one.",
+)
+@click.option("--free", multiple=True, metavar="JOINT", help="A joint that nothing holds. May be given again.")
+@click.option("--free-base", is_flag=True, help="Let the robot stand on the floor: its root's joints make way for a free one.")
+@click.option("--observer", default="homogeneous", show_default=True, metavar="NAME", help="With which it is to stand.")
+@click.option("--json", "as_json", is_flag=True, help="Print what the pair can do as JSON, and nothing else.")
+@users_code()
+def mount(
+    robot: str,
+    body: str,
+    axis: str,
+    out: str,
+    at: str | None,
+    cubes: int,
+    scale: float,
+    name: str,
+    keyframe: str | None,
+    hold: str,
+    free: tuple[str, ...],
+    free_base: bool,
+    observer: str,
+    as_json: bool,
+) -> None:
+    """Mount control moment gyroscopes on a robot, and say what they can do there.
+
+    Writes the robot with the pair on it, which plain MuJoCo loads too, and beside it a scenario to run: its gains are
+    Table 2's, carried over by the robot's time scale and the pair's authority, and it is pushed with 0.6 of what it
+    bears.
+    """
+    from cmg_mj.mounting import mount as mounted_on
+    from cmg_mj.mounting.prospects import LOW_CEILING_DEG, prospects, scale_that_suffices
+    from cmg_mj.mounting.told import told, write_scenario
+    from cmg_mj.plant import load_plant
+    from cmg_mj.recoverable import ceiling
+
+    along = axis.split() if len(axis.split()) == 3 else axis
+
+    def mounted_at(size: float) -> Mounted:
+        return mounted_on(
+            named(robot),
+            body,
+            axis=along,  # type: ignore[arg-type]
+            at=_point(at),
+            cubes=cubes,
+            scale=size,
+            name=name,
+            keyframe=keyframe,
+            hold=hold,  # type: ignore[arg-type]
+            free=free,
+            base="free" if free_base else "as_is",
+        )
+
+    found = mounted_at(scale)
+    target = found.save(named(out))
+    experiment = write_scenario(target, found.path, observer)
+    can = prospects(experiment)
+    experiment = write_scenario(target, found.path, observer, can)
+    enough = None
+    if math.degrees(can.ceiling.tilt) < LOW_CEILING_DEG:
+
+        def ceiling_at(size: float) -> float:
+            trial = mounted_at(size).save(target.with_name(f".{target.name}.trial.xml"))
+            try:
+                return ceiling(load_plant(model=str(trial)).reduced, experiment.law.rate_limit).tilt
+            finally:
+                trial.unlink()
+
+        enough = scale_that_suffices(ceiling_at, scale)
+    if as_json:
+        figures = can.figures() | {"model": str(target), "held": list(found.held), "scale_that_suffices": enough}
+        click.echo(json.dumps(figures, indent=2))
+        return
+    for line in told(found, experiment.plant, can, enough):
+        click.echo(line)
+    say_hints(can.hints)
+    say(f"wrote {target} and {target.with_suffix('.toml')}; try: cmg-mj run {target.with_suffix('.toml')}")
+
+
+def _point(at: str | None) -> list[float] | None:
+    if at is None:
+        return None
+    try:
+        point = [float(part) for part in at.replace(",", " ").split()]
+    except ValueError:
+        point = []
+    if len(point) != 3:
+        raise InputError(f"--at {at}: must be three numbers, such as '0 0 0.1' [m]")
+    return point

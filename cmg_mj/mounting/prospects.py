@@ -1,0 +1,120 @@
+"""What a pair can do on a robot: the ceiling for any controller, what this one bears, and whether the robot is the model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+
+from cmg_mj.bearable import PUSH_S, Bearable, bearable
+from cmg_mj.engine import control_callback, quiet
+from cmg_mj.experiment import Experiment
+from cmg_mj.mounting.mount import SCALES
+from cmg_mj.plant import Plant
+from cmg_mj.recoverable import Ceiling, ceiling
+from cmg_mj.reduced import ReducedModel
+
+LOW_CEILING_DEG = 2.0
+"""A pair that recovers less tilt is too small for the robot [deg]."""
+OFF = 0.1
+"""A robot that starts to fall so much faster or slower than its reduced model is not what that takes it for."""
+TRIED_DEG = 0.05
+"""From which tilt it is let fall [deg]."""
+FOR_TIME_CONSTANTS = 1.5
+"""Of the reduced model's unstable pole, for so long."""
+
+
+@dataclass(frozen=True)
+class Prospects:
+    """What a pair can do on a robot.
+
+    Attributes:
+        reduced: The reduced model read off.
+        ceiling: For any controller.
+        bears: What the law, the observer and the sensors of the scenario bear.
+        pole: The rate at which the simulated robot starts to fall with nothing controlled, its flywheels at rest [1/s].
+    """
+
+    reduced: ReducedModel
+    ceiling: Ceiling
+    bears: Bearable
+    pole: float
+
+    @property
+    def hints(self) -> list[str]:
+        """What is no mistake and yet likely to make the robot fall, in clauses."""
+        off = self.pole / self.ceiling.pole - 1.0
+        hints = []
+        if not abs(off) < OFF:
+            hints.append(
+                f"the robot starts to fall with a pole of {self.pole:.3g} 1/s, its reduced model's is "
+                f"{self.ceiling.pole:.3g}: what it stands on gives way (soft contacts, or joints that are held softly)"
+            )
+        if self.bears.impulse == 0.0:
+            hints.append("with this controller it falls without a push")
+        return hints
+
+    def figures(self) -> dict[str, Any]:
+        """The numbers by name, as `--json` prints them."""
+        model = self.reduced
+        n = model.gimbals
+        return {
+            "inertia_kg_m2": n * model.J1,
+            "gravity_torque_n_m": n * model.gravity_torque,
+            "momentum_n_m_s": n * model.J_d * model.omega_d,
+            "pole_1_s": self.ceiling.pole,
+            "pole_simulated_1_s": self.pole,
+            "ceiling_tilt_deg": math.degrees(self.ceiling.tilt),
+            "ceiling_impulse_n_m_s": self.ceiling.impulse,
+            "borne_impulse_n_m_s": self.bears.impulse,
+            "borne_impulse_least_n_m_s": self.bears.least,
+            "borne_push_n_m": self.bears.impulse / PUSH_S,
+        }
+
+
+def prospects(experiment: Experiment) -> Prospects:
+    """Find what a pair can do.
+
+    Args:
+        experiment: The robot, and the controller it is to have.
+
+    Returns:
+        The prospects.
+    """
+    plant = experiment.plant
+    top = ceiling(plant.reduced, experiment.law.rate_limit)
+    return Prospects(plant.reduced, top, bearable(experiment.scenario, experiment.design), starts_to_fall(plant))
+
+
+@quiet()
+def starts_to_fall(plant: Plant) -> float:
+    """The rate at which a rig starts to fall from a small tilt, its flywheels at rest and its gimbals held [1/s]."""
+    model, line = plant.model, plant.axis.line
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, plant.key)
+    data.qvel[:], data.ctrl[[cube.motor for cube in plant.cubes]] = 0.0, 0.0
+    line.tilt(data, -plant.axis.bias + math.radians(TRIED_DEG))
+    for_s = FOR_TIME_CONSTANTS / math.sqrt(plant.reduced.gravity_torque / plant.reduced.J1)
+    with control_callback(None):
+        mujoco.mj_step(model, data, max(1, round(for_s / model.opt.timestep)))
+    grown = (float(line.lean(data.qpos)) + plant.axis.bias) / math.radians(TRIED_DEG)
+    return math.acosh(grown) / float(data.time) if grown > 1.0 else 0.0
+
+
+def scale_that_suffices(ceiling_at: Callable[[float], float], scale: float) -> float | None:
+    """A scale of the modules, a tenth larger each time, with which a robot recovers two degrees.
+
+    Args:
+        ceiling_at: The ceiling's tilt for a scale [rad].
+        scale: What does not suffice.
+
+    Returns:
+        The scale; None if none up to the largest suffices.
+    """
+    while (scale := round(1.1 * scale, 2)) <= SCALES[1]:
+        if ceiling_at(scale) >= math.radians(LOW_CEILING_DEG):
+            return scale
+    return None

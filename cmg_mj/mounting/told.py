@@ -1,0 +1,91 @@
+"""What `cmg-mj mount` says and writes beside the robot: a scenario to run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import tomli_w
+
+from cmg_mj.bearable import PUSH_S
+from cmg_mj.experiment import Experiment, prepare
+from cmg_mj.line import HingeLine
+from cmg_mj.mounting.mount import Mounted
+from cmg_mj.mounting.prospects import LOW_CEILING_DEG, Prospects
+from cmg_mj.plant import Plant
+from cmg_mj.scenario import load_scenario
+from cmg_mj.trajectory import whole_file
+
+START_DEG, SHARE_OF_CEILING = 1.0, 0.25
+"""A run starts with one degree of tilt, or with a quarter of the ceiling if that is less."""
+SHARE_OF_BORNE = 0.6
+PUSHED_AT_S = 5.0
+
+
+def write_scenario(model: Path, robot: Path, observer: str, can: Prospects | None = None) -> Experiment:
+    """Write a scenario beside a model that carries a pair.
+
+    Args:
+        model: The model's file; the scenario's has its name.
+        robot: What the model was made from, for the title.
+        observer: In the loop.
+        can: What the pair can do, which says how far the robot is tilted and pushed; without it, it is neither.
+
+    Returns:
+        The scenario, made ready to run.
+    """
+    tilt = min(START_DEG, SHARE_OF_CEILING * math.degrees(can.ceiling.tilt)) if can else 0.0
+    fields = {
+        "title": f"{robot.stem}, balanced",
+        "duration_s": 15.0,
+        "plant": {"model": model.name, "equilibrium_bias_deg": 0.0, "initial_tilt_deg": float(f"{tilt:.3g}")},
+        "controller": {"gains": "carried_over"},
+        "observer": {"kind": observer},
+    }
+    if can and can.bears.impulse:
+        torque = float(f"{SHARE_OF_BORNE * can.bears.impulse / PUSH_S:.3g}")
+        fields["push"] = [{"start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}]
+    path = model.with_suffix(".toml")
+    with whole_file(path) as temporary:
+        temporary.write_text(tomli_w.dumps(fields), encoding="utf-8")
+    return prepare(load_scenario(str(path)))
+
+
+def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -> Iterator[str]:
+    """What was done, and what the pair can do there, line by line.
+
+    Args:
+        mounted: The robot with its pair.
+        plant: The same as a rig.
+        can: What the pair can do.
+        enough: If the ceiling is low, the scale that suffices.
+
+    Yields:
+        Lines.
+    """
+    figures = can.figures()
+    line = plant.axis.line
+    joint = plant.model.joint(line.joint).name
+    about = f"the hinge {joint!r}" if isinstance(line, HingeLine) else "the line that it stands on"
+    yield f"{mounted.path}: {len(plant.axis.cubes)} modules on {plant.model.body(plant.frame).name!r}; tilts about {about}"
+    if mounted.held:
+        yield f"  held where they stand: {', '.join(mounted.held)}"
+    for note in mounted.notes:
+        yield f"  {note}"
+    yield (
+        f"  inertia {figures['inertia_kg_m2']:.4g} kg m^2, gravity {figures['gravity_torque_n_m']:.4g} N m, momentum "
+        f"{figures['momentum_n_m_s']:.4g} N m s, falls with {figures['pole_1_s']:.3g} 1/s"
+    )
+    yield (
+        f"  any controller: recovers at most {figures['ceiling_tilt_deg']:.3g} deg, or a push of "
+        f"{figures['ceiling_impulse_n_m_s'] / PUSH_S:.3g} N m for {PUSH_S:g} s"
+    )
+    yield (
+        f"  this one: bears a push of {figures['borne_push_n_m']:.3g} N m for {PUSH_S:g} s (E = "
+        f"{figures['borne_impulse_n_m_s']:.3g} N m s, {can.bears.impulse / can.ceiling.impulse:.0%} of that)"
+    )
+    if enough is not None:
+        yield f"  a pair of this size recovers less than {LOW_CEILING_DEG:g} deg: --scale {enough:g} suffices"
+    elif figures["ceiling_tilt_deg"] < LOW_CEILING_DEG:
+        yield f"  a pair recovers less than {LOW_CEILING_DEG:g} deg at any scale"
