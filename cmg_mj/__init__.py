@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cmg_mj.controller import Controller
     from cmg_mj.errors import InputError, RunStopped
     from cmg_mj.experiment import Experiment, prepare
-    from cmg_mj.law import Law, lqr_gains
+    from cmg_mj.laws import LAWS, Fed, Law, StateFeedback, lqr_gains, make_law
     from cmg_mj.logs import Log, read_log
     from cmg_mj.observers import OBSERVERS, Estimate, Measurement, Observer, make_observer
     from cmg_mj.plant import Plant, load_plant
@@ -41,7 +41,7 @@ _HOMES = {
     "reduced": ("ReducedModel",),
     "replay.replayed": ("Replayed", "replay_log"),
     "experiment": ("Experiment", "prepare"),
-    "law": ("Law", "lqr_gains"),
+    "laws": ("LAWS", "Fed", "Law", "StateFeedback", "lqr_gains", "make_law"),
     "logs": ("Log", "read_log"),
     "scenario": ("load_scenario", "parse_scenario"),
     "schema": ("Scenario",),
@@ -54,12 +54,14 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "LAWS",
     "OBSERVERS",
     "Accelerometer",
     "Controller",
     "Encoder",
     "Estimate",
     "Experiment",
+    "Fed",
     "Fog",
     "InputError",
     "Law",
@@ -77,6 +79,7 @@ __all__ = [
     "RunStopped",
     "Scenario",
     "Sensors",
+    "StateFeedback",
     "Swept",
     "Trajectory",
     "control",
@@ -84,6 +87,7 @@ __all__ = [
     "load_plant",
     "load_scenario",
     "lqr_gains",
+    "make_law",
     "make_observer",
     "parse_scenario",
     "prepare",

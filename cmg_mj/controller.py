@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from cmg_mj.backlash import Backlash
+from cmg_mj.commanding import Commanding
 from cmg_mj.elementwise import Scalar
 from cmg_mj.gimbal_angle import GimbalAngle
 from cmg_mj.ideal import Ideal
-from cmg_mj.law import Law
+from cmg_mj.laws.protocol import Fed, Law
 from cmg_mj.observers.protocol import Measurement, Observer
 from cmg_mj.observing import Observing, read_only
 from cmg_mj.sensors import Sensors, at_work
@@ -24,6 +25,9 @@ Angles = Literal["measured", "estimated"]
 
 CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s"})
 """Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
+
+
+_new = tuple.__new__
 
 
 class Tick(NamedTuple):
@@ -46,7 +50,7 @@ class Controller:
 
     Args:
         observer: The observer whose estimate the law uses.
-        law: The control law; its `dt` is the control period.
+        law: The control law; its `dt` is the control period, beyond its `rate_limit` no command goes.
         tilt: The tilt estimate.
         sensors: What stands between the ideal readings and the controller.
         directions: For each gimbal +1 or -1: the sign of u that it is given.
@@ -103,6 +107,7 @@ class Controller:
         self.companions = dict(companions or {})
         self._single = isinstance(worlds, int)
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
+        self._commanding = Commanding(law, self._single, timestep)
         self._observing = Observing([observer, *self.companions.values()], self._single, timestep)
         self.extra_signals = self._observing.extra_signals
         self.trim_s = trim_s
@@ -115,7 +120,6 @@ class Controller:
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
         self._sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds)
-        self._x_e: Scalar = 0.0
         self.tick: Tick | None = None
         self.turning: Scalar = None
         """The rate at which the gimbals are turned since the last tick: its u, behind the backlash [rad/s]."""
@@ -165,7 +169,7 @@ class Controller:
             The tick, which counts as the last one from now on.
 
         Raises:
-            RunStopped: An observer returned a number that is not finite.
+            RunStopped: The observer or the law failed, or returned a number that is not finite.
         """
         y1, y2, acceleration = (
             self.tilt(*forces),
@@ -174,22 +178,32 @@ class Controller:
         )
         y = Measurement(y1, y2, acceleration)
         if not self._single:
-            read_only(y1, y2, acceleration)  # observers share them
+            read_only(y1, y2, acceleration)  # observers and the law share them
         if self.tick is None:
-            estimates = self._observing.start(y, step)
-            self._x_e = 0.0 * y1
+            estimates, held = self._observing.start(y, step), 0.0 * y1
+            self._commanding.start(y, step)
         else:
-            estimates = self._observing.advance(y, self.tick.u, step)
-        x1, x2, x3 = estimates[0][:3]
-        if self.angles == "measured":
-            x1, x3 = y1, y2
-        if self.feedback != "observer":
-            x2 = fog if self.feedback == "fog" else rate
-        x_e = self._x_e
+            held = self.tick.u
+            estimates = self._observing.advance(y, held, step)
+        estimate = estimates[0]
         if step < self.trimmed_until:
-            x_e = self.trim_gain * estimates[0][self.trim_part]
-        u, self._x_e = self.law(x1, x2, x3, x_e)
+            self._commanding.trim(self.trim_gain * estimate[self.trim_part])
+        u, x_e = self._commanding.decide(y, self._fed(y, estimate, fog, rate), held, step)
         if not self._single:
             read_only(u)  # observers get it at the next tick, the trajectory later
         self.tick = Tick(y1, y2, acceleration, fog, u, x_e, estimates)
         return self.tick
+
+    def _fed(self, y: Measurement, estimate: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Fed:
+        """What is fed back to the law, out of all that is known."""
+        x1, x2, x3 = estimate[:3]
+        if self.angles == "measured":
+            x1, x3 = y
+        if self.feedback != "observer":
+            x2 = fog if self.feedback == "fog" else rate
+        if not self._single:
+            x2 = x2.copy()  # it is the sensor's, or on record: a law may change it
+        fed = _new(Fed, (x1, x2, x3))
+        if len(estimate) > 3:
+            fed.extra = tuple(estimate[3:])
+        return fed

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from cmg_mj.design import Design
 from cmg_mj.grid import physics_step
 from cmg_mj.known_rigs import RigFacts
+from cmg_mj.laws import LAWS, TABLE_2_GAINS, StateFeedback
+from cmg_mj.laws.protocol import needs
 from cmg_mj.loop_check import closed_loop, hints
 from cmg_mj.resolved import resolved
-from cmg_mj.schema import Scenario
+from cmg_mj.schema import ControllerSettings, Scenario
 
 
 def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) -> str:
@@ -25,12 +27,10 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
     Returns:
         Lines of text.
     """
-    law = design.law
     settings = scenario.plant
     timestep = physics_step(scenario, rig.largest_step)
     fields = resolved(scenario, design, rig.path, timestep)
     steps = f"{round(scenario.duration_s / timestep)} physics steps of {timestep:g} s"
-    loop = closed_loop(scenario, law, rig.reduced)
     coarse = (
         f"; figures are accurate up to {rig.largest_step:g} s" if timestep > rig.largest_step * (1.0 + 1e-9) else ""
     )
@@ -44,10 +44,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         ("plant", f"{fields['plant']['model']}, cubes: {', '.join(rig.cubes)}"),
         *([("", assignments(changes))] if changes else []),
         ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
-        ("law", f"K_e = {number(law.gains)} at {scenario.controller.rate_hz:g} Hz, at most {law.rate_limit:g} rad/s"),
-        ("", f"tilt rate from the {scenario.controller.feedback}, {scenario.controller.angles} angles"),
-        ("", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"),
-        ("", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"),
+        *_law_rows(scenario, design, rig, fields["controller"]),
         ("observer", f"{scenario.observer.kind}  {assignments(observer)}".rstrip()),
         *(
             [("", "your own code, which was imported and tried on two samples")]
@@ -61,6 +58,29 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         *(("push", f"{p.torque_n_m:g} N m from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     return lines(f"{name}: valid", [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))])
+
+
+def _law_rows(
+    scenario: Scenario, design: Design, rig: RigFacts, fields: Mapping[str, Any]
+) -> Iterator[tuple[str, str]]:
+    """What the law is, what it is fed, and of the papers' what it makes of the reduced model."""
+    controller, law = scenario.controller, design.law
+    at = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
+    fed = f"tilt rate from the {controller.feedback}, {controller.angles} angles"
+    if isinstance(law, StateFeedback):
+        loop = closed_loop(scenario, law, rig.reduced)
+        yield "law", f"K_e = {number(law.gains)} {at}"
+        yield "", fed
+        yield "", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"
+        yield "", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"
+        return
+    yield "law", f"{controller.kind} {at}"
+    own = {name: value for name, value in fields.items() if name not in ControllerSettings.model_fields}
+    if own:
+        yield "", assignments(own)
+    yield "", fed if needs(law) else "takes nothing of the observer, which is judged only"
+    if controller.kind not in LAWS:
+        yield "", "your own code, which was imported and tried on two samples"
 
 
 def rig_description(name: str, scenario: Scenario, design: Design, rig: RigFacts) -> str:
@@ -82,7 +102,7 @@ def rig_description(name: str, scenario: Scenario, design: Design, rig: RigFacts
         ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
         ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
         ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
-        ("law", f"Table 2's gains, K_e = {number(design.law.gains)}"),
+        ("law", f"Table 2's gains, K_e = {number(TABLE_2_GAINS)}"),
         *(("hint", hint) for hint in hints(scenario, design, rig)),
         ("run it", f"cmg-mj run push_recovery --set plant.model={name}"),
     ]

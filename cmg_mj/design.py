@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from cmg_mj.complaint import fields_of, not_allowed
 from cmg_mj.errors import InputError
 from cmg_mj.grid import check_times
 from cmg_mj.known_rigs import RigFacts
-from cmg_mj.law import Law
-from cmg_mj.observers import GIVEN, Observer, make_observer, observer_class
+from cmg_mj.laws import LAWS, Law
+from cmg_mj.laws.protocol import NEEDS, needs
+from cmg_mj.laws.registry import OF_LAWS, law_class
+from cmg_mj.observers import Observer, make_observer, observer_class
 from cmg_mj.observers.protocol import extra_signals
+from cmg_mj.observers.registry import OF_OBSERVERS
 from cmg_mj.reduced import ReducedModel
-from cmg_mj.rehearsal import rehearse
-from cmg_mj.scenario import as_json, located
-from cmg_mj.schema import Scenario
+from cmg_mj.rehearsal import rehearse, rehearse_law
+from cmg_mj.scenario import located, unknown_to_law
+from cmg_mj.schema import ControllerSettings, Scenario
 from cmg_mj.tilt import TiltNoise
 from cmg_mj.trim import trim_of
 
@@ -27,12 +27,12 @@ from cmg_mj.trim import trim_of
 class Design:
     """The law of a scenario, and its observers.
 
-    Observers are made anew whenever they are asked for: a user's may remember more than its state holds.
+    What a user has written is made anew whenever it is asked for: it may remember more than its state holds.
 
     Attributes:
         scenario: What it was made from.
         rig: The rig it was made for.
-        law: The control law.
+        law: The control law, to be looked at: what runs is `fresh_law`.
     """
 
     scenario: Scenario
@@ -44,6 +44,11 @@ class Design:
         """What every observer is given: the control period [s], the reduced model, the noise by the datasheet."""
         return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors)
 
+    def fresh_law(self) -> Law:
+        """The law, fresh."""
+        controller = self.scenario.controller
+        return self.law if controller.kind in LAWS else controller.law(*self.given[1:])
+
     def observer(self) -> Observer:
         """The observer in the loop, fresh."""
         return self.scenario.observer.make(*self.given)
@@ -53,13 +58,13 @@ class Design:
         return {name: make_observer(name, *self.given) for name in self.scenario.companion_names()}
 
     def rehearse(self, worlds: int | None = None) -> None:
-        """Try every observer once, so that one that cannot work is found before a run and not at its first sample.
+        """Try the law and every observer once: one that cannot work is found before a run, not at its first sample.
 
         Args:
             worlds: Try it on arrays of so many worlds; None for floats.
 
         Raises:
-            InputError: An observer raised an exception or returned something else than a state and an estimate.
+            InputError: One raised an exception or returned something else than it must.
         """
         tried = [("observer.kind =", self.scenario.observer.kind, self.observer())]
         tried += [("companions:", name, observer) for name, observer in self.companions().items()]
@@ -69,6 +74,10 @@ class Design:
                     rehearse(observer, worlds)
                 except InputError as error:
                     raise InputError(f"{field} {name!r}: {error}") from error
+            try:
+                rehearse_law(self.fresh_law(), len(extra_signals(tried[0][2])), worlds)
+            except InputError as error:
+                raise InputError(f"controller.kind = {self.scenario.controller.kind!r}: {error}") from error
 
 
 def design(scenario: Scenario, rig: RigFacts) -> Design:
@@ -87,9 +96,11 @@ def design(scenario: Scenario, rig: RigFacts) -> Design:
     try:
         check_times(scenario)
         _check_observers(scenario)
-        made = Design(scenario, rig, scenario.controller.law(rig.reduced))
+        controller = scenario.controller
+        _check_law(controller)
+        made = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
         made.rehearse()
-        trim_of(scenario.controller.trim_s, made.law, extra_signals(made.observer()))
+        trim_of(controller.trim_s, made.law, extra_signals(made.observer()))
     except InputError as error:
         raise InputError(located(scenario._where, str(error))) from error
     return made
@@ -104,17 +115,27 @@ def _check_observers(scenario: Scenario) -> None:
             observer_class(name)
         except InputError as error:
             raise InputError(str(error).replace("observer.kind = ", f"{field}: ", 1)) from error
-    kind, parameters = scenario.observer.kind, scenario.observer.parameters
-    types = fields_of(observer_class(kind))
-    for name, value in parameters.items():
-        if name in GIVEN:
-            raise InputError(f"observer.{name}: set by the bench, which gives it to every observer")
-        if name not in types:
-            continue  # a name that the class does not have, or no class of pydantic's: its constructor decides
-        adapter = TypeAdapter(types[name], config=ConfigDict(strict=True, allow_inf_nan=False))
-        try:
-            adapter.validate_json(json.dumps(value, default=as_json))
-        except ValidationError as error:
-            finite = all(detail["type"] != "finite_number" for detail in error.errors())
-            wrong = not_allowed(f"observer.{name}", value, types[name], finite=finite)
-            raise InputError(f"{wrong} (observer {kind})") from error
+    OF_OBSERVERS.check_types(scenario.observer.kind, scenario.observer.parameters)
+
+
+def _check_law(controller: ControllerSettings) -> None:
+    """The law exists, knows its parameters, which are of their types, and has a use for every field that is set."""
+    kind, parameters = controller.kind, controller.parameters
+    law = law_class(kind)
+    OF_LAWS.check_types(kind, parameters)
+    for wrong in unknown_to_law(kind, parameters):
+        raise InputError(wrong)
+    given = next((name for name in ("gains", "lqr") if getattr(controller, name) is not None), None)
+    if given and not OF_LAWS.may_take(kind, "gains"):
+        raise InputError(f"controller.{given}: {kind} takes no gains; leave it out")
+    try:
+        unused = () if needs(law) == NEEDS else ("feedback", "angles")
+    except InputError as error:
+        raise InputError(f"controller.kind = {kind!r}: {error}") from error
+    for name in unused:
+        value, usual = getattr(controller, name), ControllerSettings.model_fields[name].default
+        if value != usual:
+            raise InputError(
+                f"controller.{name} = {value!r}: {kind} takes nothing of the observer and has no use "
+                f"for this; leave it out, or set controller.{name}={usual}"
+            )

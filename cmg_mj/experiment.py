@@ -17,7 +17,7 @@ from cmg_mj.design import Design, design
 from cmg_mj.differences import differences
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.grid import check_steps, common_period
-from cmg_mj.law import Law
+from cmg_mj.laws import Law
 from cmg_mj.loop_check import hints
 from cmg_mj.overrides import assign
 from cmg_mj.plant import Plant, load_plant
@@ -75,7 +75,8 @@ class Experiment:
             The controller.
         """
         settings = self.scenario.controller
-        given = {"law": self.law, "sensors": self.scenario.sensors} | others
+        given: dict[str, Any] = {"sensors": self.scenario.sensors} | others
+        given.setdefault("law", self.design.fresh_law())
         return self.plant.controller(
             given.pop("observer", None) or self.design.observer(),
             **given,
@@ -298,7 +299,7 @@ def of_one_batch(
         For `Experiment.simulate`.
     """
     law, sensors, pushes = pooled(
-        [(each.law, each.scenario.sensors, tuple(each.scenario.push)) for each in experiments]
+        [(each.design.fresh_law(), each.scenario.sensors, tuple(each.scenario.push)) for each in experiments]
     )
     rigs = [each.plant for each in experiments]
     given = {"law": law, "sensors": sensors} | _of_the_rigs(rigs) | others

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from cmg_mj.design import Design
 from cmg_mj.known_rigs import RigFacts
-from cmg_mj.law import Law, closed_loop_poles
+from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.schema import Scenario
 from cmg_mj.stability import MARGIN, is_hurwitz
@@ -74,7 +74,7 @@ class Loop(NamedTuple):
         return None
 
 
-def closed_loop(scenario: Scenario, law: Law, model: ReducedModel) -> Loop:
+def closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) -> Loop:
     """The loop that a scenario's gains make.
 
     Args:
@@ -136,7 +136,8 @@ def hints(scenario: Scenario, design: Design, rig: RigFacts) -> list[str]:
     Returns:
         Clauses.
     """
-    loop = closed_loop(scenario, design.law, rig.reduced).hint
+    law = design.law
+    loop = closed_loop(scenario, law, rig.reduced).hint if isinstance(law, StateFeedback) else None
     return [*(f"{rig.path}: {hint}" for hint in rig.hints), *([loop] if loop else [])]
 
 

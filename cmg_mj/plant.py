@@ -24,7 +24,7 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.grid import fitting_step
 from cmg_mj.ideal import Ideal
 from cmg_mj.known_rigs import RigFacts
-from cmg_mj.law import Law
+from cmg_mj.laws import Law, StateFeedback
 from cmg_mj.line import HingeLine
 from cmg_mj.mjcf import compile_model, load_rig, lock_thrust_bearing, parse
 from cmg_mj.observers import Observer, make_observer
@@ -232,7 +232,7 @@ class Plant:
         Raises:
             InputError: The observer does not exist or refuses a parameter, or a rate does not fit the physics step.
         """
-        law = law or Law(dt=0.005)
+        law = law or StateFeedback(dt=0.005)
         sensors = sensors or Sensors()
         parameters = {name: options.pop(name) for name in options.keys() - CONTROLLER_OPTIONS}
         if isinstance(observer, str):

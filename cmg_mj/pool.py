@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmg_mj.design import Design
-from cmg_mj.law import Law
+from cmg_mj.laws import Law, law_class
+from cmg_mj.laws.registry import OF_LAWS
 from cmg_mj.observers.registry import takes_noise
 from cmg_mj.push import Push
 from cmg_mj.scenario import as_fields
@@ -40,6 +42,9 @@ ARRAYS = frozenset(
 )
 """Fields that worlds of one batch may differ in. Every other decides what is computed, or when."""
 
+OF_THE_LAW = {"controller.gains": "gains", "controller.lqr": "gains", "controller.rate_limit_rad_s": "rate_limit"}
+"""Fields of those that need a law which takes an array for one of its own."""
+
 UNUSED = frozenset({"title", "based_on", "versions", "compare"})
 
 
@@ -53,16 +58,19 @@ def structure(scenario: Scenario, design: Design) -> dict[str, str]:
     Returns:
         Field -> its value in words; worlds of which all are equal can be pooled.
     """
+    law = scenario.controller.kind
     found = {
         field: value
         for field, value in _leaves(as_fields(scenario))
-        if field.split(".")[0] not in UNUSED and not pools(field)
+        if field.split(".")[0] not in UNUSED and not pools(field, law)
     }
     _, model, noise = design.given
     found["the reduced model"] = repr(model)
     for observer in (scenario.observer.kind, *scenario.companion_names()):
         if takes_noise(observer):
             found[f"the sensors' noise, which {observer} is told,"] = repr(noise)
+    if "noise" in OF_LAWS.takes(law):
+        found["the noise that the law is told"] = repr(noise)
     return found
 
 
@@ -76,7 +84,20 @@ def pooled(
 ) -> tuple[Law, Sensors, tuple[Push, ...]]:
     """Law, sensors and pushes of many worlds as one, with arrays (n_worlds,) where they differ."""
     laws, sensors, pushes = zip(*worlds, strict=True)
-    return stacked(laws), stacked(sensors), tuple(stacked(each) for each in zip(*pushes, strict=True))
+    return _one_law(laws), stacked(sensors), tuple(stacked(each) for each in zip(*pushes, strict=True))
+
+
+def _one_law(laws: Sequence[Law]) -> Law:
+    """One law that stands for a law a world, which differ in what may be arrays alone."""
+    law = laws[0]
+    names = getattr(law, "arrays", ())
+    together = {name: stacked([getattr(each, name) for each in laws]) for name in names}
+    if all(values is getattr(law, name) for name, values in together.items()):
+        return law
+    made = copy.copy(law)
+    for name, values in together.items():
+        object.__setattr__(made, name, values)
+    return made
 
 
 def _leaves(fields: Any, at: str = "") -> list[tuple[str, str]]:
@@ -87,7 +108,8 @@ def _leaves(fields: Any, at: str = "") -> list[tuple[str, str]]:
     return [leaf for name, value in fields.items() for leaf in _leaves(value, f"{at}.{name}" if at else name)]
 
 
-def pools(field: str) -> bool:
-    """Whether worlds of one batch may differ in a field."""
+def pools(field: str, law: str) -> bool:
+    """Whether worlds of one batch may differ in a field, under a law of this kind."""
     parts = [part for part in field.split(".") if not part.isdecimal()]
-    return any(".".join(parts[: i + 1]) in ARRAYS for i in range(len(parts)))
+    found = next((name for i in range(len(parts)) if (name := ".".join(parts[: i + 1])) in ARRAYS), None)
+    return found is not None and (found not in OF_THE_LAW or OF_THE_LAW[found] in getattr(law_class(law), "arrays", ()))

@@ -1,4 +1,4 @@
-"""An observer tried once before a run, so that one that cannot work is found before its first sample."""
+"""An observer and a law tried once before a run, so that one that cannot work is found before its first sample."""
 
 from __future__ import annotations
 
@@ -6,28 +6,20 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, raised, shown
+from cmg_mj.laws.protocol import Fed, Law, integrator
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observing import read_only
 
+TILT = 0.011
+"""Of the second sample [rad]."""
+
 
 def rehearse(observer: Observer, worlds: int | None) -> None:
     """Two samples of one observer, on floats or on arrays of so many worlds."""
-
-    def sample(tilt: float) -> Measurement:
-        y = Measurement(tilt, -tilt, tilt)
-        return y if worlds is None else Measurement(*(np.full(worlds, number) for number in (*y, y.acceleration)))
-
-    hint = (
-        ""
-        if worlds is None
-        else "; many worlds come at once, as arrays that must not be changed: use operators and cmg_mj.elementwise"
-    )
-    u: Any = 0.1 if worlds is None else np.full(worlds, 0.1)
-    first, second = sample(0.01), sample(0.011)
-    if worlds is not None:
-        read_only(*first, first.acceleration, *second, second.acceleration, u)
+    first, second, u = _samples(worlds)
     call = "init(y)"
     try:
         names = ("x1", "x2", "x3", *extra_signals(observer))
@@ -38,20 +30,86 @@ def rehearse(observer: Observer, worlds: int | None) -> None:
         call = "step(state, y, u)"
         returned = observer.step(state, second, u)
     except (Exception, SystemExit) as error:  # a user's observer may fail in any way
-        raise InputError(f"{call} raised {raised(error)}{hint}") from error
+        raise InputError(f"{call} raised {raised(error)}{_hint(worlds)}") from error
     try:
         _, estimate = returned
         if not hasattr(estimate, "__len__"):  # a generator, which could be read once
             raise TypeError
         parts = list(zip(names, estimate, strict=True))
     except (TypeError, ValueError) as error:
-        pair = isinstance(returned, tuple) and len(returned) == 2
-        given = f"(state, {shown(returned[1])})" if pair else shown(returned)
-        raise InputError(f"{call} must return (state, ({', '.join(names)})), not {given}") from error
+        raise InputError(f"{call} must return (state, ({', '.join(names)})), not {_given(returned)}") from error
     for name, value in parts:
-        number = np.asarray(value)
-        if number.dtype.kind not in "fiu" or number.shape != np.shape(u):
-            wanted = "a number" if worlds is None else f"an array of {worlds} numbers"
-            raise InputError(f"{call} must return {wanted} for {name}, not {shown(value)}{hint}")
-        if not np.all(np.isfinite(number)):
-            raise InputError(f"{call} returned {shown(value)} for {name} at a tilt of 0.011 rad")
+        _check_number(call, name, value, worlds)
+
+
+def rehearse_law(law: Law, extra: int, worlds: int | None) -> None:
+    """Two samples of a law, fed back with so many signals beyond x, on floats or on arrays of so many worlds."""
+    first, second, u = _samples(worlds)
+    call = "init(y)"
+    try:
+        state = law.init(first)
+        call = "step(state, y, x, u)"
+        for y, rate, held in ((first, 0.0 * u, 0.0 * u), (second, u, u)):
+            if worlds is not None:
+                read_only(held)
+            x = Fed(y[0], rate, y[1])
+            x.extra = (rate,) * extra
+            returned = law.step(state, y, x, held)
+            _check_command(call, returned, state, worlds)
+            state = returned[0]
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:  # a user's law may fail in any way
+        raise InputError(f"{call} raised {raised(error)}{_hint(worlds)}") from error
+    trimmed = getattr(law, "trim_gain", None) is not None
+    if trimmed and not (hasattr(state, "_replace") and hasattr(state, "x_e")):
+        raise InputError(f"has a trim_gain, so its state must be a NamedTuple with x_e, not {shown(state)}")
+
+
+def _check_command(call: str, returned: Any, state: Any, worlds: int | None) -> None:
+    """What a law returned is a state and a gimbal rate."""
+    if not isinstance(returned, tuple) or len(returned) != 2:
+        raise InputError(f"{call} must return (state, u), not {shown(returned)}")
+    _check_number(call, "u", returned[1], worlds)
+    x_e = integrator(state)
+    number = np.asarray(x_e)
+    if number.dtype.kind not in "fiu" or number.shape not in ((), (worlds or 1,)):
+        raise InputError(f"x_e in its state must be {_wanted(worlds)}, not {shown(x_e)}")
+
+
+def _samples(worlds: int | None) -> tuple[Measurement, Measurement, Scalar]:
+    """Two measurements, and the gimbal rate between them, as a run has them."""
+
+    def sample(tilt: float) -> Measurement:
+        y = Measurement(tilt, -tilt, tilt)
+        return y if worlds is None else Measurement(*(np.full(worlds, number) for number in (*y, y.acceleration)))
+
+    u: Any = 0.1 if worlds is None else np.full(worlds, 0.1)
+    first, second = sample(0.01), sample(TILT)
+    if worlds is not None:
+        read_only(*first, first.acceleration, *second, second.acceleration, u)
+    return first, second, u
+
+
+def _hint(worlds: int | None) -> str:
+    if worlds is None:
+        return ""
+    return "; many worlds come at once, as arrays that must not be changed: use operators and cmg_mj.elementwise"
+
+
+def _wanted(worlds: int | None) -> str:
+    return "a number" if worlds is None else f"an array of {worlds} numbers"
+
+
+def _given(returned: Any) -> str:
+    pair = isinstance(returned, tuple) and len(returned) == 2
+    return f"(state, {shown(returned[1])})" if pair else shown(returned)
+
+
+def _check_number(call: str, name: str, value: Any, worlds: int | None) -> None:
+    """A part of what a step returned is a number of each world."""
+    number = np.asarray(value)
+    if number.dtype.kind not in "fiu" or number.shape != (() if worlds is None else (worlds,)):
+        raise InputError(f"{call} must return {_wanted(worlds)} for {name}, not {shown(value)}{_hint(worlds)}")
+    if not np.all(np.isfinite(number)):
+        raise InputError(f"{call} returned {shown(value)} for {name} at a tilt of {TILT:g} rad")

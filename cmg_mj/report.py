@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import sys
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +15,9 @@ from rich.text import Text
 from cmg_mj import markdown
 from cmg_mj.description import assignments
 from cmg_mj.differences import in_words
-from cmg_mj.observers import GIVEN, OBSERVERS, observer_class
+from cmg_mj.laws.registry import OF_LAWS
+from cmg_mj.observers.registry import OF_OBSERVERS
+from cmg_mj.own_class import Kind
 from cmg_mj.resources import bundled
 from cmg_mj.scenario import load_scenario
 from cmg_mj.summary_keys import KEYS, RIDING, difference, heading, spread, written
@@ -166,13 +167,22 @@ def scenario_list() -> str:
 
 def observer_list() -> str:
     """What `cmg-mj list observers` prints: every observer, the defaults of its parameters, what it is."""
-    width = max(len(name) for name in OBSERVERS)
-    lines = ["Observers, and the defaults of their parameters (--set observer.NAME=VALUE)"]
-    for name in OBSERVERS:
-        cls = observer_class(name)
-        parameters = [p for p in inspect.signature(cls).parameters.values() if p.name not in GIVEN]
-        title = (sys.modules[cls.__module__].__doc__ or "").partition("\n")[0]
-        defaults = assignments({p.name: p.default for p in parameters}) or "no parameters"
+    return _class_list(OF_OBSERVERS)
+
+
+def law_list() -> str:
+    """What `cmg-mj list laws` prints: every control law, the defaults of its parameters, what it is."""
+    return _class_list(OF_LAWS)
+
+
+def _class_list(kind: Kind) -> str:
+    """All of a kind: name, the defaults of its parameters, what it is."""
+    width = max(len(name) for name in kind.known)
+    lines = [f"{kind.what.capitalize()}s, and the defaults of their parameters (--set {kind.section}.NAME=VALUE)"]
+    for name in kind.known:
+        taken = kind.takes(name)
+        title = (sys.modules[kind.find(name).__module__].__doc__ or "").partition("\n")[0]
+        defaults = assignments({own: taken[own].default for own in kind.own(name)}) or "no parameters"
         indent = " " * (width + 4)
         # A default is kept in one piece: its spaces are not those to break at.
         wrapped = textwrap.wrap(defaults.replace(", ", ",\0"), 98, initial_indent=indent, subsequent_indent=indent)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import platform
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import tomli_w
 from pydantic import TypeAdapter
 
 from cmg_mj.design import Design
+from cmg_mj.laws.registry import GIVEN as GIVEN_TO_LAWS
 from cmg_mj.observers import GIVEN
 from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.resources import folder
@@ -39,25 +40,27 @@ def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float)
     fields["plant"] = {
         field.name: plant[field.name] for field in dataclasses.fields(PlantSettings) if field.name in plant
     }
-    controller = fields["controller"] | {"gains": list(design.law.gains), "lqr": None}
+    own = scenario.controller.parameters
+    law = {name: value for name, value in _parameters(own, design.law, GIVEN_TO_LAWS).items() if name != "gains"}
+    controller = fields["controller"] | {"gains": getattr(design.law, "gains", None), "lqr": None}
     fields["controller"] = {
         name: controller[name] for name in ControllerSettings.model_fields if controller[name] is not None
-    }
+    } | law
     fields["companions"] = scenario.companion_names()
     fields["observer"] = {
         "kind": scenario.observer.kind,
-        **_parameters(scenario.observer.parameters, design.observer()),
+        **_parameters(scenario.observer.parameters, design.observer(), GIVEN),
     }
     fields["versions"] = versions()
     return _plain(fields)
 
 
-def _parameters(given: dict[str, Any], observer: Any) -> dict[str, Any]:
+def _parameters(given: dict[str, Any], made: Any, by_bench: Collection[str]) -> dict[str, Any]:
     """What was given, and the defaults of the rest as far as they can be known and TOML can hold them."""
-    if not dataclasses.is_dataclass(observer):
+    if not dataclasses.is_dataclass(made):
         return given
-    names = [f.name for f in dataclasses.fields(observer) if f.init and f.name not in GIVEN]
-    kept = {name: _plain(getattr(observer, name, None)) for name in names if name not in given}
+    names = [f.name for f in dataclasses.fields(made) if f.init and f.name not in by_bench]
+    kept = {name: _plain(getattr(made, name, None)) for name in names if name not in given}
     return {name: value for name, value in kept.items() if _is_toml(value)} | given
 
 

@@ -13,11 +13,13 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from cmg_mj.complaint import complaint
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, nearest
+from cmg_mj.laws.registry import LAWS, OF_LAWS
 from cmg_mj.overrides import override
+from cmg_mj.own_class import as_json
 from cmg_mj.plausible import out_of_size, unreadable
 from cmg_mj.resources import bundled, find, folder
-from cmg_mj.schema import ObserverSettings, Scenario
+from cmg_mj.schema import ControllerSettings, ObserverSettings, Scenario
 
 LARGEST_FILE = 1_000_000
 """Bytes of a scenario file; the longest that a run writes has three thousand."""
@@ -124,12 +126,36 @@ def parse_scenario(fields: Mapping[str, Any], where: str = "") -> Scenario:
         scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True)
     except ValidationError as error:
         complaints = [complaint(Scenario, detail, fields) for detail in error.errors()]
-        raise InputError(located(where, _clauses(complaints))) from error
-    wrong = list(out_of_size(fields))
+        raise InputError(located(where, _clauses([*complaints, *_unknown_to_law(fields)]))) from error
+    wrong = [*_unknown_to_law(fields), *out_of_size(fields)]
     if wrong:
         raise InputError(located(where, _clauses(wrong)))
     scenario._where = where
     return scenario
+
+
+def unknown_to_law(kind: str, given: Iterable[str]) -> list[str]:
+    """Fields of [controller] that are neither every law's nor this one's own.
+
+    Args:
+        kind: Of the law.
+        given: The fields.
+
+    Returns:
+        A clause for each.
+    """
+    known = {*ControllerSettings.model_fields, *OF_LAWS.own(kind)}
+    unknown = [name for name in given if name not in known and not OF_LAWS.may_take(kind, name)]
+    return [f"controller.{name}: no such field; {nearest(name, known)}" for name in unknown]
+
+
+def _unknown_to_law(fields: Mapping[str, Any]) -> list[str]:
+    """The same of a scenario with one of the bench's laws; no code of a user's is run to read a file."""
+    section = fields.get("controller")
+    if not isinstance(section, Mapping):
+        return []
+    kind = section.get("kind", ControllerSettings().kind)
+    return unknown_to_law(kind, section) if isinstance(kind, str) and kind in LAWS else []
 
 
 def as_fields(scenario: Scenario) -> dict[str, Any]:
@@ -142,11 +168,6 @@ def _clauses(wrong: Iterable[str]) -> str:
     each = list(dict.fromkeys(wrong))
     more = [f"and {len(each) - MOST_CLAUSES} more"] if len(each) > MOST_CLAUSES else []
     return "; ".join(each[:MOST_CLAUSES] + more)
-
-
-def as_json(value: Any) -> Any:
-    """Numbers of numpy, for those who write a scenario in Python; a date of TOML, which no field takes."""
-    return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 def located(where: str, wrong: str) -> str:

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from cmg_mj.controller import Angles, Feedback
 from cmg_mj.fields import Duration, Instant, Line, NonNegative, Positive, Rate
-from cmg_mj.law import TABLE_2_GAINS, Law, lqr_gains
+from cmg_mj.laws import Law, lqr_gains, make_law
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
 from cmg_mj.plant_settings import PlantSettings
@@ -31,13 +31,15 @@ class LqrSettings(BaseModel):
 
 
 class ControllerSettings(BaseModel):
-    """The control law."""
+    """The control law by name or dotted path, and its parameters, which the law itself checks."""
 
-    model_config = FORBID
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+    kind: str = "state_feedback"
+    """A name that `cmg-mj list laws` shows, or package.module:Class."""
     rate_hz: Rate = 200.0
     """Control ticks a second; divides the physics rate."""
     gains: tuple[float, float, float, float] | None = None
-    """K_e on [x1, x2, x3, x_e]; Table 2's if neither gains nor lqr is given."""
+    """K_e on [x1, x2, x3, x_e], of a law that takes gains; Table 2's if neither gains nor lqr is given."""
     lqr: LqrSettings | None = None
     """Weights to solve for the gains instead."""
     rate_limit_rad_s: Positive = 4.7
@@ -55,12 +57,19 @@ class ControllerSettings(BaseModel):
             raise ValueError("give either gains or lqr, not both")
         return self
 
-    def law(self, model: ReducedModel) -> Law:
-        """The law for a reduced model."""
-        gains = self.gains or TABLE_2_GAINS
-        if self.lqr is not None:
-            gains = lqr_gains(model, self.lqr.state_cost, self.lqr.input_cost)
-        return Law(1.0 / self.rate_hz, tuple(gains), self.rate_limit_rad_s)  # type: ignore[arg-type]
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What was given that belongs to the law alone."""
+        return dict(self.__pydantic_extra__ or {})
+
+    def law(self, model: ReducedModel, noise: TiltNoise) -> Law:
+        """The law for a reduced model and the sensors' noise."""
+        parameters = self.parameters
+        if self.gains is not None:
+            parameters["gains"] = self.gains
+        elif self.lqr is not None:
+            parameters["gains"] = lqr_gains(model, self.lqr.state_cost, self.lqr.input_cost)
+        return make_law(self.kind, 1.0 / self.rate_hz, self.rate_limit_rad_s, model, noise, **parameters)
 
 
 class ObserverSettings(BaseModel):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.law import Law
+from cmg_mj.laws.protocol import Law
 from cmg_mj.observers.protocol import BIAS
 
 
@@ -16,7 +16,7 @@ def trim_of(trim_s: float, law: Law, extra_signals: Sequence[str]) -> tuple[int,
 
     Args:
         trim_s: For how long [s]; 0 for not at all.
-        law: The law, whose integrator settles at k_e1/k_e4 e.
+        law: The law, whose integrator settles at its `trim_gain` times the bias.
         extra_signals: What the observer estimates beyond x.
 
     Returns:
@@ -29,12 +29,17 @@ def trim_of(trim_s: float, law: Law, extra_signals: Sequence[str]) -> tuple[int,
         raise InputError(f"controller.trim_s = {trim_s!r}: must be a number greater than or equal to 0")
     if not trim_s:
         return 0, 0.0
-    k1, _, _, k4 = law.gains
+    gain = getattr(law, "trim_gain", None)
+    if gain is None:
+        raise InputError(
+            f"controller.trim_s = {trim_s:g}: {type(law).__name__} has no integrator to be trimmed; leave "
+            "it out, or set controller.trim_s=0"
+        )
     if BIAS not in extra_signals:
         raise InputError(
             f"controller.trim_s = {trim_s:g}: needs an observer in the loop that estimates the bias, "
             "such as adaptive; or set controller.trim_s=0"
         )
-    if np.any(k4 == 0.0):
+    if not np.all(np.isfinite(gain)):
         raise InputError(f"controller.trim_s = {trim_s:g}: the gain on the integrator is zero")
-    return 3 + list(extra_signals).index(BIAS), k1 / k4
+    return 3 + list(extra_signals).index(BIAS), gain

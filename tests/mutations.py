@@ -58,8 +58,8 @@ def element(parameter: str, file: str, opening: str, index: int) -> Mutation:
 
 OBSERVERS = "cmg_mj/observers/"
 MUTATIONS = [
-    *(element(f"law: K_e[{i}]", "cmg_mj/law.py", "TABLE_2_GAINS = (", i) for i in range(4)),
-    Mutation("law: rate limit", "cmg_mj/law.py", r"rate_limit: float = " + NUMBER),
+    *(element(f"law: K_e[{i}]", "cmg_mj/laws/state_feedback.py", "TABLE_2_GAINS = (", i) for i in range(4)),
+    Mutation("law: rate limit", "cmg_mj/laws/state_feedback.py", r"rate_limit: float = " + NUMBER),
     Mutation("scenario: rate limit", "cmg_mj/schema.py", r"rate_limit_rad_s: Positive = " + NUMBER),
     Mutation("linear: tau", OBSERVERS + "linear.py", r"tau: Positive = " + NUMBER),
     *(element(f"ltv: Q[{i}]", OBSERVERS + "ltv.py", "Q: tuple[Positive, Positive, Positive] = (", i) for i in range(3)),

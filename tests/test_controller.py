@@ -15,7 +15,7 @@ from scipy.linalg import solve_continuous_are
 from cmg_mj.controller import Controller
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.experiment import prepare
-from cmg_mj.law import Law, lqr_gains
+from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.scenario import load_scenario, parse_scenario
 from cmg_mj.sensors import Accelerometer, Encoder, Fog, Ideal, Sensors
@@ -66,7 +66,7 @@ def test_the_extended_pair_is_controllable() -> None:
 
 def test_closed_loop_poles_of_table_2() -> None:
     """Of the law itself, differentiated: A_e - B_e K_e has -10.47 +- 4.60j and -0.203 +- 0.295j."""
-    K = [[-Law(DT)(*row)[0] for row in (1e-3 * np.eye(4)).tolist()]]
+    K = [[-StateFeedback(DT)(*row)[0] for row in (1e-3 * np.eye(4)).tolist()]]
     poles = np.linalg.eigvals(A_E - B_E @ (1e3 * np.array(K)))
     expected = [-10.47 - 4.60j, -10.47 + 4.60j, -0.203 - 0.295j, -0.203 + 0.295j]
     found = sorted(poles, key=lambda s: (round(s.real, 2), s.imag))
@@ -79,8 +79,8 @@ def test_closed_loop_poles_of_table_2() -> None:
 # --- the law -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("law", "gains"), [(Law(DT), K_E), (Law(DT, OTHER_GAINS), OTHER_GAINS)])
-def test_law_is_the_papers(law: Law, gains: tuple[float, float, float, float]) -> None:
+@pytest.mark.parametrize(("law", "gains"), [(StateFeedback(DT), K_E), (StateFeedback(DT, OTHER_GAINS), OTHER_GAINS)])
+def test_law_is_the_papers(law: StateFeedback, gains: tuple[float, float, float, float]) -> None:
     """u = -K_e [y1, x2, y2, x_e], x_e' = -x3 over a control period."""
     rng = np.random.default_rng(0)
     for _ in range(50):
@@ -92,7 +92,7 @@ def test_law_is_the_papers(law: Law, gains: tuple[float, float, float, float]) -
 
 @pytest.mark.parametrize("limit", [RATE_LIMIT, 2.0])
 def test_rate_limit(limit: float) -> None:
-    law = Law(DT) if limit == RATE_LIMIT else Law(DT, rate_limit=limit)
+    law = StateFeedback(DT) if limit == RATE_LIMIT else StateFeedback(DT, rate_limit=limit)
     x1 = limit / 35.0
     assert law(0.999 * x1, 0.0, 0.0, 0.0)[0] == pytest.approx(-0.999 * limit)
     for sign in (1.0, -1.0):
@@ -104,7 +104,7 @@ def test_rate_limit(limit: float) -> None:
 @pytest.mark.parametrize("k4", [0.3, -0.3])
 def test_integrator_does_not_wind_up(sign: float, k4: float) -> None:
     """Saturated: x_e moves only if that brings the demand back. The demand moves by k4 x3 dt a period."""
-    law = Law(DT, (35.0, 4.0, -1.0, k4))
+    law = StateFeedback(DT, (35.0, 4.0, -1.0, k4))
     saturating = -sign * 0.5  # demand of sign * 17.5 rad/s
     outward = math.copysign(0.2, sign * k4)
     assert law(saturating, 0.0, outward, 1.0) == (sign * RATE_LIMIT, 1.0)
@@ -115,7 +115,7 @@ def test_integrator_does_not_wind_up(sign: float, k4: float) -> None:
 
 def test_integrator_stays_bounded_through_a_long_saturation_and_resumes() -> None:
     """Held at x1 = 0.5 for 10 s with the gimbal turned outward, it stays; let go, it goes on at -x3."""
-    law, x_e = Law(DT), 0.0
+    law, x_e = StateFeedback(DT), 0.0
     for _ in range(2000):
         _, x_e = law(-0.5, 0.0, 0.3, x_e)
     assert x_e == 0.0
@@ -128,15 +128,17 @@ def test_integrator_stays_bounded_through_a_long_saturation_and_resumes() -> Non
 def test_law_treats_each_world_alone() -> None:
     rng = np.random.default_rng(2)
     x = rng.normal(0.0, [[0.2], [1.0], [0.5], [3.0]], (4, 500))
-    u, x_e = Law(DT)(*x)
-    singles = [Law(DT)(*column) for column in x.T.tolist()]
+    u, x_e = StateFeedback(DT)(*x)
+    singles = [StateFeedback(DT)(*column) for column in x.T.tolist()]
     np.testing.assert_array_equal(np.array(singles).T, [u, x_e])
     assert 50 < np.sum(np.abs(u) == RATE_LIMIT) < 450
 
 
-def reduced_loop(e: float, duration: float, x: list[float], x_e: float = 0.0, law: Law | None = None) -> np.ndarray:
+def reduced_loop(
+    e: float, duration: float, x: list[float], x_e: float = 0.0, law: StateFeedback | None = None
+) -> np.ndarray:
     """(4) under the sampled law with y1 = x1 - e and the true rate: [x1, x2, x3, x_e, u] at each tick."""
-    law, rows = law or Law(DT), []
+    law, rows = law or StateFeedback(DT), []
     for _ in range(round(duration / DT)):
         u, following = law(x[0] - e, x[1], x[2], x_e)
         rows.append([*x, x_e, u])
@@ -262,10 +264,10 @@ def reading(tilt: float, gimbal: float, rate: float) -> Ideal:
     return Ideal((x, z, x, z), [math.pi / 2.0 + gimbal, math.pi / 2.0 - gimbal], rate, rate)
 
 
-def controller(observer: Any, law: Law | None = None, **options: Any) -> Controller:
+def controller(observer: Any, law: StateFeedback | None = None, **options: Any) -> Controller:
     return Controller(
         observer,
-        law or Law(DT),
+        law or StateFeedback(DT),
         RadialTilt(0.1, 0.3),
         IDEAL_SENSORS,
         directions=[1.0, -1.0],
@@ -391,7 +393,7 @@ def test_trim_needs_a_bias_and_an_integrator() -> None:
     ):
         controller(Script(ESTIMATES.__getitem__), trim_s=1.0)
     with pytest.raises(InputError, match=r"controller\.trim_s = 1: the gain on the integrator is zero"):
-        controller(WithBias(ESTIMATES.__getitem__), trim_s=1.0, law=Law(DT, (35.0, 4.0, 1.0, 0.0)))
+        controller(WithBias(ESTIMATES.__getitem__), trim_s=1.0, law=StateFeedback(DT, (35.0, 4.0, 1.0, 0.0)))
 
 
 def test_reset_starts_the_same_run_again() -> None:
@@ -417,7 +419,7 @@ def test_beat_is_where_anything_may_be_due() -> None:
     sensors = Sensors(Accelerometer(rate_hz=1000.0), Encoder(rate_hz=100.0), Fog(rate_hz=500.0))
     of = Controller(
         Script(ESTIMATES.__getitem__),
-        Law(0.01),
+        StateFeedback(0.01),
         RadialTilt(0.1, 0.3),
         sensors,
         directions=[1.0],

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_plant, load_scenario, prepare
-from cmg_mj.law import closed_loop_poles
+from cmg_mj.laws.state_feedback import closed_loop_poles
 from cmg_mj.loop_check import Loop, closed_loop
 from cmg_mj.resources import bundled, folder
 from tests.command import cmg_mj

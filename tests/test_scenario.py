@@ -13,7 +13,7 @@ import pytest
 import tomli_w
 
 from cmg_mj import Estimate, InputError, Measurement, load_scenario, parse_scenario, prepare
-from cmg_mj.law import TABLE_2_GAINS
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.resources import bundled, folder
 from cmg_mj.scenario import Scenario

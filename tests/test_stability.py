@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.law import TABLE_2_GAINS, closed_loop_poles, lqr_gains
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS, closed_loop_poles, lqr_gains
 from cmg_mj.stability import MARGIN, is_hurwitz
 from tests.command import cmg_mj
 from tests.observers.reference import PAPER

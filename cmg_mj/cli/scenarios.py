@@ -162,12 +162,12 @@ def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown:
         sys.exit(WRONG_INPUT)
 
 
-@click.command("list", short_help="List the bundled scenarios and the observers.")
-@click.argument("what", type=click.Choice(["scenarios", "observers"]), required=False)
+@click.command("list", short_help="List the bundled scenarios, the observers and the control laws.")
+@click.argument("what", type=click.Choice(["scenarios", "observers", "laws"]), required=False)
 def list_names(what: str | None) -> None:
-    """List the bundled scenarios and the observers.
+    """List the bundled scenarios, the observers and the control laws.
 
-    An observer's parameters are shown with their defaults; change them with --set observer.NAME=VALUE.
+    Parameters are shown with their defaults; change them with --set observer.NAME=VALUE or controller.NAME=VALUE.
     """
     from cmg_mj import report
 
@@ -177,6 +177,10 @@ def list_names(what: str | None) -> None:
         click.echo()
     if what in (None, "observers"):
         click.echo(report.observer_list())
+    if what is None:
+        click.echo()
+    if what in (None, "laws"):
+        click.echo(report.law_list())
 
 
 @click.command(short_help="Check a scenario file, or a model file, without running it.")

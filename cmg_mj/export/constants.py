@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from cmg_mj.controller import Controller
+from cmg_mj.laws import StateFeedback
 
 
 class Constant(NamedTuple):
@@ -42,7 +43,7 @@ class Constants(NamedTuple):
 
 def constants_of(controller: Controller) -> Constants:
     """The numbers of a controller."""
-    tilt, law = controller.tilt, controller.law
+    tilt, law = controller.tilt, cast("StateFeedback", controller.law)
     k1, k2, k3, k4 = law.gains
     numbered = list(enumerate(zip(controller.directions, controller.gimbal_zero, strict=True), 1))
     return Constants(

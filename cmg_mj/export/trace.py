@@ -15,7 +15,7 @@ from cmg_mj.export.symbol import Symbol, expression
 from cmg_mj.export.tree import form, numbers, rebuilt
 from cmg_mj.export.words import identifiers
 from cmg_mj.gimbal_angle import GimbalAngle
-from cmg_mj.law import Law
+from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.observers.protocol import Measurement, Observer
 from cmg_mj.tilt import RadialTilt
 
@@ -152,5 +152,5 @@ def _law(constants: Constants) -> casadi.Function:
     named = _symbols([constant.name for constant in constants.of_law])
     dt, k1, k2, k3, k4, limit = named
     given = _symbols(["x1", "x2", "x3", "x_e"])
-    law = Law(dt, (k1, k2, k3, k4), limit)  # type: ignore[arg-type]
+    law = StateFeedback(dt, (k1, k2, k3, k4), limit)  # type: ignore[arg-type]
     return _function("law", [*given, *named], [expression(part) for part in law(*given)])

@@ -17,6 +17,7 @@ from cmg_mj.export.example import example, vector
 from cmg_mj.export.names import files_of, name_of
 from cmg_mj.export.texts import Texts
 from cmg_mj.export.trace import trace
+from cmg_mj.laws import StateFeedback
 from cmg_mj.rehearsal import rehearse
 from cmg_mj.run_folder.folder import write_text
 
@@ -59,6 +60,11 @@ def _code(controller: Controller, precision: Precision, name: str) -> Code:
         raise InputError(
             f"controller.feedback = {controller.feedback!r}: what is exported has the observer's rate alone; set "
             "controller.feedback=observer"
+        )
+    if type(controller.law) is not StateFeedback:
+        raise InputError(
+            f"law {type(controller.law).__name__}: what is exported has the law (8) alone; set "
+            "controller.kind=state_feedback"
         )
     try:
         tried, traced_one = copy.deepcopy(controller.observer), copy.deepcopy(controller.observer)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 from collections.abc import Iterable
 from typing import Any
 
-from pydantic import ValidationError
-
-from cmg_mj.complaint import complaint
-from cmg_mj.errors import InputError, nearest, raised
+from cmg_mj.errors import InputError
 from cmg_mj.observers.protocol import Observer
+from cmg_mj.own_class import Kind
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.tilt import TiltNoise
 
@@ -34,6 +31,9 @@ OBSERVERS = {
 GIVEN = ("dt", "model", "noise")
 """What the bench gives every observer whose constructor takes it; all else is the user's choice."""
 
+OF_OBSERVERS = Kind("observer", "observer", OBSERVERS, GIVEN, {"init": "y", "step": "state, y, u"})
+"""How an observer is found, checked and made."""
+
 
 def observer_class(kind: str) -> type:
     """Find an observer's class.
@@ -47,22 +47,7 @@ def observer_class(kind: str) -> type:
     Raises:
         InputError: There is no such observer, or its module cannot be imported.
     """
-    if ":" not in kind and kind not in OBSERVERS:
-        raise InputError(
-            f"observer.kind = {kind!r}: no such observer; {nearest(kind, OBSERVERS)}, "
-            "or your own as package.module:Class"
-        )
-    path = OBSERVERS.get(kind, kind)
-    module_name, _, class_name = path.partition(":")
-    try:
-        found = getattr(importlib.import_module(module_name), class_name)
-    except (Exception, SystemExit) as error:  # a user's module may fail in any way while it is imported
-        raise InputError(f"observer.kind = {kind!r}: cannot be imported: {raised(error)}") from error
-    if not (
-        inspect.isclass(found) and callable(getattr(found, "init", None)) and callable(getattr(found, "step", None))
-    ):
-        raise InputError(f"observer.kind = {kind!r}: must be a class with the methods init(y) and step(state, y, u)")
-    return found
+    return OF_OBSERVERS.find(kind)
 
 
 def make_observer(
@@ -83,21 +68,14 @@ def make_observer(
     Raises:
         InputError: Unknown observer or parameter, or a parameter that the observer refuses.
     """
-    cls = observer_class(kind)
     check_names(kind, parameters)
-    taken = inspect.signature(cls).parameters
+    taken = OF_OBSERVERS.takes(kind)
     given: dict[str, Any] = {"dt": dt, "model": model}
     if "noise" in taken:
         if noise is None and taken["noise"].default is inspect.Parameter.empty:
             raise InputError(f"observer {kind}: needs the noise of its sensors (a TiltNoise after the model)")
         given["noise"] = noise
-    try:
-        return cls(**given, **parameters)
-    except ValidationError as error:
-        clause = complaint(cls, error.errors()[0], {**given, **parameters})
-        raise InputError(f"observer.{clause} (observer {kind})") from error
-    except (Exception, SystemExit) as error:  # a user's own class may refuse its parameters in its own way
-        raise InputError(f"observer {kind}: {raised(error)}") from error
+    return OF_OBSERVERS.make(kind, given, parameters)
 
 
 def check_names(kind: str, names: Iterable[str]) -> None:
@@ -110,19 +88,9 @@ def check_names(kind: str, names: Iterable[str]) -> None:
     Raises:
         InputError: Unknown observer or parameter.
     """
-    cls = observer_class(kind)
-    allowed = [name for name in inspect.signature(cls).parameters if name not in GIVEN]
-    for name in names:
-        if name not in allowed and not _takes_any(cls):
-            what = nearest(name, allowed) if allowed else "it has none"
-            raise InputError(f"observer.{name}: {kind} has no such parameter; {what}")
+    OF_OBSERVERS.check_names(kind, names)
 
 
 def takes_noise(kind: str) -> bool:
     """Whether an observer is told the noise of its sensors."""
-    return "noise" in inspect.signature(observer_class(kind)).parameters
-
-
-def _takes_any(cls: type) -> bool:
-    kinds = [p.kind for p in inspect.signature(cls).parameters.values()]
-    return inspect.Parameter.VAR_KEYWORD in kinds
+    return "noise" in OF_OBSERVERS.takes(kind)

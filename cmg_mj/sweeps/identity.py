@@ -15,6 +15,7 @@ from cmg_mj.errors import InputError, shown
 from cmg_mj.experiment import prepare
 from cmg_mj.model_files import check_files
 from cmg_mj.resources import find
+from cmg_mj.scenario import as_fields
 from cmg_mj.sweeps.study import Study
 
 KEY = b"cmg_mj.chunk"
@@ -141,5 +142,7 @@ def resolved(study: Study) -> dict[str, Any]:
     if weights is not None:  # solved for anew on every rig
         fields["controller"]["lqr"] = weights.model_dump(mode="json")
     if weights is not None or any(f"{field}.".startswith("controller.lqr.") for field in varied):
-        fields["controller"].pop("gains")
+        fields["controller"].pop("gains", None)
+    if "controller.kind" in varied:  # each law has parameters of its own
+        fields["controller"] = as_fields(study.scenario)["controller"]
     return study.as_fields(fields)

@@ -53,7 +53,7 @@ def _thinned(study: Study) -> Study:
 def _seconds_a_trial(study: Study, observer: str) -> float:
     """Of an observer, by some of its trials; by several stretches of them if not all can run in one batch."""
     trials = study.n_points * study.worlds
-    pooled = all(pools(field) for axis in study.axes for field in axis.fields)
+    pooled = all(pools(field, study.scenario.controller.kind) for axis in study.axes for field in axis.fields)
     stretches = 1 if pooled else min(STRETCHES, trials)
     count = min(TRIALS, trials // stretches)
     starts = [trials * i // stretches for i in range(stretches)]

@@ -154,7 +154,8 @@ class Study:
     @cached_property
     def _order(self) -> np.ndarray:
         """Numbers of the points, those that can run in one batch together, (n_points,)."""
-        apart = [field for axis in self.axes for field in axis.fields if not pools(field)]
+        law = self.scenario.controller.kind
+        apart = [field for axis in self.axes for field in axis.fields if not pools(field, law)]
         if not apart:
             return np.arange(len(self.points))
 

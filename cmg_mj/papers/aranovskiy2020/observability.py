@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cmg_mj.law import Law
+from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.papers.aranovskiy2020.paper import A_prime, C, damping
 from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.claim import Claim, OnShare
@@ -53,7 +53,9 @@ def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, floa
 def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
     """The uniform observability that (10) needs."""
     grid = [
-        (u, y2) for u in np.linspace(-Law.rate_limit, Law.rate_limit, 21) for y2 in np.linspace(-math.pi, math.pi, 41)
+        (u, y2)
+        for u in np.linspace(-StateFeedback.rate_limit, StateFeedback.rate_limit, 21)
+        for y2 in np.linspace(-math.pi, math.pi, 41)
     ]
     dampings = [float(damping(u, float(y2))) for u, y2 in grid]
     margin = min(observability_margin(a) for a in dampings)

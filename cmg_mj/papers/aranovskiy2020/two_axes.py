@@ -10,7 +10,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.law import Law, lqr_gains
+from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim, OnShare
@@ -133,7 +133,7 @@ def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Ran:
     model = two_pairs()
     data = at_rest(model)
     axes = [addresses(model, axis) for axis in range(2)]
-    laws = [Law(DT, lqr_gains(reduced(model, axis), WEIGHTS, 1.0)) for axis in range(2)]  # type: ignore[arg-type]
+    laws = [StateFeedback(DT, lqr_gains(reduced(model, axis), WEIGHTS, 1.0)) for axis in range(2)]  # type: ignore[arg-type]
     integrators, steps = [0.0, 0.0], round(DT / model.opt.timestep)
     tilts, momenta = [], []
     torso = int(model.body("torso").id)

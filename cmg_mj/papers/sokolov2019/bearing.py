@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.intervals import mean_interval
+from cmg_mj.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import poles_as_pairs
 from cmg_mj.papers.recorded import pushed, rms, trajectory_of
@@ -56,6 +57,7 @@ def stiffness() -> Stiffness:
     M = np.zeros((plant.model.nv, plant.model.nv))
     mujoco.mj_fullM(plant.model, plant.new_data(), M)
     r, law = plant.reduced, experiment().law
+    assert isinstance(law, StateFeedback)
     I_z = float(M[plant.yaw, plant.yaw])
     gyroscopic = (r.J_d * r.omega_d) ** 2 / (2.0 * I_z)
     A_e = r.A_e.copy()

@@ -10,6 +10,7 @@ import numpy as np
 
 from cmg_mj import markdown
 from cmg_mj.experiment import Experiment
+from cmg_mj.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.release import (
@@ -74,6 +75,7 @@ def linearised(observer: str | None, **parameters: float) -> tuple[Loop, Servo, 
     """
     prepared = _rig()
     plant, law = prepared.plant, prepared.law
+    assert isinstance(law, StateFeedback)
     o = None if observer is None else estimator(observer, prepared, **parameters)
 
     def loop(servo: Servo, age_steps: int = 0, share: complex = 1.0) -> np.ndarray:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from cmg_mj.law import Law
+from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.hold import hold_matrices
 from cmg_mj.reduced import ReducedModel
@@ -74,7 +74,7 @@ def period_map(
     model: ReducedModel,
     servo: Servo,
     observer: Observer | None,
-    law: Law,
+    law: StateFeedback,
     *,
     timestep: float,
     age_steps: int = 0,

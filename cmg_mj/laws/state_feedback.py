@@ -1,14 +1,18 @@
-"""The control law (8) of aranovskiy2020, and where its gains come from."""
+"""State feedback with an integrator: (8) of aranovskiy2020, and where its gains come from."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from cmg_mj.elementwise import Scalar, clip, where
 from cmg_mj.errors import InputError
+from cmg_mj.laws.protocol import Fed
+from cmg_mj.observers.protocol import Measurement
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.stability import is_hurwitz
 
@@ -48,9 +52,16 @@ def closed_loop_poles(model: ReducedModel, gains: Sequence[float]) -> np.ndarray
     return np.linalg.eigvals(model.A_e - model.B_e @ np.array([gains]))
 
 
+class Integrated(NamedTuple):
+    """The law's memory."""
+
+    x_e: Scalar
+    """Integral of -x3 [rad s]."""
+
+
 @dataclass(frozen=True)
-class Law:
-    """u = -K_e [y1, x2, y2, x_e], x_e' = -x3 (aranovskiy2020 (8)), with the rate limit and anti-windup.
+class StateFeedback:
+    """u = -K_e [x1, x2, x3, x_e], x_e' = -x3 (aranovskiy2020 (8)), with the rate limit and anti-windup.
 
     While the command is limited, the integrator takes no step that would push it further into the limit.
 
@@ -60,9 +71,27 @@ class Law:
         rate_limit: Largest gimbal rate [rad/s].
     """
 
+    arrays: ClassVar[tuple[str, ...]] = ("gains", "rate_limit")
+
     dt: float
     gains: tuple[float, float, float, float] = TABLE_2_GAINS
     rate_limit: float = 4.7
+
+    @property
+    def trim_gain(self) -> Scalar:
+        """k_e1/k_e4: with y1 = x1 - e the integrator settles at that times e [s]; infinite where k_e4 is zero."""
+        k1, _, _, k4 = self.gains
+        return math.inf if np.any(k4 == 0.0) else k1 / k4
+
+    def init(self, y: Measurement) -> Integrated:
+        """Nothing integrated yet."""
+        return Integrated(0.0 * y.y1)
+
+    def step(self, state: Integrated, y: Measurement, x: Fed, u: Scalar) -> tuple[Integrated, Scalar]:
+        """Decide on one sample."""
+        x1, x2, x3 = x
+        u, x_e = self(x1, x2, x3, state[0])
+        return Integrated(x_e), u
 
     def __call__(self, x1: Scalar, x2: Scalar, x3: Scalar, x_e: Scalar) -> tuple[Scalar, Scalar]:
         """Command and the next integrator state.
