@@ -7,9 +7,9 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar
+from cmg_mj.elementwise import Scalar, clip
 from cmg_mj.errors import RunStopped, raised
-from cmg_mj.laws.protocol import Fed, Law, integrator
+from cmg_mj.laws.protocol import Fed, Law
 from cmg_mj.observers.protocol import Measurement
 
 
@@ -25,7 +25,7 @@ class Commanding:
     def __init__(self, law: Law, single: bool, timestep: float) -> None:
         self.law = law
         self._step = law.step
-        self._limit = law.rate_limit
+        self._least, self._most = -law.rate_limit, law.rate_limit
         self._single = single
         self._timestep = timestep
         self._state: Any = None
@@ -67,32 +67,35 @@ class Commanding:
         before = self._state
         try:
             self._state, command = self._step(before, y, x, u)
-            if not self._single:
-                return self._limited(command, y), self._of_worlds(integrator(before), y)
-            x_e = integrator(before)
-            limit = self._limit
-            if type(command) is not float or type(x_e) is not float or not -limit <= command <= limit:
-                command, x_e = _number(command), _number(x_e)
-                command = min(max(command, -limit), limit) if math.isfinite(command) else command
+            x_e = getattr(before, "x_e", math.nan)
+            # A float within the limit is what the bench's laws give: all else is looked at more closely.
+            if self._single and type(command) is float and type(x_e) is float and self._least <= command <= self._most:
+                return command, x_e
+            command, x_e = self._fitted(command, x_e, y)
         except (Exception, SystemExit) as error:  # a user's law may fail in any way
             self._blame(f"raised {raised(error)}", step, error)
-        if not math.isfinite(command):  # many worlds are judged one by one, elsewhere
+        if self._single and not math.isfinite(command):  # many worlds are judged one by one, elsewhere
             self._blame(f"returned {command} for u", step)
         return command, x_e
 
-    def _limited(self, command: Any, y: Measurement) -> np.ndarray:
-        """A command of many worlds within the limit, in an array of its own: a law may go on changing its arrays."""
-        return np.minimum(np.maximum(self._of_worlds(command, y), -self._limit), self._limit)
-
-    def _of_worlds(self, value: Any, y: Measurement) -> np.ndarray:
-        """What a law has said, which may be the same for all worlds, as an array (n_worlds,)."""
-        given = np.asarray(value)
-        if given.dtype.kind not in "fiub":
-            raise TypeError(f"the law returned {given.dtype}, not real numbers")
-        return given.astype(float) if given.shape == y.y1.shape else np.full(y.y1.shape, given, dtype=float)
+    def _fitted(self, command: Any, x_e: Any, y: Measurement) -> tuple[Scalar, Scalar]:
+        """What a law has said, within the limit, as floats or as arrays of their own: it may go on changing its own."""
+        if self._single:
+            u, x_e = _number(command), _number(x_e)
+            return clip(u, self._least, self._most) if math.isfinite(u) else u, x_e
+        u = _of_worlds(command, y)
+        return np.where(np.isfinite(u), clip(u, self._least, self._most), u), _of_worlds(x_e, y)
 
     def _blame(self, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
         raise RunStopped(f"law {type(self.law).__name__} {what} at t = {step * self._timestep:g} s") from cause
+
+
+def _of_worlds(value: Any, y: Measurement) -> np.ndarray:
+    """A user's numbers, which may be one for all worlds, as an array (n_worlds,) of its own."""
+    given = np.asarray(value)
+    if given.dtype.kind not in "fiub":
+        raise TypeError(f"the law returned {given.dtype}, not real numbers")
+    return given.astype(float) if given.shape == y.y1.shape else np.full(y.y1.shape, given, dtype=float)
 
 
 def _number(value: Any) -> float:

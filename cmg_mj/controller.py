@@ -11,7 +11,7 @@ from cmg_mj.commanding import Commanding
 from cmg_mj.elementwise import Scalar
 from cmg_mj.gimbal_angle import GimbalAngle
 from cmg_mj.ideal import Ideal
-from cmg_mj.laws.protocol import Fed, Law
+from cmg_mj.laws.protocol import Law, fed
 from cmg_mj.observers.protocol import Measurement, Observer
 from cmg_mj.observing import Observing, read_only
 from cmg_mj.sensors import Sensors, at_work
@@ -25,9 +25,6 @@ Angles = Literal["measured", "estimated"]
 
 CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s"})
 """Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
-
-
-_new = tuple.__new__
 
 
 class Tick(NamedTuple):
@@ -188,22 +185,16 @@ class Controller:
         estimate = estimates[0]
         if step < self.trimmed_until:
             self._commanding.trim(self.trim_gain * estimate[self.trim_part])
-        u, x_e = self._commanding.decide(y, self._fed(y, estimate, fog, rate), held, step)
+        x1, x2, x3 = estimate[:3]
+        if self.angles == "measured":
+            x1, x3 = y1, y2
+        if self.feedback != "observer":
+            x2 = fog if self.feedback == "fog" else rate
+        if not self._single:
+            x2 = x2.copy()
+            read_only(x2, *estimate)
+        u, x_e = self._commanding.decide(y, fed(x1, x2, x3, estimate[3:]), held, step)
         if not self._single:
             read_only(u)  # observers get it at the next tick, the trajectory later
         self.tick = Tick(y1, y2, acceleration, fog, u, x_e, estimates)
         return self.tick
-
-    def _fed(self, y: Measurement, estimate: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Fed:
-        """What is fed back to the law, out of all that is known."""
-        x1, x2, x3 = estimate[:3]
-        if self.angles == "measured":
-            x1, x3 = y
-        if self.feedback != "observer":
-            x2 = fog if self.feedback == "fog" else rate
-        if not self._single:
-            x2 = x2.copy()  # it is the sensor's, or on record: a law may change it
-        fed = _new(Fed, (x1, x2, x3))
-        if len(estimate) > 3:
-            fed.extra = tuple(estimate[3:])
-        return fed

@@ -232,14 +232,16 @@ class Experiment:
         base = base_of(self.scenario)
         if base is None:
             return {}
-        other = base.with_observer(self.scenario.observer.kind)
+        law = self.scenario.controller.kind
+        own = {} if law == base.controller.kind else {"controller.kind": law}
+        other = base.with_observer(self.scenario.observer.kind).with_law(law)
         if other.model_dump(mode="json") == self.scenario.model_dump(mode="json"):
-            return {}
+            return own
         try:
             bundled = prepare(other)
         except InputError:  # it does not suit this observer
             bundled = prepare(base)
-        return differences(bundled.resolved(), self.resolved())
+        return own | differences(bundled.resolved(), self.resolved())
 
     def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
         """The resolved scenario: running it again gives the same run; its head says if that needs options."""

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, raised, shown
-from cmg_mj.laws.protocol import Fed, Law, integrator
+from cmg_mj.laws.protocol import Law, fed
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observing import read_only
 
-TILT = 0.011
-"""Of the second sample [rad]."""
+TILTS = (0.01, 0.011)
+"""Of the two samples [rad]."""
 
 
 def rehearse(observer: Observer, worlds: int | None) -> None:
@@ -49,13 +50,11 @@ def rehearse_law(law: Law, extra: int, worlds: int | None) -> None:
     try:
         state = law.init(first)
         call = "step(state, y, x, u)"
-        for y, rate, held in ((first, 0.0 * u, 0.0 * u), (second, u, u)):
+        for tilt, y, rate, held in ((TILTS[0], first, 0.0 * u, 0.0 * u), (TILTS[1], second, u, u)):
             if worlds is not None:
                 read_only(held)
-            x = Fed(y[0], rate, y[1])
-            x.extra = (rate,) * extra
-            returned = law.step(state, y, x, held)
-            _check_command(call, returned, state, worlds)
+            returned = law.step(state, y, fed(y[0], rate, y[1], (rate,) * extra), held)
+            _check_command(call, returned, state, worlds, tilt)
             state = returned[0]
     except InputError:
         raise
@@ -66,12 +65,12 @@ def rehearse_law(law: Law, extra: int, worlds: int | None) -> None:
         raise InputError(f"has a trim_gain, so its state must be a NamedTuple with x_e, not {shown(state)}")
 
 
-def _check_command(call: str, returned: Any, state: Any, worlds: int | None) -> None:
+def _check_command(call: str, returned: Any, state: Any, worlds: int | None, tilt: float) -> None:
     """What a law returned is a state and a gimbal rate."""
     if not isinstance(returned, tuple) or len(returned) != 2:
         raise InputError(f"{call} must return (state, u), not {shown(returned)}")
-    _check_number(call, "u", returned[1], worlds)
-    x_e = integrator(state)
+    _check_number(call, "u", returned[1], worlds, tilt)
+    x_e = getattr(state, "x_e", math.nan)
     number = np.asarray(x_e)
     if number.dtype.kind not in "fiu" or number.shape not in ((), (worlds or 1,)):
         raise InputError(f"x_e in its state must be {_wanted(worlds)}, not {shown(x_e)}")
@@ -85,7 +84,7 @@ def _samples(worlds: int | None) -> tuple[Measurement, Measurement, Scalar]:
         return y if worlds is None else Measurement(*(np.full(worlds, number) for number in (*y, y.acceleration)))
 
     u: Any = 0.1 if worlds is None else np.full(worlds, 0.1)
-    first, second = sample(0.01), sample(TILT)
+    first, second = map(sample, TILTS)
     if worlds is not None:
         read_only(*first, first.acceleration, *second, second.acceleration, u)
     return first, second, u
@@ -106,10 +105,10 @@ def _given(returned: Any) -> str:
     return f"(state, {shown(returned[1])})" if pair else shown(returned)
 
 
-def _check_number(call: str, name: str, value: Any, worlds: int | None) -> None:
+def _check_number(call: str, name: str, value: Any, worlds: int | None, tilt: float = TILTS[1]) -> None:
     """A part of what a step returned is a number of each world."""
     number = np.asarray(value)
     if number.dtype.kind not in "fiu" or number.shape != (() if worlds is None else (worlds,)):
         raise InputError(f"{call} must return {_wanted(worlds)} for {name}, not {shown(value)}{_hint(worlds)}")
     if not np.all(np.isfinite(number)):
-        raise InputError(f"{call} returned {shown(value)} for {name} at a tilt of {TILT:g} rad")
+        raise InputError(f"{call} returned {shown(value)} for {name} at a tilt of {tilt:g} rad")

@@ -40,12 +40,12 @@ def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float)
     fields["plant"] = {
         field.name: plant[field.name] for field in dataclasses.fields(PlantSettings) if field.name in plant
     }
-    own = scenario.controller.parameters
-    law = {name: value for name, value in _parameters(own, design.law, GIVEN_TO_LAWS).items() if name != "gains"}
-    controller = fields["controller"] | {"gains": getattr(design.law, "gains", None), "lqr": None}
-    fields["controller"] = {
-        name: controller[name] for name in ControllerSettings.model_fields if controller[name] is not None
-    } | law
+    law = _parameters(scenario.controller.parameters, design.law, GIVEN_TO_LAWS)
+    controller = fields["controller"] | law
+    if "gains" in law:
+        controller.pop("lqr", None)  # they have been solved for
+    known = [*ControllerSettings.model_fields, *law]
+    fields["controller"] = {name: controller[name] for name in dict.fromkeys(known) if name in controller}
     fields["companions"] = scenario.companion_names()
     fields["observer"] = {
         "kind": scenario.observer.kind,

@@ -133,6 +133,13 @@ class Scenario(BaseModel):
             return self
         return self.model_copy(update={"observer": ObserverSettings(kind=kind)})
 
+    def with_law(self, kind: str) -> Scenario:
+        """The same experiment with another control law, with its default parameters."""
+        if kind == self.controller.kind:
+            return self
+        shared = {name: getattr(self.controller, name) for name in ControllerSettings.model_fields} | {"kind": kind}
+        return self.model_copy(update={"controller": ControllerSettings(**shared | {"gains": None, "lqr": None})})
+
     def companion_names(self) -> list[str]:
         """The companions, spelled out, without the observer itself."""
         names = list(OBSERVERS) if self.companions == "all" else list(self.companions)

@@ -298,15 +298,14 @@ def simulate(
 
 
 def _stop_blind(worlds: ManyWorlds, tick: Tick, ends: list[Outcome | None], time: float) -> None:
-    """Stop the worlds whose observer lost itself (in one world the controller raises)."""
-    estimate = tick.estimates[0]
-    blind = ~np.isfinite(sum(estimate)) & worlds.running
-    if blind.any():
-        for i in np.flatnonzero(blind):
-            ends[i] = Outcome(
-                "stopped", time, f"the observer returned an estimate that is not finite at t = {time:g} s"
-            )
-        worlds.stop(blind)
+    """Stop the worlds whose observer or law lost itself (in one world the controller raises)."""
+    said = {"observer returned an estimate": sum(tick.estimates[0]), "law returned a command": tick.u}
+    for what, numbers in said.items():
+        blind = ~np.isfinite(numbers) & worlds.running
+        if blind.any():
+            for i in np.flatnonzero(blind):
+                ends[i] = Outcome("stopped", time, f"the {what} that is not finite at t = {time:g} s")
+            worlds.stop(blind)
 
 
 def _fallen(lean: float, time: float) -> Outcome:

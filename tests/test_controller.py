@@ -223,8 +223,10 @@ def test_lqr_of_a_scenario_reaches_the_law() -> None:
     state_cost, input_cost = WEIGHTS[0]
     scenario = {"controller": {"lqr": {"state_cost": state_cost, "input_cost": input_cost}}}
     expected = (B_E.T @ riccati(state_cost, input_cost) / input_cost).ravel()
-    assert prepare(parse_scenario(scenario)).law.gains == pytest.approx(tuple(expected), rel=1e-6)
-    assert prepare(parse_scenario({})).law.gains == K_E
+    law = prepare(parse_scenario(scenario)).law
+    assert isinstance(law, StateFeedback)
+    assert law.gains == pytest.approx(tuple(expected), rel=1e-6)
+    assert prepare(parse_scenario({})).law == StateFeedback(DT, K_E, RATE_LIMIT)
 
 
 @pytest.mark.parametrize("state_cost", [[1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 0.0]])

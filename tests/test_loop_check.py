@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_plant, load_scenario, prepare
-from cmg_mj.laws.state_feedback import closed_loop_poles
+from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.loop_check import Loop, closed_loop
 from cmg_mj.resources import bundled, folder
 from tests.command import cmg_mj
@@ -29,6 +29,7 @@ def half() -> str:
 
 def loop(*overrides: str, name: str = "push_recovery") -> Loop:
     experiment = prepare(load_scenario(name, overrides))
+    assert isinstance(experiment.law, StateFeedback)
     return closed_loop(experiment.scenario, experiment.law, experiment.plant.reduced)
 
 

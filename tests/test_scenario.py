@@ -13,7 +13,7 @@ import pytest
 import tomli_w
 
 from cmg_mj import Estimate, InputError, Measurement, load_scenario, parse_scenario, prepare
-from cmg_mj.laws.state_feedback import TABLE_2_GAINS
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS, StateFeedback
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.resources import bundled, folder
 from cmg_mj.scenario import Scenario
@@ -75,7 +75,7 @@ def test_every_field_arrives() -> None:
     assert [push.torque_n_m for push in scenario.push] == [-1.0, 1.0]
     assert scenario.push[1].end_s == 1.25
     assert scenario.metrics.settle_band_deg == 0.5
-    assert prepare(scenario).law.gains == (1.0, 2.5, -3.0, 4.0)
+    assert prepare(scenario).law == StateFeedback(1.0 / scenario.controller.rate_hz, (1.0, 2.5, -3.0, 4.0))
 
 
 def test_companions_leave_out_the_observer_itself_and_doubles() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 from cmg_mj.elementwise import Scalar
@@ -18,7 +18,18 @@ class Fed(Estimate):
     `extra_signals`.
     """
 
-    extra: tuple[Scalar, ...] = ()
+    extra: Sequence[Scalar] = ()
+
+
+_new = tuple.__new__
+
+
+def fed(x1: Scalar, x2: Scalar, x3: Scalar, extra: Sequence[Scalar] = ()) -> Fed:
+    """Put together what is fed back to a law."""
+    x = _new(Fed, (x1, x2, x3))
+    if extra:
+        x.extra = extra
+    return x
 
 
 class Law(Protocol):
@@ -82,8 +93,3 @@ def needs(law: Any) -> tuple[str, ...]:
         if name not in NEEDS:
             raise InputError(f"needs = {named!r}: there is no {name!r}; {nearest(str(name), NEEDS)}")
     return named
-
-
-def integrator(state: Any) -> Scalar:
-    """The integrator in a law's state; NaN if it has none."""
-    return getattr(state, "x_e", math.nan)

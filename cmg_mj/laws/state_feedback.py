@@ -59,6 +59,9 @@ class Integrated(NamedTuple):
     """Integral of -x3 [rad s]."""
 
 
+_new = tuple.__new__
+
+
 @dataclass(frozen=True)
 class StateFeedback:
     """u = -K_e [x1, x2, x3, x_e], x_e' = -x3 (aranovskiy2020 (8)), with the rate limit and anti-windup.
@@ -90,8 +93,9 @@ class StateFeedback:
     def step(self, state: Integrated, y: Measurement, x: Fed, u: Scalar) -> tuple[Integrated, Scalar]:
         """Decide on one sample."""
         x1, x2, x3 = x
-        u, x_e = self(x1, x2, x3, state[0])
-        return Integrated(x_e), u
+        (x_e,) = state
+        u, x_e = self(x1, x2, x3, x_e)
+        return _new(Integrated, (x_e,)), u
 
     def __call__(self, x1: Scalar, x2: Scalar, x3: Scalar, x_e: Scalar) -> tuple[Scalar, Scalar]:
         """Command and the next integrator state.
