@@ -55,8 +55,8 @@ class Lqg:
     Integral action is there twice. A bias e or a constant torque moves the equilibrium: the rig balances where gravity
     bears the torque, at x1 = -torque/(n M), M the gravity torque of one of n gimbals' shares, and the tilt is fed back
     from there. While the torque is still being learnt, and where something else turns the gimbals steadily, the
-    integrator of (8) brings them back, fed with the estimated angle: x_e+ = x_e - dt x3. While the command is limited,
-    it takes no step that would push it further into the limit.
+    integrator of (8) brings them back, fed with the estimated angle and exact for a u held: x_e+ = x_e - dt (x3 + dt
+    u/2). While the command is limited, it takes no step that would push it further into the limit.
 
     Attributes:
         dt: Control period [s].
@@ -161,7 +161,7 @@ class Lqg:
         demanded = -(k1 * (x1 + per_torque * torque) + k2 * x2 + k3 * x3 + k4 * x_e)
         u = clip(demanded, -self.rate_limit, self.rate_limit)
         winding = (u != demanded) & (k4 * x3 * demanded > 0.0)
-        x_e = where(winding, x_e, x_e - self.dt * x3)
+        x_e = where(winding, x_e, x_e - self.dt * (x3 + 0.5 * self.dt * u))
         e1, e2, e3, e4 = [a * x1 + b * x2 + c * x3 + d * torque + g * u for a, b, c, d, g in ahead]
         return LqgState(e1, e2, e3, e4, x_e), u
 
