@@ -107,7 +107,7 @@ def test_the_group_is_an_ordinary_one_of_clicks() -> None:
 def test_list() -> None:
     said = cmg_mj("list")
     assert (said.status, said.err) == (0, "")
-    assert said.out == cmg_mj("list", "scenarios").out + "\n" + cmg_mj("list", "observers").out
+    assert said.out == "\n".join(cmg_mj("list", what).out for what in ("scenarios", "observers", "laws"))
     for name in bundled("scenarios"):
         assert re.search(rf"^  {name}  +[A-Z]", said.out, re.MULTILINE)
     for name in OBSERVERS:

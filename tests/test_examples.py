@@ -17,6 +17,7 @@ SAYS = {
     "bias_estimation": "found",
     "control_callback": "the tilt is",
     "many_worlds": "homogeneous beside ltv: better",
+    "own_law": "own_law:Leaning: 5 of 5 stood",
     "own_loop": "estimated tilt rate",
     "own_observer": "own_observer:HalfDifference: 0 of 5 fell",
     "python_control": "slowest pole -0.20",

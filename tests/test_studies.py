@@ -40,6 +40,14 @@ def test_the_tables_of_gyro_free() -> None:
     assert done.stdout.count("as in the tables") == 3
 
 
+def test_the_tables_of_the_laws() -> None:
+    arguments = "--worlds 2 --e 0.5 --figures-only"
+    command = [sys.executable, STUDIES / "laws.py", *arguments.split()]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.count("| `lqg`  ") == 1
+    assert done.stdout.count("| (8), `kalman`") == 2
+
+
 @pytest.mark.parametrize("study", sorted(path.name for path in STUDIES.glob("*.toml")))
 def test_a_study_file_can_be_run(study: str) -> None:
     said = cmg_mj("sweep", STUDIES / study, "--plan")
