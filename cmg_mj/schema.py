@@ -137,8 +137,9 @@ class Scenario(BaseModel):
         """The same experiment with another control law, with its default parameters."""
         if kind == self.controller.kind:
             return self
-        shared = {name: getattr(self.controller, name) for name in ControllerSettings.model_fields} | {"kind": kind}
-        return self.model_copy(update={"controller": ControllerSettings(**shared | {"gains": None, "lqr": None})})
+        fields: dict[str, Any] = {name: getattr(self.controller, name) for name in ControllerSettings.model_fields}
+        own = ControllerSettings(**fields | {"kind": kind, "gains": None, "lqr": None})
+        return self.model_copy(update={"controller": own})
 
     def companion_names(self) -> list[str]:
         """The companions, spelled out, without the observer itself."""

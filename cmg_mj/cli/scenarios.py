@@ -117,6 +117,7 @@ def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown:
     """
     from cmg_mj import comparison, report, runs
     from cmg_mj.differences import in_words
+    from cmg_mj.laws.protocol import needs
     from cmg_mj.schema import CompareSettings
     from cmg_mj.standings import standings
 
@@ -135,6 +136,8 @@ def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown:
     experiments = comparison.prepare_comparison(scenario, names)
     own = comparison.rerunnable(scenario, experiments, worlds)
     say_hints(own.hints)
+    if not needs(own.law):
+        say(f"{scenario.controller.kind} takes nothing of the observer: every loop is the same, the estimates differ")
     files = runs.files_of_comparison(names, plot=plot)
     folder = chosen.folder("compare", files, own)
     with CtrlC() as ctrl_c:

@@ -48,6 +48,11 @@ def code(controller: Controller, precision: Precision, name: str | None = None) 
     Raises:
         InputError: It cannot be exported, or C is not what Python runs.
     """
+    if type(controller.law) is not StateFeedback:
+        raise InputError(
+            f"law {type(controller.law).__name__}: cannot be exported: C has the law (8) alone; set "
+            "controller.kind=state_feedback"
+        )
     cls = type(controller.observer)
     try:
         return _code(controller, precision, name_of(controller.observer, name))
@@ -60,11 +65,6 @@ def _code(controller: Controller, precision: Precision, name: str) -> Code:
         raise InputError(
             f"controller.feedback = {controller.feedback!r}: what is exported has the observer's rate alone; set "
             "controller.feedback=observer"
-        )
-    if type(controller.law) is not StateFeedback:
-        raise InputError(
-            f"law {type(controller.law).__name__}: what is exported has the law (8) alone; set "
-            "controller.kind=state_feedback"
         )
     try:
         tried, traced_one = copy.deepcopy(controller.observer), copy.deepcopy(controller.observer)

@@ -12,6 +12,8 @@ import numpy as np
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.grid import common_period
+from cmg_mj.laws import law_class
+from cmg_mj.laws.protocol import needs
 from cmg_mj.observers import Observer
 from cmg_mj.push import Window, inside, push_windows
 from cmg_mj.replay import replay
@@ -104,7 +106,9 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
         sensors = dataclasses.replace(sensors, accelerometer=accelerometer)
     period = scenario.plant.timestep_s or common_period(scenario)
     duration = math.ceil(window_of(scenario)[1] / period - 1e-9) * period
-    feedback = "fog" if scenario.controller.feedback == "observer" else scenario.controller.feedback
+    feedback = scenario.controller.feedback
+    if feedback == "observer" and needs(law_class(scenario.controller.kind)):
+        feedback = "fog"
     loop = {"feedback": feedback, "trim_s": 0.0}
     return scenario.model_copy(
         update={

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from cmg_mj import load_scenario, prepare
+from cmg_mj import InputError, load_scenario, prepare, sweep
 from cmg_mj.laws import LAWS, Fed, Law, law_class, make_law
 from cmg_mj.laws.protocol import fed, needs
 from cmg_mj.laws.registry import GIVEN
 from cmg_mj.observers import Measurement
+from cmg_mj.trajectory import Trajectory
+from cmg_mj.tuning.recorded import tuning_scenario
+from tests.command import cmg_mj
 from tests.observers.reference import DT, NOISE, PAPER
 
 EVERY = sorted(LAWS)
@@ -82,7 +86,7 @@ def test_many_worlds_are_single_ones(kind: str, rate_limit: float) -> None:
     assert np.abs(together).max() == rate_limit
     assert np.abs(together).min() < rate_limit
     for i in range(worlds):
-        one = [(Measurement(*(float(p[i]) for p in y)), fed(*(float(p[i]) for p in x))) for y, x in many]
+        one = [(Measurement(*(float(p[i]) for p in y)), Fed(*(float(p[i]) for p in x))) for y, x in many]
         np.testing.assert_array_equal(commands(of, one), together[:, i])
 
 
@@ -127,3 +131,72 @@ def test_what_the_bench_gives_is_no_parameter() -> None:
     for kind in EVERY:
         given: dict[str, Any] = dict.fromkeys(GIVEN)
         assert {"dt", "rate_limit"} <= given.keys() & inspect.signature(law_class(kind)).parameters.keys()
+
+
+def test_a_law_that_is_told_the_noise_keeps_worlds_of_other_noise_apart() -> None:
+    experiment = prepare(load_scenario("push_recovery", [*SHORT, "controller.kind=lqg"]))
+    with pytest.raises(InputError, match="the noise that the law is told differs"):
+        experiment.run_many(2, vary={"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]})
+
+
+def test_a_sweep_over_the_law() -> None:
+    """Each law in batches of its own, each row as if run alone; where one raises, its own trials alone are lost."""
+    scenario = load_scenario("push_recovery", SHORT)
+    varied = {"controller.kind": [*EVERY, f"{__name__}:RaisesLate"], "plant.equilibrium_bias_deg": [0.0, 1.0]}
+    rows = sweep(scenario, varied, observers=["linear", "kalman"], worlds=2).trials.to_pylist()
+    assert len(rows) == 3 * 2 * 2 * 2
+    for row in rows:
+        kind, bias = row["controller.kind"], row["plant.equilibrium_bias_deg"]
+        if kind not in LAWS:
+            assert (row["outcome"], row["stood"]) == ("stopped", False)
+            assert row["reason"].startswith("law RaisesLate raised KeyError: 'late' at t = 0.")
+            continue
+        settings = [*SHORT, f"controller.kind={kind}", f"plant.equilibrium_bias_deg={bias}"]
+        alone = prepare(load_scenario("push_recovery", settings, row["observer"])).run(world=row["world"])
+        assert row["tilt_rms_deg"] == alone.summaries[0]["tilt_rms_deg"]
+
+
+class RaisesLate:
+    def __init__(self, dt: float, rate_limit: float) -> None:
+        self.dt, self.rate_limit = dt, rate_limit
+
+    def init(self, y: Measurement) -> int:
+        return 0
+
+    def step(self, state: int, y: Measurement, x: Fed, u: Any) -> tuple[int, Any]:
+        if state == 40:
+            raise KeyError("late")
+        return state + 1, -35.0 * x.x1 - 4.0 * x.x2
+
+
+def test_observers_are_tuned_in_a_loop_that_takes_nothing_of_them() -> None:
+    scenario = load_scenario("push_recovery", ["controller.kind=lqg"])
+    assert tuning_scenario(scenario).controller == scenario.controller
+    assert tuning_scenario(load_scenario("push_recovery")).controller.feedback == "fog"
+
+
+def test_a_run_says_which_law_and_reruns(elsewhere: None) -> None:
+    said = cmg_mj(
+        "run", "push_recovery", "--set", "controller.kind=lqg", "--set", "controller.torque_walk=0.1", "--plot"
+    )
+    assert said.status == 0
+    name = "runs/push_recovery-homogeneous-0-kind=lqg-torque_walk=0.1"
+    assert name in said.err
+    again = cmg_mj("run", f"{name}/scenario.toml", "--out", "again")
+    assert again.status == 0
+    one, other = Trajectory.load(Path(name, "trajectory.parquet")), Trajectory.load(Path("again/trajectory.parquet"))
+    for column in one.columns:
+        np.testing.assert_array_equal(one[column], other[column])
+
+
+def test_a_law_without_an_integrator_is_recorded_and_plotted(elsewhere: None) -> None:
+    said = cmg_mj("run", "push_recovery", "--set", f"controller.kind={__name__}:NoMemory", "--plot", "--out", "it")
+    assert said.status == 0
+    assert np.isnan(Trajectory.load(Path("it/trajectory.parquet"))["x_e_rad_times_s"]).all()
+    said = cmg_mj("compare", "push_recovery", "--set", "controller.kind=lqg", "--observers", "linear", "--worlds", 1)
+    assert "lqg takes nothing of the observer: every loop is the same" in said.err
+
+
+class NoMemory(RaisesLate):
+    def step(self, state: int, y: Measurement, x: Fed, u: Any) -> tuple[int, Any]:
+        return 0, -35.0 * x.x1 - 4.0 * x.x2 + x.x3
