@@ -90,7 +90,9 @@ def complaint(root: Any, detail: Mapping[str, Any], fields: Mapping[str, Any]) -
     Returns:
         A clause for an error message.
     """
-    location = [part for part in detail["loc"] if not str(part).startswith(("list[", "literal["))]  # a union's members
+    location = [
+        part for part in detail["loc"] if not str(part).startswith(("list[", "tuple[", "literal["))
+    ]  # a union's members
     kind = detail["type"]
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
         where = path_of(location)

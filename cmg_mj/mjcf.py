@@ -14,7 +14,6 @@ from cmg_mj.model_files import check_files
 from cmg_mj.rig_check import Placement, numbers_that_are_none
 from cmg_mj.rig_parts import NEEDS, lacks
 
-
 _QPOS_SIZES = {0: 7, 1: 4, 2: 1, 3: 1}
 _QVEL_SIZES = {0: 6, 1: 3, 2: 1, 3: 1}
 """Of a free joint, a ball, a slide and a hinge, by MuJoCo's mjtJoint."""

@@ -14,9 +14,9 @@ TRAVEL = math.pi / 2.0
 class Ceiling(NamedTuple):
     """What no controller can exceed, on the linearised reduced model (6) with the gimbals' geometry kept.
 
-    With lambda^2 = m g h/J, the part z = x1 + x2/lambda of a state grows as z' = lambda z - (H/J) cos(x3) u/lambda. Nothing
-    takes more off it than gimbals that turn at once as fast as they can, x3 = u t, up to their travel theta. It is
-    recoverable if
+    With lambda^2 = m g h/J, the part z = x1 + x2/lambda of a state grows as z' = lambda z - (H/J) cos(x3) u/lambda.
+    Nothing takes more off it than gimbals that turn at once as fast as they can, x3 = u t, up to their travel theta. It
+    is recoverable if
 
         z < (H/J) S,   S = 1/lambda integral of e^(-lambda t) u cos(u t) dt from 0 to T = theta/u
                          = u/(lambda^2 + u^2) [1 + e^(-lambda T) ((u/lambda) sin theta - cos theta)]

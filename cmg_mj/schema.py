@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from cmg_mj.controller import Angles, Feedback
 from cmg_mj.fields import Duration, Instant, Line, NonNegative, Positive, Rate
-from cmg_mj.laws import Law, lqr_gains, make_law
+from cmg_mj.laws import Law, carried_over_gains, lqr_gains, make_law
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
 from cmg_mj.plant_settings import PlantSettings
@@ -38,8 +38,9 @@ class ControllerSettings(BaseModel):
     """A name that `cmg-mj list laws` shows, or package.module:Class."""
     rate_hz: Rate = 200.0
     """Control ticks a second; divides the physics rate."""
-    gains: tuple[float, float, float, float] | None = None
-    """K_e on [x1, x2, x3, x_e], of a law that takes gains; Table 2's if neither gains nor lqr is given."""
+    gains: tuple[float, float, float, float] | Literal["carried_over"] | None = None
+    """K_e on [x1, x2, x3, x_e], of a law that takes gains; Table 2's if neither gains nor lqr is given;
+    `carried_over`: Table 2's by the rig's time scale and authority."""
     lqr: LqrSettings | None = None
     """Weights to solve for the gains instead."""
     rate_limit_rad_s: Positive = 4.7
@@ -66,7 +67,8 @@ class ControllerSettings(BaseModel):
         """The law for a reduced model and the sensors' noise."""
         parameters = self.parameters
         if self.gains is not None:
-            parameters["gains"] = self.gains
+            carried = self.gains == "carried_over"
+            parameters["gains"] = carried_over_gains(model) if carried else self.gains
         elif self.lqr is not None:
             parameters["gains"] = lqr_gains(model, self.lqr.state_cost, self.lqr.input_cost)
         return make_law(self.kind, 1.0 / self.rate_hz, self.rate_limit_rad_s, model, noise, **parameters)

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from cmg_mj.cli import boards, logs, scenarios, studies, sweeps
+from cmg_mj.cli import boards, logs, mount, scenarios, studies, sweeps
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, say
 from cmg_mj.errors import InputError, RunStopped
 
@@ -77,6 +77,7 @@ for command in (
     studies.tune,
     logs.replay,
     boards.export,
+    mount.mount,
 ):
     cli.add_command(command)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -24,11 +23,11 @@ if TYPE_CHECKING:
     "--axis",
     default="y",
     show_default=True,
-    help="About what it tilts: a hinge's name, or a direction in the body's frame, x, y or '0.1 1 0'. Of a body that hangs "
-    "on a hinge along it, that hinge; of a free one, the line that it stands on.",
+    help="About what it tilts: a hinge's name, or a direction in the body's frame, x, y or '0.1 1 0'. Of a body that "
+    "hangs on a hinge along it, that hinge; of a free one, the line that it stands on.",
 )
 @click.option("-o", "--out", metavar="FILE", default="balanced.xml", show_default=True, help="What to write.")
-@click.option("--at", metavar="'X Y Z'", help="Where the pair's middle is, in the body's frame [m].  [default: its mass]")
+@click.option("--at", metavar="'X Y Z'", help="The pair's middle in the body's frame [m].  [default: its mass's]")
 @click.option("--cubes", default=2, show_default=True, metavar="N", help="How many modules.")
 @click.option("--scale", default=1.0, show_default=True, metavar="S", help="Of the modules' lengths.")
 @click.option("--name", default="", help="Of the axis; a second one on the same robot needs one.")
@@ -41,9 +40,10 @@ if TYPE_CHECKING:
     help="What holds the robot's other joints: constraints all of them, or its own servos those that have one.",
 )
 @click.option("--free", multiple=True, metavar="JOINT", help="A joint that nothing holds. May be given again.")
-@click.option("--free-base", is_flag=True, help="Let the robot stand on the floor: its root's joints make way for a free one.")
+@click.option("--free-base", is_flag=True, help="Let it stand on the floor: its root's joints make way for a free one.")
 @click.option("--observer", default="homogeneous", show_default=True, metavar="NAME", help="With which it is to stand.")
 @click.option("--json", "as_json", is_flag=True, help="Print what the pair can do as JSON, and nothing else.")
+@click.option("--overwrite", is_flag=True, help="Write over what an earlier mount has written.")
 @users_code()
 def mount(
     robot: str,
@@ -60,6 +60,7 @@ def mount(
     free_base: bool,
     observer: str,
     as_json: bool,
+    overwrite: bool,
 ) -> None:
     """Mount control moment gyroscopes on a robot, and say what they can do there.
 
@@ -90,8 +91,12 @@ def mount(
             base="free" if free_base else "as_is",
         )
 
+    target = named(out)
+    for path in (target, target.with_suffix(".toml")):
+        if path.exists() and not overwrite:
+            raise InputError(f"-o {out}: {path} exists; give another name, or --overwrite")
     found = mounted_at(scale)
-    target = found.save(named(out))
+    target = found.save(target)
     experiment = write_scenario(target, found.path, observer)
     can = prospects(experiment)
     experiment = write_scenario(target, found.path, observer, can)

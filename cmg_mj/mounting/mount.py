@@ -181,12 +181,13 @@ def _mount(
     if root is None:
         qpos, point = _balanced(model, qpos, model.joint(tilts[0]).id, direction, path)
     else:
+        qpos, point, direction = stand(model, qpos, model.joint(tilts[0]).id, direction, path)
         for _ in range(MOST_TRIES):
-            qpos, point, direction = stand(model, qpos, model.joint(tilts[0]).id, direction, path)
             turn = _posed(model, qpos).xmat[tree].reshape(3, 3)
             if place_cubes(mounts, middle, turn.T @ _axes_along(direction), scale):
                 break
             model = compile_model(spec, path)
+            qpos, point, direction = stand(model, qpos, model.joint(tilts[0]).id, direction, path)
 
     # With sensors, and a keyframe to start from.
     data = _posed(model, qpos)

@@ -1,4 +1,4 @@
-"""What a pair can do on a robot: the ceiling for any controller, what this one bears, and whether the robot is the model."""
+"""What a pair can do on a robot: the ceiling for any controller, and what this one bears."""
 
 from __future__ import annotations
 

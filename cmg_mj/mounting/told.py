@@ -68,7 +68,8 @@ def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -
     line = plant.axis.line
     joint = plant.model.joint(line.joint).name
     about = f"the hinge {joint!r}" if isinstance(line, HingeLine) else "the line that it stands on"
-    yield f"{mounted.path}: {len(plant.axis.cubes)} modules on {plant.model.body(plant.frame).name!r}; tilts about {about}"
+    body = plant.model.body(plant.frame).name
+    yield f"{mounted.path}: {len(plant.axis.cubes)} modules on {body!r}; tilts about {about}"
     if mounted.held:
         yield f"  held where they stand: {', '.join(mounted.held)}"
     for note in mounted.notes:

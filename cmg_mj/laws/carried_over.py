@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from cmg_mj.law import TABLE_2_GAINS
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.reduced import ReducedModel
 
 PAPERS_AUTHORITY = 0.3454 / 0.061841
@@ -17,8 +17,8 @@ def carried_over_gains(model: ReducedModel) -> tuple[float, float, float, float]
     """The gains that make a rig's linearised loop the papers' own, slowed down or sped up.
 
     With b = J_d omega_d/J1 and g = m g h/J1 of this rig, its time runs tau = sqrt(g0/g) times as slowly as that of the
-    papers' rig, and a gimbal rate does 1/r as much, r = b0/b. Then [k1 r/tau^2, k2 r/tau, k3/tau, k4/tau^2] has the poles of
-    [k1, k2, k3, k4] on the papers' rig, divided by tau.
+    papers' rig, and a gimbal rate does 1/r as much, r = b0/b. Then [k1 r/tau^2, k2 r/tau, k3/tau, k4/tau^2] has the
+    of [k1, k2, k3, k4] on the papers' rig, divided by tau.
 
     Args:
         model: The rig's reduced model.
