@@ -18,7 +18,7 @@ def carried_over_gains(model: ReducedModel) -> tuple[float, float, float, float]
 
     With b = J_d omega_d/J1 and g = m g h/J1 of this rig, its time runs tau = sqrt(g0/g) times as slowly as that of the
     papers' rig, and a gimbal rate does 1/r as much, r = b0/b. Then [k1 r/tau^2, k2 r/tau, k3/tau, k4/tau^2] has the
-    of [k1, k2, k3, k4] on the papers' rig, divided by tau.
+    poles of [k1, k2, k3, k4] on the papers' rig, divided by tau.
 
     Args:
         model: The rig's reduced model.

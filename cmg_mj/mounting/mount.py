@@ -12,10 +12,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from cmg_mj.axis import find_axis
 from cmg_mj.engine import control_callback, quiet
 from cmg_mj.errors import InputError
 from cmg_mj.mjcf import check_rig, compile_model, parse
 from cmg_mj.mounting.axes import AxisLike, hinge_or_direction
+from cmg_mj.mounting.falling import TRIED_DEG, falls_with
 from cmg_mj.mounting.holding import Hold, hold_joints
 from cmg_mj.mounting.keyframes import as_qpos, poses_of, taken_out, write_keyframe
 from cmg_mj.mounting.parts import add_sensors, attach_cubes, cube_names, place_cubes, site_names
@@ -182,12 +184,13 @@ def _mount(
         qpos, point = _balanced(model, qpos, model.joint(tilts[0]).id, direction, path)
     else:
         qpos, point, direction = stand(model, qpos, model.joint(tilts[0]).id, direction, path)
-        for _ in range(MOST_TRIES):
+        for left in reversed(range(MOST_TRIES)):
             turn = _posed(model, qpos).xmat[tree].reshape(3, 3)
             if place_cubes(mounts, middle, turn.T @ _axes_along(direction), scale):
                 break
             model = compile_model(spec, path)
-            qpos, point, direction = stand(model, qpos, model.joint(tilts[0]).id, direction, path)
+            if left:
+                qpos, point, direction = stand(model, qpos, model.joint(tilts[0]).id, direction, path)
 
     # With sensors, and a keyframe to start from.
     data = _posed(model, qpos)
@@ -203,7 +206,10 @@ def _mount(
     write_keyframe(spec, model, KEYFRAME, qpos, turning, commands)
     for own_name, own_poses in own:
         write_keyframe(spec, model, own_name, as_qpos(model, own_poses | gimbals), turning, commands)
-    compile_model(spec, path)
+    model = compile_model(spec, path)
+    key = model.key(KEYFRAME).id
+    if not falls_with(model, key, find_axis(model, key, name).line):
+        raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: it stands by itself")
     return Mounted(spec, path, tuple(held), tuple(notes))
 
 

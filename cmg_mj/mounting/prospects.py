@@ -7,13 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import mujoco
-
 from cmg_mj.bearable import PUSH_S, Bearable, bearable
 from cmg_mj.engine import control_callback, quiet
 from cmg_mj.experiment import Experiment
+from cmg_mj.mounting.falling import falls_with
 from cmg_mj.mounting.mount import SCALES
-from cmg_mj.plant import Plant
 from cmg_mj.recoverable import Ceiling, ceiling
 from cmg_mj.reduced import ReducedModel
 
@@ -21,10 +19,6 @@ LOW_CEILING_DEG = 2.0
 """A pair that recovers less tilt is too small for the robot [deg]."""
 OFF = 0.1
 """A robot that starts to fall so much faster or slower than its reduced model is not what that takes it for."""
-TRIED_DEG = 0.05
-"""From which tilt it is let fall [deg]."""
-FOR_TIME_CONSTANTS = 1.5
-"""Of the reduced model's unstable pole, for so long."""
 
 
 @dataclass(frozen=True)
@@ -86,22 +80,9 @@ def prospects(experiment: Experiment) -> Prospects:
     """
     plant = experiment.plant
     top = ceiling(plant.reduced, experiment.law.rate_limit)
-    return Prospects(plant.reduced, top, bearable(experiment.scenario, experiment.design), starts_to_fall(plant))
-
-
-@quiet()
-def starts_to_fall(plant: Plant) -> float:
-    """The rate at which a rig starts to fall from a small tilt, its flywheels at rest and its gimbals held [1/s]."""
-    model, line = plant.model, plant.axis.line
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, plant.key)
-    data.qvel[:], data.ctrl[[cube.motor for cube in plant.cubes]] = 0.0, 0.0
-    line.tilt(data, -plant.axis.bias + math.radians(TRIED_DEG))
-    for_s = FOR_TIME_CONSTANTS / math.sqrt(plant.reduced.gravity_torque / plant.reduced.J1)
-    with control_callback(None):
-        mujoco.mj_step(model, data, max(1, round(for_s / model.opt.timestep)))
-    grown = (float(line.lean(data.qpos)) + plant.axis.bias) / math.radians(TRIED_DEG)
-    return math.acosh(grown) / float(data.time) if grown > 1.0 else 0.0
+    with control_callback(None), quiet():
+        pole = falls_with(plant.model, plant.key, plant.axis.line, plant.axis.bias)
+    return Prospects(plant.reduced, top, bearable(experiment.scenario, experiment.design), pole)
 
 
 def scale_that_suffices(ceiling_at: Callable[[float], float], scale: float) -> float | None:
