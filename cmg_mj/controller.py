@@ -9,11 +9,12 @@ from typing import Literal, NamedTuple
 from cmg_mj.backlash import Backlash
 from cmg_mj.commanding import Commanding
 from cmg_mj.elementwise import Scalar
+from cmg_mj.errors import InputError
 from cmg_mj.gimbal_angle import GimbalAngle
 from cmg_mj.ideal import Ideal
 from cmg_mj.laws.protocol import Law, fed
 from cmg_mj.observers.protocol import Measurement, Observer
-from cmg_mj.observing import Observing, read_only
+from cmg_mj.observing import Joining, Observing, read_only
 from cmg_mj.sensors import Sensors, at_work
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.timing import steps_until, whole_steps
@@ -105,7 +106,7 @@ class Controller:
         self._single = isinstance(worlds, int)
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         self._commanding = Commanding(law, self._single, timestep)
-        self._observing = Observing([observer, *self.companions.values()], self._single, timestep)
+        self._observing: Observing = Observing([observer, *self.companions.values()], self._single, timestep)
         self.extra_signals = self._observing.extra_signals
         self.trim_s = trim_s
         self.trim_part, self.trim_gain = trim_of(trim_s, law, self.extra_signals[0])
@@ -125,6 +126,43 @@ class Controller:
         """The physics step of the last update."""
         self.beat = math.gcd(self.period, *(sensor.beat for sensor in self._sampled))
         """Physics steps between the moments at which anything may be due."""
+
+    def exchange(
+        self,
+        *,
+        observer: Observer | None = None,
+        law: Law | None = None,
+        sensors: Sensors | None = None,
+        feedback: Feedback | None = None,
+    ) -> None:
+        """Go on with something else from the next update on; the integrator and the command that is held stay.
+
+        An integrator that was trimmed until now goes free with another observer or law.
+
+        Args:
+            observer: Another one in the loop, which starts from the next tick's sample; companions start again too.
+            law: Another law of the same control period.
+            sensors: Others, of the same rates. All sensors start afresh, with their noise from its beginning.
+            feedback: Which rate the law uses.
+
+        Raises:
+            InputError: A rate does not fit.
+        """
+        if law is not None and law.dt != self.law.dt:
+            raise InputError(f"controller.rate_hz: stays {1.0 / self.law.dt:g} Hz while it runs")
+        if sensors is not None:
+            sampled = at_work(sensors, self.timestep, self.seed, self.worlds)
+            if math.gcd(self.period, *(sensor.beat for sensor in sampled)) != self.beat:
+                raise InputError("sensors: their rates stay while it runs")
+            self._sampled, self.sensors = sampled, sensors
+            self.step = None  # all of them sample at the next update, due or not
+        if observer is not None:
+            self._observing = Joining([observer, *self.companions.values()], self._single, self.timestep)
+            self.observer, self.extra_signals = observer, self._observing.extra_signals
+        if law is not None or observer is not None:
+            self.law = law or self.law
+            self.trimmed_until = 0
+        self.feedback = feedback or self.feedback
 
     def update(self, step: int, ideal: Ideal) -> bool:
         """Take the samples and the control decision that are due at a physics step.

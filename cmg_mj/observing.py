@@ -139,6 +139,14 @@ class Observing:
         raise RunStopped(f"observer {name} {what} at t = {step * self._timestep:g} s") from cause
 
 
+class Joining(Observing):
+    """Observers that join a run which others have begun: they start from the first sample that they see."""
+
+    def advance(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
+        """The estimates at the next sample: see `Observing`."""
+        return super().advance(y, u, step) if self._at_work else self.start(y, step)
+
+
 class _Lost:
     """A companion that raised: nothing is known any more."""
 

@@ -27,7 +27,13 @@ ORDER = [*ABOVE, *BELOW]
 
 REAL_LOG = PACKAGE.parent / "examples" / "data" / "stepper_encoder_gyro.csv"
 
-HEAVY = {"rerun": "recording", "matplotlib": "plots", "casadi": "export", "distributed": "sweeps"}
+HEAVY = {
+    "rerun": "recording",
+    "matplotlib": "plots",
+    "casadi": "export",
+    "distributed": "sweeps",
+    "mujoco.studio": "studio",
+}
 """Imported by one room each, because it costs time."""
 
 
@@ -149,7 +155,11 @@ def test_heavy_packages_are_imported_where_they_are_used() -> None:
 @pytest.mark.parametrize("package", sorted(HEAVY))
 def test_only_one_room_knows_a_heavy_package(package: str) -> None:
     users = {
-        room for room in rooms() for path in files(room) for _, name in imports(path) if name.split(".")[0] == package
+        room
+        for room in rooms()
+        for path in files(room)
+        for _, name in imports(path)
+        if f"{name}.".startswith(f"{package}.")
     }
     assert users <= {HEAVY[package]}
 

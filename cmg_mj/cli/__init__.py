@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from cmg_mj.cli import boards, logs, mount, scenarios, studies, sweeps
+from cmg_mj.cli import boards, logs, mount, scenarios, studies, studio, sweeps
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, say
 from cmg_mj.errors import InputError, RunStopped
 
@@ -71,6 +71,7 @@ for command in (
     scenarios.compare,
     scenarios.list_names,
     scenarios.check,
+    studio.studio,
     sweeps.sweep,
     studies.bench,
     studies.reproduce,

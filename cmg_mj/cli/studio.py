@@ -1,0 +1,80 @@
+"""The command that opens a scenario in MuJoCo Studio."""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import TYPE_CHECKING
+
+import click
+
+from cmg_mj.cli.arguments import Chosen, check_observer
+from cmg_mj.cli.terminal import say_hints, users_code
+from cmg_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from cmg_mj.experiment import Experiment
+
+GRAPHICS = ("web", "native", "opengl", "opengl_headless", "opengl_software", "vulkan", "vulkan_software")
+
+
+@click.command(short_help="Open a scenario in MuJoCo Studio, its controller running: push it, switch observers.")
+@click.argument("scenario")
+@click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="FIELD=VALUE",
+    help="Replace a field of the scenario, such as plant.initial_tilt_deg=2.0; may be given again.",
+)
+@click.option("--seed", type=click.IntRange(0, 2**128 - 1), metavar="N", help="Seed of the sensors' noise.")
+@click.option(
+    "--gfx",
+    type=click.Choice(GRAPHICS),
+    default="web",
+    show_default=True,
+    help="web: in a browser, for this machine alone. native and the others: in a window (Python 3.12 or newer).",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    metavar="N",
+    help="Port of the web view.  [default: the first free one from 8080 on]",
+)
+@click.option("--browser", is_flag=True, help="Open the web view in a browser.")
+@users_code()
+def studio(
+    scenario: str,
+    observer: str | None,
+    settings: tuple[str, ...],
+    seed: int | None,
+    gfx: str,
+    port: int,
+    browser: bool,
+) -> None:
+    """Open SCENARIO in MuJoCo Studio, its controller running, until the viewer is closed or Ctrl-C.
+
+    As long as nobody interferes it is the trajectory of cmg-mj run. A panel switches the observer, the gains and the
+    rate that is fed back, pushes, and sets the bias and the accelerometers' noise; Studio pauses, steps, resets, and
+    goes back in time (docs/studio.md).
+    """
+    from cmg_mj.experiment import prepare
+
+    if observer is not None:
+        check_observer("--observer", observer)
+    chosen = Chosen(scenario, settings, seed, None, False)
+
+    def opened(model: str) -> Experiment:
+        """The scenario as its file is now; with another rig, if one was dropped on the viewer."""
+        if not model:
+            return prepare(chosen.scenario(observer))
+        return prepare(chosen.scenario(observer)).with_values({"plant.model": model})
+
+    first = opened("")
+    say_hints(first.hints)
+    if importlib.util.find_spec("mujoco.studio") is None:
+        raise InputError("this MuJoCo comes without Studio: install the wheel from PyPI, python -m pip install mujoco")
+    from cmg_mj.studio.opened import open_in_studio
+
+    open_in_studio(opened, first.scenario.title or scenario, gfx, port, browser)

@@ -1,0 +1,64 @@
+"""Which viewer there is: the browser's, on loopback alone, or a window."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+
+from mujoco.studio import endpoints, launch_native, launch_thread, plugin, viewer_handle, viewer_protocol, web_viewer
+
+from cmg_mj.errors import InputError
+
+LOOPBACK = "127.0.0.1"
+WEB = "web"
+
+
+class LoopbackViewer(web_viewer.WebViewer):
+    """The web viewer for this machine's browsers alone. Studio's own listens on every network interface, to anybody."""
+
+    @property
+    def _host(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return LOOPBACK
+
+    @_host.setter
+    def _host(self, _: str) -> None:
+        """Studio names all interfaces here."""
+
+
+def check_graphics(gfx: str) -> None:
+    """Refuse graphics that cannot be had, which end the process otherwise, before there is a viewer.
+
+    Args:
+        gfx: `web`, `native`, or one of Studio's graphics modes.
+
+    Raises:
+        InputError: They cannot be had here.
+    """
+    if gfx == WEB:
+        return
+    if sys.version_info < (3, 12):
+        raise InputError(
+            f"--gfx {gfx}: MuJoCo Studio's windows need Python 3.12 or newer, and this is "
+            f"{sys.version_info.major}.{sys.version_info.minor}; take --gfx {WEB}"
+        )
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise InputError(f"--gfx {gfx}: there is no screen (DISPLAY is not set); take --gfx {WEB}")
+
+
+def launched(config: viewer_protocol.ViewerConfig, plugins: Sequence[plugin.Plugin]) -> viewer_handle.ViewerHandle:
+    """Start a viewer in a thread of its own.
+
+    Args:
+        config: Its window and graphics.
+        plugins: What runs on both threads.
+
+    Returns:
+        The simulation's handle on it.
+    """
+    of_viewer, of_simulation = plugin.split_plugins(plugins)
+    targets: dict[bool, Callable[[endpoints.ViewerEndpoint], None]] = {
+        True: lambda endpoint: viewer_protocol.run_viewer_loop(LoopbackViewer(config, endpoint, plugins=of_viewer)),
+        False: lambda endpoint: launch_native.run_native_viewer(config, endpoint, plugins=of_viewer),
+    }
+    return launch_thread.launch_thread(targets[config.gfx == WEB], sim_plugins=of_simulation)
