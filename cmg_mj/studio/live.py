@@ -23,7 +23,7 @@ KEPT_TICKS = 2400
 
 
 class Shown(NamedTuple):
-    """A control tick as it is plotted."""
+    """A control tick as it is plotted: x1, its true and its estimated rate, u."""
 
     time_s: float
     tilt_deg: float
@@ -134,7 +134,8 @@ class Live:
         tick = self.controller.tick
         if ticked and tick is not None:
             rate = float(data.qvel[self.plant.tilt])
-            self.ticks.append(Shown(data.time, math.degrees(lean), rate, tick.estimates[0][1], tick.u, torque))
+            x1 = math.degrees(lean + self.now.plant.bias)
+            self.ticks.append(Shown(data.time, x1, rate, tick.estimates[0][1], tick.u, torque))
         return ticked
 
     def _stop(self, data: mujoco.MjData, step: int, why: str) -> None:
@@ -156,7 +157,7 @@ class Live:
         self.pushes.forget(step)
         if self.memory.has(step):
             try:
-                self.controller, was = self.memory.at(step)
+                self.controller, was = self.memory.back_to(step)
                 self._take(was)
                 self.stopped = self.note = ""
                 return step
@@ -166,6 +167,14 @@ class Live:
             self.note = f"nothing is remembered of t = {data.time:g} s: the controller starts afresh"
         self._begin(step)
         return step
+
+    def as_of(self, data: mujoco.MjData) -> tuple[Experiment, str]:
+        """The scenario, and why the controller does not control, as they were where the state is; looked at only."""
+        step = self._step_of(data)
+        if step == self._next:
+            return self.now, self.stopped
+        stopped = self.stopped if step > self._stopped_at else ""
+        return self.memory.told(step) if self.memory.has(step) else self.now, stopped
 
     # --- what a user changes -------------------------------------------------------------------------------
 

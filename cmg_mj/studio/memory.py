@@ -72,7 +72,16 @@ class Memory:
         """Whether the controller can be had as it was before a physics step; nothing was left out on the way there."""
         return self.whole and self.begin <= step
 
-    def at(self, step: int) -> tuple[Controller, Experiment]:
+    def told(self, step: int) -> Experiment:
+        """Whose the controller was before its update at a physics step that it `has`."""
+        count = self._count(step)
+        return next(told.experiment for told in reversed(self._told) if told.count <= count)
+
+    def _count(self, step: int) -> int:
+        """How many samples it was shown before a physics step."""
+        return int(np.searchsorted(np.asarray(self._steps), step))
+
+    def back_to(self, step: int) -> tuple[Controller, Experiment]:
         """The controller as it was before its update at a physics step. What was later is forgotten.
 
         Args:
@@ -84,10 +93,10 @@ class Memory:
         Raises:
             RunStopped: An observer fails at samples that it did not fail at the first time.
         """
-        count = int(np.searchsorted(np.asarray(self._steps), step))
+        count = self._count(step)
         width = len(self._numbers) // max(1, len(self._steps))
         del self._steps[count:], self._numbers[count * width :]
-        self._told = [told for told in self._told if told.count <= count] or self._told[:1]
+        self._told = [told for told in self._told if told.count <= count]
         start = max(i for i, told in enumerate(self._told) if told.afresh)
         since = self._told[start:]
         experiment = since[0].experiment

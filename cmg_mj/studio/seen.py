@@ -12,6 +12,10 @@ from cmg_mj.plant import Plant
 _OF_WHAT_IS_SEEN = ("_", "name", "geom", "mesh", "mat", "tex", "skin", "bvh", "body_geom", "body_bvh", "light", "cam")
 """What arrays are called that hold geoms and what hangs on their number."""
 
+MUJOCO_LOOKS_ALONG = (90.0, -45.0)
+LOOKED_AT_ALONG = (125.0, -20.0)
+"""Where the camera looks at first, azimuth and elevation, unless the model file says it [deg]."""
+
 
 def seen(plant: Plant) -> Plant:
     """The same rig on a model of its own, which has what is only seen as well.
@@ -25,6 +29,9 @@ def seen(plant: Plant) -> Plant:
     other = copy.copy(plant)
     other.model = copy.copy(plant.drawn_model)
     other.model.opt = plant.model.opt
+    view = other.model.vis.global_
+    if (view.azimuth, view.elevation) == MUJOCO_LOOKS_ALONG:
+        view.azimuth, view.elevation = LOOKED_AT_ALONG
     take_numbers(other.model, plant.model)
     return other
 

@@ -96,12 +96,12 @@ class Stepping(plugin.SimPlugin):
         if event.model.opt.timestep != live.timestep:
             event.model.opt.timestep = live.timestep
             self._complain(f"the physics step stays {live.timestep:g} s: samples and ticks fall on whole steps")
+        before = self._state()
         if self._pause == sim.PauseState.UNPAUSED:
             due = self._pace.steps_due(data.time, live.timestep)
         else:
             due, self._single_steps = self._single_steps, 0
             self._pace.begin(data.time + due * live.timestep)
-        before = self._state()
         for _ in range(due):
             live.step(data)
             if not np.isfinite(data.qpos).all():
@@ -112,7 +112,7 @@ class Stepping(plugin.SimPlugin):
         now = self._clock()
         if not 0.0 <= now - self._said < SAID_EVERY_S:
             self._said = now
-            self.handle.send_to_viewer(self.standing(data.time))
+            self.handle.send_to_viewer(self.standing())
         self._sleep(REST_S)
         return True
 
@@ -172,22 +172,22 @@ class Stepping(plugin.SimPlugin):
         self._complaint = what
         logger.warning("%s", what)
 
-    def standing(self, time_s: float) -> Standing:
+    def standing(self) -> Standing:
         """Where things stand, for the panel."""
-        live = self.live
-        if live is None:
+        live, data = self.live, self.handle.data
+        if live is None or data is None:
             return Standing(note=self._complaint)
-        now = live.now
-        ticks = np.array([tick for tick in live.ticks if tick.time_s <= time_s]).reshape(-1, 6)
+        now, stopped = live.as_of(data)
+        ticks = np.array([tick for tick in live.ticks if tick.time_s < data.time - 1e-9]).reshape(-1, 6)
         return Standing(
             title=now.scenario.title,
-            time_s=time_s,
+            time_s=data.time,
             settings=settings_of(now.scenario),
             observers=observers_of(live.base),
             gains=now.law.gains,
             laws=laws_of(live.base),
             law=law_of(now),
-            stopped=live.stopped,
+            stopped=stopped,
             note=self._complaint or live.note,
             ticks=ticks,
         )
