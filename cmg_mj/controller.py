@@ -27,6 +27,9 @@ Angles = Literal["measured", "estimated"]
 CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s"})
 """Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
 
+RIDES_ALONG = 20
+"""Ticks that a new observer sees before it takes over from another: 0.1 s at 200 Hz."""
+
 
 class Tick(NamedTuple):
     """All that one control period measured and decided (floats, or arrays (n_worlds,))."""
@@ -140,7 +143,8 @@ class Controller:
         An integrator that was trimmed until now goes free with another observer or law.
 
         Args:
-            observer: Another one in the loop, which starts from the next tick's sample; companions start again too.
+            observer: Another one for the loop. It starts from the next tick's sample and takes over `RIDES_ALONG` ticks
+                later; companions start again with it.
             law: Another law of the same control period.
             sensors: Others, of the same rates. All sensors start afresh, with their noise from its beginning.
             feedback: Which rate the law uses.
@@ -157,7 +161,11 @@ class Controller:
             self._sampled, self.sensors = sampled, sensors
             self.step = None  # all of them sample at the next update, due or not
         if observer is not None:
-            self._observing = Joining([observer, *self.companions.values()], self._single, self.timestep)
+            observers = [observer, *self.companions.values()]
+            if self.tick is None:
+                self._observing = Observing(observers, self._single, self.timestep)
+            else:
+                self._observing = Joining(self._observing, RIDES_ALONG, observers, self._single, self.timestep)
             self.observer, self.extra_signals = observer, self._observing.extra_signals
         if law is not None or observer is not None:
             self.law = law or self.law

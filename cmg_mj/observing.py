@@ -140,11 +140,38 @@ class Observing:
 
 
 class Joining(Observing):
-    """Observers that join a run which others have begun: they start from the first sample that they see."""
+    """Observers that join a run which others have begun, and take over once they have had time to converge.
+
+    They start from the first sample that they see, whose rate they take for zero. Until they take over, or the one
+    before fails, the estimate in the loop is its.
+
+    Args:
+        before: Those that they take over from.
+        ticks: How many samples they ride along.
+        observers: The one that will be in the loop, then those that only ride along.
+        single: Whether on floats (one world) or on arrays (n_worlds,).
+        timestep: Physics step [s].
+    """
+
+    def __init__(
+        self, before: Observing, ticks: int, observers: Sequence[Observer], single: bool, timestep: float
+    ) -> None:
+        super().__init__(observers, single, timestep)
+        self._before: Observing | None = before
+        self._ticks = ticks
 
     def advance(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
         """The estimates at the next sample: see `Observing`."""
-        return super().advance(y, u, step) if self._at_work else self.start(y, step)
+        estimates = super().advance(y, u, step) if self._at_work else self.start(y, step)
+        if self._before is not None:
+            self._ticks -= 1
+            try:
+                estimates[0] = self._before.advance(y, u, step)[0]
+            except RunStopped:
+                self._ticks = 0
+            if self._ticks <= 0:
+                self._before = None
+        return estimates
 
 
 class _Lost:

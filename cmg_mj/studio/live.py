@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import mujoco
+import numpy as np
 
 from cmg_mj.callback import control
 from cmg_mj.controller import Controller
@@ -45,6 +46,7 @@ class Live:
         plant: Its rig, on a model that has what is only seen as well.
         pushes: The torques from outside.
         stopped: Why the controller no longer controls; empty while it does. The gimbals then stand.
+        diverged: Whether that is because the physics has no numbers any more.
         note: What the last change or jump came to, if it is worth a line.
         ticks: The last ones, to be plotted.
     """
@@ -92,6 +94,7 @@ class Live:
         self.controller: Controller = self.now.controller()
         self.memory = Memory(self.now, step)
         self.stopped = ""
+        self.diverged = False
         self._stopped_at = 0
         self._next = step
         """The step that comes next, unless somebody else has a hand in it."""
@@ -116,13 +119,15 @@ class Live:
         ticked = not self.stopped and self._control(data, step, torque)
         mujoco.mj_step(self.model, data)
         self._next = step + 1
+        if not np.isfinite(data.qpos).all():
+            self.diverged = True
+            self._stop(data, step, f"the physics diverged at t = {data.time:g} s; reset")
         return ticked
 
     def _control(self, data: mujoco.MjData, step: int, torque: float) -> bool:
         lean = float(data.qpos[self.plant.tilt] - self.plant.tilt_zero)
         if not abs(lean) <= math.radians(self.now.scenario.metrics.fall_angle_deg):
-            what = "fell" if math.isfinite(lean) else "diverged"
-            self._stop(data, step, f"the rig {what} at t = {data.time:g} s")
+            self._stop(data, step, f"the rig fell at t = {data.time:g} s; reset, or go back in time")
             return False
         try:
             ticked = control(self.plant, self.controller, data)
@@ -159,7 +164,7 @@ class Live:
             try:
                 self.controller, was = self.memory.back_to(step)
                 self._take(was)
-                self.stopped = self.note = ""
+                self.stopped, self.note, self.diverged = "", "", False
                 return step
             except (InputError, RunStopped) as error:
                 self.note = f"the controller could not be brought back ({error}) and starts afresh"
@@ -206,7 +211,9 @@ class Live:
 
     def _fields(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """With the physics step that it runs with, and of an observer the parameters that the scenario has for it."""
-        fields = {**values, "plant.timestep_s": self.timestep}
+        fields = dict(values)
+        if self.now.scenario.plant.timestep_s is None:
+            fields["plant.timestep_s"] = self.timestep
         kind = fields.pop("observer.kind", None)
         if kind is not None:
             own = self.base.scenario.observer

@@ -104,7 +104,7 @@ class Stepping(plugin.SimPlugin):
             self._pace.begin(data.time + due * live.timestep)
         for _ in range(due):
             live.step(data)
-            if not np.isfinite(data.qpos).all():
+            if live.diverged:
                 self._pause = sim.PauseState.NORMAL_PAUSED  # nothing is left to be seen
                 break
         if self._state() != before:

@@ -92,8 +92,9 @@ class Session:
 
     def run(self, seconds: float, every_s: float = 0.017) -> None:
         """Let the clock go so far, and the simulation with it."""
-        until = self.data.time + seconds
+        until, most = self.data.time + seconds, self.now + 2.0 * seconds + 1.0
         while self.data.time < until - 1e-9:
+            assert self.now < most, "it stands still"
             self.now += min(every_s, until - self.data.time + 1e-7)
             self.handle.sync()
 
