@@ -14,7 +14,7 @@ from cmg_mj.errors import InputError
 if TYPE_CHECKING:
     from cmg_mj.experiment import Experiment
 
-GRAPHICS = ("web", "native", "opengl", "opengl_headless", "opengl_software", "vulkan", "vulkan_software")
+GRAPHICS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_software")
 
 
 @click.command(short_help="Open a scenario in MuJoCo Studio, its controller running: push it, switch observers.")

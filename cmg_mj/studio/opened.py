@@ -11,7 +11,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment
 from cmg_mj.studio.panel import Panel
 from cmg_mj.studio.stepping import Stepping
-from cmg_mj.studio.viewers import WEB, check_graphics, launched
+from cmg_mj.studio.viewers import NATIVE, WEB, check_graphics, launched
 
 HISTORY_S = 10.0
 
@@ -32,9 +32,10 @@ def open_in_studio(
         InputError: The graphics cannot be had, or the port is taken.
     """
     check_graphics(gfx)
-    mode = "" if gfx == "native" else gfx
+    mode = "" if gfx == NATIVE else gfx
     config = viewer_protocol.ViewerConfig(title=title, gfx=mode, http_port=port, open_browser=browser)
-    plugins = [app.App(), Panel(), Stepping(opened), sim_history.SimHistory(min_seconds=HISTORY_S)]
+    studio = app.App(app.Config(show_inspector=False))  # where the panel is; Shift+Tab shows it
+    plugins = [studio, Panel(), Stepping(opened), sim_history.SimHistory(min_seconds=HISTORY_S)]
     with quiet():
         try:
             with launched(config, plugins) as handle:

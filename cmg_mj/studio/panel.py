@@ -15,7 +15,7 @@ from cmg_mj.studio.said import Choose, PushNow, Standing, StartAgain
 
 TITLE = "Gyroscopic balance"
 PLOTTED_S = 6.0
-PLOT_HEIGHT = 130.0
+PLOT_HEIGHT = 135.0
 FEEDBACKS = {"observer": "the observer's", "fog": "the gyro's", "truth": "the true one"}
 
 logger = logging.getLogger(__name__)
@@ -33,6 +33,7 @@ class Panel(plugin.ViewerPlugin):
         self._curves: dict[str, list[float]] = {}
         self._torque, self._duration = 1.0, 0.1
         self._typed: dict[str, float] = {}
+        self._shown = True
         self._broken = False
 
     @messages.handler
@@ -49,15 +50,27 @@ class Panel(plugin.ViewerPlugin):
         """Draw it. What goes wrong here ends the panel, not the viewer."""
         if self._broken:
             return
-        imgui.SetNextWindowPos(imgui.Vec2(330.0, 60.0), int(imgui.Cond.FirstUseEver))
-        imgui.SetNextWindowSize(imgui.Vec2(430.0, 760.0), int(imgui.Cond.FirstUseEver))
-        expanded, _open = imgui.Begin(TITLE)
         try:
-            if expanded:
-                self._build()
+            if imgui.BeginMainMenuBar():
+                if imgui.BeginMenu("View"):
+                    if imgui.MenuItem(TITLE, "", self._shown):
+                        self._shown = not self._shown
+                    imgui.EndMenu()
+                imgui.EndMainMenuBar()
+            if self._shown:
+                self._build_window()
         except Exception:
             self._broken = True
             logger.exception("the panel has failed and is gone; the simulation runs on")
+
+    def _build_window(self) -> None:
+        right = imgui.Vec2(imgui.GetIO().DisplaySize.x - 15.0, 45.0)
+        imgui.SetNextWindowPos(right, int(imgui.Cond.FirstUseEver), imgui.Vec2(1.0, 0.0))
+        imgui.SetNextWindowSize(imgui.Vec2(430.0, 770.0), int(imgui.Cond.FirstUseEver))
+        expanded, self._shown = imgui.Begin(TITLE, self._shown)
+        try:
+            if expanded:
+                self._build()
         finally:
             imgui.End()
 
@@ -122,6 +135,7 @@ class Panel(plugin.ViewerPlugin):
                 implot.SetupAxes("", "", 0, int(implot.AxisFlags.AutoFit))
                 start, always = now.time_s - PLOTTED_S, int(implot.Cond.Always)
                 implot.SetupAxisLimits(int(implot.Axis.X1), start, now.time_s, always)
+                implot.SetupLegend(int(implot.Location.NorthWest), int(implot.LegendFlags.Horizontal))
                 for name, label in curves.items():
                     if self._curves.get("time"):
                         implot.PlotLine(label, self._curves["time"], self._curves[name])

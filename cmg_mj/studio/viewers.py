@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import subprocess
 import sys
 from collections.abc import Callable, Sequence
 
@@ -11,7 +11,9 @@ from mujoco.studio import endpoints, launch_native, launch_thread, plugin, viewe
 from cmg_mj.errors import InputError
 
 LOOPBACK = "127.0.0.1"
-WEB = "web"
+WEB, NATIVE = "web", "native"
+PATIENCE_S = 60.0
+"""With which a window's first frames are waited for [s]."""
 
 
 class LoopbackViewer(web_viewer.WebViewer):
@@ -42,8 +44,23 @@ def check_graphics(gfx: str) -> None:
             f"--gfx {gfx}: MuJoCo Studio's windows need Python 3.12 or newer, and this is "
             f"{sys.version_info.major}.{sys.version_info.minor}; take --gfx {WEB}"
         )
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise InputError(f"--gfx {gfx}: there is no screen (DISPLAY is not set); take --gfx {WEB}")
+    mode = "" if gfx == NATIVE else gfx
+    try:
+        tried = subprocess.run(
+            [sys.executable, "-m", "cmg_mj.studio.probe", mode], capture_output=True, text=True, timeout=PATIENCE_S
+        )
+    except subprocess.TimeoutExpired:
+        why = f"no frame in {PATIENCE_S:g} s"
+    else:
+        if tried.returncode == 0:
+            return
+        lines = [line.strip() for line in tried.stderr.splitlines() if _says_why(line)]
+        why = lines[-1] if lines else f"a window ends the process, status {tried.returncode}"
+    raise InputError(f"--gfx {gfx}: MuJoCo Studio cannot draw with it here ({why}); take --gfx {WEB}")
+
+
+def _says_why(line: str) -> bool:
+    return "rror" in line or "ailed" in line
 
 
 def launched(config: viewer_protocol.ViewerConfig, plugins: Sequence[plugin.Plugin]) -> viewer_handle.ViewerHandle:

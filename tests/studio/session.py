@@ -40,7 +40,7 @@ class Recorded(Stepping):
         before = self.live
         done = super().on_load_model(event)
         if self.live is not None and self.live is not before:
-            self.live.step = recording(self.live, self.rows)
+            vars(self.live)["step"] = recording(self.live, self.rows)
         return done
 
 
