@@ -115,7 +115,8 @@ class Live:
         """
         step = self.attend(data)
         torque = self.pushes.at(step)
-        data.qfrc_applied[self.plant.tilt] = torque  # what Studio's mouse does is in xfrc_applied: MuJoCo adds them up
+        for dof, share in zip(*self.plant.axis.line.push, strict=True):
+            data.qfrc_applied[dof] = share * torque  # Studio's mouse writes xfrc_applied: MuJoCo adds them up
         ticked = not self.stopped and self._control(data, step, torque)
         mujoco.mj_step(self.model, data)
         self._next = step + 1
@@ -125,7 +126,8 @@ class Live:
         return ticked
 
     def _control(self, data: mujoco.MjData, step: int, torque: float) -> bool:
-        lean = float(data.qpos[self.plant.tilt] - self.plant.tilt_zero)
+        axis = self.plant.axis
+        lean = float(axis.line.lean(data.qpos))
         if not abs(lean) <= math.radians(self.now.scenario.metrics.fall_angle_deg):
             self._stop(data, step, f"the rig fell at t = {data.time:g} s; reset, or go back in time")
             return False
@@ -138,14 +140,15 @@ class Live:
             self.memory.show(step, data)
         tick = self.controller.tick
         if ticked and tick is not None:
-            rate = float(data.qvel[self.plant.tilt])
+            rate = float(axis.line.rate(data.qvel))
             x1 = math.degrees(lean + self.now.plant.bias)
             self.ticks.append(Shown(data.time, x1, rate, tick.estimates[0][1], tick.u, torque))
         return ticked
 
     def _stop(self, data: mujoco.MjData, step: int, why: str) -> None:
         self.stopped, self._stopped_at = why, step
-        data.ctrl[self.plant.servos] = 0.0
+        for axis in self.plant.axes:
+            data.ctrl[axis.servos] = 0.0
 
     def attend(self, data: mujoco.MjData) -> int:
         """Bring the controller to where the state is, should somebody have moved it in time; the step it is at.

@@ -129,6 +129,6 @@ def session(*settings: str, scenario: str = "push_recovery", **others: Any) -> I
 
 def as_rows(trajectory: Trajectory) -> np.ndarray:
     """A runner's trajectory as the rows of a session."""
-    rates = [trajectory[f"rate/{joint}_rad_s"] for joint in trajectory.joints]
+    rates = [trajectory[name] for name in trajectory.layout.rates()]
     names = ("time_s", *SIGNALS)
     return np.column_stack([*(trajectory[name] for name in names), trajectory.qpos(), *rates])

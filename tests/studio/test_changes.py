@@ -194,7 +194,7 @@ def test_an_observer_that_raises_stops_the_controller_and_nothing_else() -> None
         said = studio.standing()
         assert said.stopped == "observer Fragile raised KeyError: 'gone' at t = 2.505 s"
         assert studio.data.time == pytest.approx(3.5, abs=0.05)
-        assert np.all(studio.data.ctrl[studio.live.plant.servos] == 0.0)
+        assert np.all(studio.data.ctrl[studio.live.plant.axis.servos] == 0.0)
         assert studio.rows[-1, TIME] < 2.51
 
 
