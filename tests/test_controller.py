@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.controller import Controller
+from cmg_mj.controller import RIDES_ALONG, Controller
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.experiment import prepare
 from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
@@ -516,3 +516,85 @@ def test_gimbals_move_oppositely_at_the_commanded_rate() -> None:
     np.testing.assert_allclose(trajectory["x3_rad"], first, atol=1e-6)
     commanded = np.concatenate([[0.0], np.cumsum(trajectory["u_rad_s"])[:-1]]) * 0.005
     np.testing.assert_allclose(first[100:], commanded[100:], atol=2e-2)
+
+
+# --- something else while it runs --------------------------------------------------------------------------
+
+
+def test_another_observer_rides_along_and_takes_over() -> None:
+    """The command is the one's until the other takes over, which began with the next sample and knows its held u."""
+    one, other = Script(lambda k: Estimate(0.0, 1.0, 0.0)), Script(lambda k: Estimate(0.0, -1.0, 0.0))
+    of = controller(one)
+    rates = []
+    for k in range(3 + RIDES_ALONG + 5):
+        if k == 3:
+            of.exchange(observer=other)
+        of.update(5 * k, READINGS[k % 4])
+        assert of.tick is not None
+        rates.append(of.tick.estimates[0][1])
+    assert rates == [0.0, *[1.0] * (2 + RIDES_ALONG), *[-1.0] * 5]
+    assert len(one.asked) == 2 + RIDES_ALONG
+    assert len(other.asked) == RIDES_ALONG + 4
+    assert other.asked == [*one.asked[3:], *other.asked[RIDES_ALONG - 1 :]]
+
+
+def test_it_takes_over_at_once_from_one_that_fails() -> None:
+    def failing(k: int) -> Estimate:
+        if k > 4:
+            raise KeyError("gone")
+        return Estimate(0.0, 1.0, 0.0)
+
+    of = controller(Script(failing))
+    rates = []
+    for k in range(9):
+        if k == 3:
+            of.exchange(observer=Script(lambda k: Estimate(0.0, -1.0, 0.0)))
+        of.update(5 * k, READINGS[0])
+        assert of.tick is not None
+        rates.append(of.tick.estimates[0][1])
+    assert rates == [0.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
+
+
+def test_before_the_first_tick_an_observer_is_exchanged_at_once() -> None:
+    of = controller(Script(lambda k: Estimate(0.0, 1.0, 0.0)))
+    of.exchange(observer=Script(ESTIMATES.__getitem__))
+    assert [tick.estimates[0] for tick in ticks(of)][1:] == ESTIMATES[1:]
+
+
+def test_law_and_feedback_change_with_the_integrator_as_it_was() -> None:
+    of = controller(Script(ESTIMATES.__getitem__))
+    of.update(0, READINGS[0])
+    of.update(5, READINGS[1])
+    other = Law(DT, (30.0, 3.0, -0.5, 0.1))
+    of.exchange(law=other, feedback="truth")
+    of.update(10, READINGS[2])
+    assert of.tick is not None
+    assert of.tick.x_e == pytest.approx(-DT * 0.1)
+    assert of.tick.u == other(of.tick.y1, 0.7, of.tick.y2, of.tick.x_e)[0]
+
+
+def test_sensors_start_afresh_between_their_samples_too() -> None:
+    """Other sensors have something to show at the next tick, though none of theirs is due."""
+    slow = Sensors(
+        Accelerometer(rate_hz=50.0, noise_density_ug_rthz=0.0, counts_per_g=0.0),
+        IDEAL_SENSORS.encoder,
+        IDEAL_SENSORS.fog,
+    )
+    of = controller(Script(lambda k: Estimate(0.0, 0.0, 0.0)))
+    of.sensors = slow
+    of.reset()
+    of.update(0, READINGS[0])
+    of.update(5, READINGS[1])
+    assert of.tick is not None
+    assert of.tick.y1 == pytest.approx(0.01)
+    of.exchange(sensors=Sensors(Accelerometer(rate_hz=50.0, bias_mg=(1.0, 1.0)), slow.encoder, slow.fog))
+    of.update(10, READINGS[2])
+    assert of.tick.y1 != pytest.approx(0.01, abs=0.005)
+
+
+def test_rates_stay_while_it_runs() -> None:
+    of = controller(Script(ESTIMATES.__getitem__))
+    with pytest.raises(InputError, match=r"controller.rate_hz: stays 200 Hz"):
+        of.exchange(law=Law(0.01))
+    with pytest.raises(InputError, match="sensors: their rates stay"):
+        of.exchange(sensors=Sensors(Accelerometer(rate_hz=1000.0)))

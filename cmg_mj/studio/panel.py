@@ -15,7 +15,7 @@ from cmg_mj.studio.said import Choose, PushNow, Standing, StartAgain
 
 TITLE = "Gyroscopic balance"
 PLOTTED_S = 6.0
-PLOT_HEIGHT = 135.0
+PLOT_HEIGHT = 122.0
 FEEDBACKS = {"observer": "the observer's", "fog": "the gyro's", "truth": "the true one"}
 
 logger = logging.getLogger(__name__)
@@ -131,7 +131,8 @@ class Panel(plugin.ViewerPlugin):
             ("Tilt rate", "rad/s", {"rate": "true", "estimate": "estimate"}),
             ("Command", "rad/s", {"command": "u"}),
         ):
-            if implot.BeginPlot(f"{title} [{unit}]", imgui.Vec2(-1.0, PLOT_HEIGHT)):
+            flags = int(implot.Flags.NoLegend) if len(curves) == 1 else 0
+            if implot.BeginPlot(f"{title} [{unit}]", imgui.Vec2(-1.0, PLOT_HEIGHT), flags):
                 implot.SetupAxes("", "", 0, int(implot.AxisFlags.AutoFit))
                 start, always = now.time_s - PLOTTED_S, int(implot.Cond.Always)
                 implot.SetupAxisLimits(int(implot.Axis.X1), start, now.time_s, always)
