@@ -11,7 +11,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment
 from cmg_mj.studio.panel import Panel
 from cmg_mj.studio.stepping import Stepping
-from cmg_mj.studio.viewers import NATIVE, WEB, check_graphics, launched
+from cmg_mj.studio.viewers import NATIVE, WEB, ViewerFailed, check_graphics, launched
 
 HISTORY_S = 10.0
 
@@ -29,7 +29,7 @@ def open_in_studio(
         browser: Whether to open the web view in a browser, if there is a screen.
 
     Raises:
-        InputError: The graphics cannot be had, or the port is taken.
+        InputError: The graphics cannot be had, the port is taken, or the viewer fails.
     """
     check_graphics(gfx)
     mode = "" if gfx == NATIVE else gfx
@@ -41,5 +41,5 @@ def open_in_studio(
             with launched(config, plugins) as handle:
                 handle.dispatch(messages.LoadModelEvent())
                 viewer_handle.run_sim_loop(handle)
-        except (RuntimeError, ValueError, ImportError, OSError) as error:
-            raise InputError(f"--gfx {gfx}: {' '.join(str(error).split())}") from error
+        except ViewerFailed as error:
+            raise InputError(f"--gfx {gfx}: the viewer has failed: {' '.join(str(error).split())}") from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from mujoco.studio import endpoints, launch_native, launch_thread, plugin, viewer_handle, viewer_protocol, web_viewer
 
@@ -14,6 +14,10 @@ LOOPBACK = "127.0.0.1"
 WEB, NATIVE = "web", "native"
 PATIENCE_S = 60.0
 """With which a window's first frames are waited for [s]."""
+
+
+class ViewerFailed(Exception):
+    """The viewer's thread has ended with an exception."""
 
 
 class LoopbackViewer(web_viewer.WebViewer):
@@ -71,11 +75,17 @@ def launched(config: viewer_protocol.ViewerConfig, plugins: Sequence[plugin.Plug
         plugins: What runs on both threads.
 
     Returns:
-        The simulation's handle on it.
+        The simulation's handle on it, which raises `ViewerFailed` should the viewer.
     """
     of_viewer, of_simulation = plugin.split_plugins(plugins)
-    targets: dict[bool, Callable[[endpoints.ViewerEndpoint], None]] = {
-        True: lambda endpoint: viewer_protocol.run_viewer_loop(LoopbackViewer(config, endpoint, plugins=of_viewer)),
-        False: lambda endpoint: launch_native.run_native_viewer(config, endpoint, plugins=of_viewer),
-    }
-    return launch_thread.launch_thread(targets[config.gfx == WEB], sim_plugins=of_simulation)
+
+    def view(endpoint: endpoints.ViewerEndpoint) -> None:
+        try:
+            if config.gfx == WEB:
+                viewer_protocol.run_viewer_loop(LoopbackViewer(config, endpoint, plugins=of_viewer))
+            else:
+                launch_native.run_native_viewer(config, endpoint, plugins=of_viewer)
+        except Exception as error:
+            raise ViewerFailed(f"{type(error).__name__}: {error}") from error
+
+    return launch_thread.launch_thread(view, sim_plugins=of_simulation)

@@ -14,6 +14,7 @@ from mujoco.studio import (
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.observers import OBSERVERS, Estimate
+from cmg_mj.resources import folder
 from cmg_mj.studio.choices import BIAS, FEEDBACK, NOISE, OBSERVER, laws_of
 from cmg_mj.studio.said import Choose, PushNow, StartAgain
 from tests.studio.session import Session, session
@@ -272,8 +273,11 @@ def test_physics_that_diverges_is_paused() -> None:
 
 
 def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> None:
-    other = tmp_path / "mine.xml"
-    other.write_text((Path("models") / "scissored_pair.xml").read_text(), encoding="utf-8")
+    """A robot of one's own: here a heavier one, whose numbers the controller learns."""
+    for name in ("scissored_pair.xml", "cube.xml"):
+        (tmp_path / name).write_text((folder("models") / name).read_text(encoding="utf-8"), encoding="utf-8")
+    other = tmp_path / "scissored_pair.xml"
+    other.write_text(other.read_text(encoding="utf-8").replace('gravity="0 0 -9.81"', 'gravity="0 0 -9.6"'))
     base = prepare(load_scenario("push_recovery"))
     studio = Session(lambda path: base.with_values({"plant.model": path}) if path else base)
     with studio.handle:
@@ -281,7 +285,14 @@ def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> N
         studio.send(messages.LoadModelEvent(path=str(tmp_path / "none.xml")))
         assert "no such file" in studio.standing().note
         studio.run(0.5)
+        assert studio.data.time > 1.0
+        studio.stepping.rows.clear()
+        studio.send(messages.LoadModelEvent(path=str(other)))
+        studio.run(3.0)
+        expected = of_runner(f"plant.model={other}")
+        same(studio.rows, expected)
+        assert not np.array_equal(expected, of_runner())
         other.write_text("<mujoco/>", encoding="utf-8")
         studio.send(messages.LoadModelEvent(path=str(other)))
         assert "joint" in studio.standing().note
-        assert studio.data.time > 1.0
+        assert studio.data.time > 3.0
