@@ -23,7 +23,7 @@ from cmg_mj.studio.said import Choose, PushNow, Standing, StartAgain
 AFTER_STUDIO = 0
 """Priority of a handler that Studio's own comes before."""
 SAID_EVERY_S = 1.0 / 30.0
-REST_S = 0.001
+REST_S = 0.002
 """Between two looks at what is due: without it the viewer's thread would starve."""
 
 logger = logging.getLogger(__name__)

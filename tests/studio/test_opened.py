@@ -55,6 +55,13 @@ def test_graphics_are_tried_in_a_process_of_their_own(
     assert said in str(error.value)
 
 
+def free_port() -> int:
+    """Not one that another test, in another process, might look for at the same time."""
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return found.getsockname()[1]
+
+
 def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
     """In a process of its own: Studio hooks into Python's log, warnings and exceptions for as long as one lasts."""
     with socket.socket() as taken:
@@ -66,7 +73,7 @@ def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
 
 
 BOTH_THREADS = """
-import time
+import sys, time
 from mujoco.studio import app, messages, sim_history, viewer_protocol
 from cmg_mj import load_scenario, prepare
 from cmg_mj.studio import viewers
@@ -74,7 +81,7 @@ from cmg_mj.studio.panel import Panel
 from cmg_mj.studio.stepping import Stepping
 opened = prepare(load_scenario("push_recovery"))
 plugins = [app.App(), Panel(), Stepping(lambda path: opened), sim_history.SimHistory()]
-with viewers.launched(viewer_protocol.ViewerConfig(gfx="web"), plugins) as handle:
+with viewers.launched(viewer_protocol.ViewerConfig(gfx="web", http_port=int(sys.argv[1])), plugins) as handle:
     handle.dispatch(messages.LoadModelEvent())
     start = time.monotonic()
     while time.monotonic() - start < 1.0:
@@ -87,14 +94,16 @@ assert not handle.is_running()
 
 def test_both_threads_and_nobody_looking() -> None:
     """The viewer in its thread: the simulation keeps the clock's pace, and the viewer ends when it is told."""
-    done = subprocess.run([sys.executable, "-c", BOTH_THREADS], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", BOTH_THREADS, str(free_port())], capture_output=True, text=True, timeout=120
+    )
     assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_the_command_listens_on_loopback_alone_and_ends_with_ctrl_c(tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [*COMMAND, "studio", "push_recovery"],
+        [*COMMAND, "studio", "push_recovery", "--port", str(free_port())],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

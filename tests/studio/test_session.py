@@ -143,6 +143,23 @@ def test_history_brings_the_controller_back(back: int) -> None:
         same(studio.rows, of_runner("duration_s=6.0", "push.0.start_s=2.0"))
 
 
+def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
+    """A push by hand that has not been yet is not to come; what is gone on with has a history of its own."""
+    with session("push=[]") as studio:
+        studio.run(1.0, every_s=0.004)
+        studio.send(PushNow(0.8, 0.1))
+        studio.run(1.0, every_s=0.004)
+        for frames, seconds in ((-150, 1.5), (-50, 1.0)):  # to 0.5 s, then to 1.5 s
+            studio.scrub(frames)
+            time = studio.data.time
+            assert time == pytest.approx(2.0 + 0.01 * frames, abs=0.011)
+            studio.stepping.rows[:] = [row for row in studio.stepping.rows if row[0] < time - 1e-9]
+            studio.pause(False)
+            studio.run(seconds, every_s=0.004)
+        same(studio.rows, of_runner("push=[]"))
+        assert len(studio.rows) == pytest.approx(500, abs=3)
+
+
 def test_history_brings_back_what_was_chosen() -> None:
     with session() as studio:
         studio.run(1.0, every_s=0.004)
