@@ -90,6 +90,32 @@ class Commanding:
         raise RunStopped(f"law {type(self.law).__name__} {what} at t = {step * self._timestep:g} s") from cause
 
 
+class Succeeding(Commanding):
+    """A law that takes over from another: it starts from the first sample that it sees, with the other's integrator.
+
+    Args:
+        before: The other one, at work.
+        law: The law.
+        single: Whether on floats (one world) or on arrays (n_worlds,).
+        timestep: Physics step [s].
+    """
+
+    def __init__(self, before: Commanding, law: Law, single: bool, timestep: float) -> None:
+        super().__init__(law, single, timestep)
+        waiting = before._before if isinstance(before, Succeeding) else None
+        self._before: Commanding | None = waiting or before
+
+    def decide(self, y: Measurement, x: Fed, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
+        """The command of a tick: see `Commanding`."""
+        if self._before is not None:
+            self.start(y, step)
+            x_e = getattr(self._before._state, "x_e", None)
+            if x_e is not None and hasattr(self._state, "x_e") and hasattr(self._state, "_replace"):
+                self.trim(x_e)
+            self._before = None
+        return super().decide(y, x, u, step)
+
+
 def _of_worlds(value: Any, y: Measurement) -> np.ndarray:
     """A user's numbers, which may be one for all worlds, as an array (n_worlds,) of its own."""
     given = np.asarray(value)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from cmg_mj.backlash import Backlash
-from cmg_mj.commanding import Commanding
+from cmg_mj.commanding import Commanding, Succeeding
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
 from cmg_mj.gimbal_angle import GimbalAngle
@@ -108,7 +108,7 @@ class Controller:
         self.companions = dict(companions or {})
         self._single = isinstance(worlds, int)
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
-        self._commanding = Commanding(law, self._single, timestep)
+        self._commanding: Commanding = Commanding(law, self._single, timestep)
         self._observing: Observing = Observing([observer, *self.companions.values()], self._single, timestep)
         self.extra_signals = self._observing.extra_signals
         self.trim_s = trim_s
@@ -138,14 +138,14 @@ class Controller:
         sensors: Sensors | None = None,
         feedback: Feedback | None = None,
     ) -> None:
-        """Go on with something else from the next update on; the integrator and the command that is held stay.
+        """Go on with something else from the next update on; an integrator and the command that is held stay.
 
         An integrator that was trimmed until now goes free with another observer or law.
 
         Args:
             observer: Another one for the loop. It starts from the next tick's sample and takes over `RIDES_ALONG` ticks
                 later; companions start again with it.
-            law: Another law of the same control period.
+            law: Another law of the same control period, which starts from the next tick's sample.
             sensors: Others, of the same rates. All sensors start afresh, with their noise from its beginning.
             feedback: Which rate the law uses.
 
@@ -167,8 +167,10 @@ class Controller:
             else:
                 self._observing = Joining(self._observing, RIDES_ALONG, observers, self._single, self.timestep)
             self.observer, self.extra_signals = observer, self._observing.extra_signals
+        if law is not None:
+            self._commanding = Succeeding(self._commanding, law, self._single, self.timestep)
+            self.law = law
         if law is not None or observer is not None:
-            self.law = law or self.law
             self.trimmed_until = 0
         self.feedback = feedback or self.feedback
 

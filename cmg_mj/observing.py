@@ -143,7 +143,7 @@ class Joining(Observing):
     """Observers that join a run which others have begun, and take over once they have had time to converge.
 
     They start from the first sample that they see, whose rate they take for zero. Until they take over, or the one
-    before fails, the estimate in the loop is its.
+    before fails, the estimate of x in the loop is its.
 
     Args:
         before: Those that they take over from.
@@ -166,7 +166,8 @@ class Joining(Observing):
         if self._before is not None:
             self._ticks -= 1
             try:
-                estimates[0] = self._before.advance(y, u, step)[0]
+                of_before = self._before.advance(y, u, step)[0]
+                estimates[0] = named([*of_before[:3], *estimates[0][3:]])  # beyond x a law finds what it was told
             except RunStopped:
                 self._ticks = 0
             if self._ticks <= 0:

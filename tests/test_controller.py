@@ -565,7 +565,7 @@ def test_law_and_feedback_change_with_the_integrator_as_it_was() -> None:
     of = controller(Script(ESTIMATES.__getitem__))
     of.update(0, READINGS[0])
     of.update(5, READINGS[1])
-    other = Law(DT, (30.0, 3.0, -0.5, 0.1))
+    other = StateFeedback(DT, (30.0, 3.0, -0.5, 0.1))
     of.exchange(law=other, feedback="truth")
     of.update(10, READINGS[2])
     assert of.tick is not None
@@ -595,6 +595,6 @@ def test_sensors_start_afresh_between_their_samples_too() -> None:
 def test_rates_stay_while_it_runs() -> None:
     of = controller(Script(ESTIMATES.__getitem__))
     with pytest.raises(InputError, match=r"controller.rate_hz: stays 200 Hz"):
-        of.exchange(law=Law(0.01))
+        of.exchange(law=StateFeedback(0.01))
     with pytest.raises(InputError, match="sensors: their rates stay"):
         of.exchange(sensors=Sensors(Accelerometer(rate_hz=1000.0)))

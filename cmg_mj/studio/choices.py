@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from cmg_mj.experiment import Experiment
-from cmg_mj.law import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.schema import Scenario
 
 OBSERVER, FEEDBACK = "observer.kind", "controller.feedback"
 BIAS, NOISE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz"
-GAINS, LQR = "controller.gains", "controller.lqr"
+LAW = "controller"
+"""All of the law but what is fed back to it."""
 
 WEIGHTS = {"state_cost": [1.0, 1.0, 1.0, 1.0], "input_cost": 1.0}
 """Of the gains that are solved for, where the scenario has no weights of its own."""
@@ -32,22 +32,26 @@ def observers_of(base: Experiment) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*OBSERVERS, base.scenario.observer.kind]))
 
 
+def law_settings(scenario: Scenario) -> dict[str, Any]:
+    """Its section [controller], but for what is fed back."""
+    return scenario.controller.model_dump(mode="json", exclude_none=True, exclude={"feedback"})
+
+
 def laws_of(base: Experiment) -> dict[str, dict[str, Any]]:
-    """The gains that can be chosen: name -> the settings that make them."""
-    own = base.scenario.controller
-    weights = WEIGHTS if own.lqr is None else own.lqr.model_dump(mode="json")
+    """The laws that can be chosen: name -> the settings that make them."""
+    own = law_settings(base.scenario)
+    common = {name: own[name] for name in ("rate_hz", "rate_limit_rad_s", "angles", "trim_s")}
     laws: dict[str, dict[str, Any]] = {
-        "Table 2": {GAINS: list(TABLE_2_GAINS), LQR: None},
-        "LQR": {GAINS: None, LQR: weights},
+        "Table 2": {**common, "kind": "state_feedback"},
+        "LQR": {**common, "kind": "state_feedback", "lqr": own.get("lqr", WEIGHTS)},
+        "LQG": {**common, "kind": "lqg"},
     }
-    if own.gains is not None and tuple(own.gains) != TABLE_2_GAINS:
-        laws["the scenario's"] = {GAINS: list(own.gains), LQR: None}
-    return laws
+    if own not in laws.values():
+        laws["the scenario's"] = own
+    return {name: {LAW: settings} for name, settings in laws.items()}
 
 
-def law_of(now: Experiment) -> str:
+def law_of(base: Experiment, now: Experiment) -> str:
     """Which of the laws it has."""
-    controller = now.scenario.controller
-    if controller.lqr is not None:
-        return "LQR"
-    return "Table 2" if controller.gains in (None, TABLE_2_GAINS) else "the scenario's"
+    settings = {LAW: law_settings(now.scenario)}
+    return next((name for name, made in laws_of(base).items() if made == settings), "")

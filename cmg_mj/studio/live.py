@@ -15,6 +15,7 @@ from cmg_mj.controller import Controller
 from cmg_mj.engine import control_callback
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.experiment import Experiment
+from cmg_mj.studio.choices import LAW, OBSERVER
 from cmg_mj.studio.memory import Memory, adopt
 from cmg_mj.studio.pushes import Pushes
 from cmg_mj.studio.seen import seen, take_numbers
@@ -204,6 +205,7 @@ class Live:
         except InputError as error:
             self.note = str(error)
             return
+        new.scenario._where = self.base.scenario._where  # which would grow with every change
         self.note = "; ".join(new.hints)
         self._take(new)
         if self.stopped:
@@ -217,7 +219,9 @@ class Live:
         fields = dict(values)
         if self.now.scenario.plant.timestep_s is None:
             fields["plant.timestep_s"] = self.timestep
-        kind = fields.pop("observer.kind", None)
+        if LAW in fields:
+            fields[LAW] = {**fields[LAW], "feedback": self.now.scenario.controller.feedback}
+        kind = fields.pop(OBSERVER, None)
         if kind is not None:
             own = self.base.scenario.observer
             fields["observer"] = {"kind": kind, **(own.parameters if kind == own.kind else {})}

@@ -14,6 +14,7 @@ import numpy as np
 
 from cmg_mj.controller import Controller
 from cmg_mj.experiment import Experiment
+from cmg_mj.studio.choices import law_settings
 
 MOST_SAMPLES = 200_000
 """Kept at most, 1000 s at 200 a second: 27 MB for the scissored pair."""
@@ -126,7 +127,7 @@ def adopt(controller: Controller, was: Experiment, now: Experiment) -> None:
     before, after = was.scenario, now.scenario
     controller.exchange(
         observer=now.design.observer() if after.observer != before.observer else None,
-        law=now.law if now.law != was.law else None,
+        law=now.design.fresh_law() if law_settings(after) != law_settings(before) else None,
         sensors=after.sensors if after.sensors != before.sensors else None,
         feedback=after.controller.feedback,
     )

@@ -96,10 +96,11 @@ class Panel(plugin.ViewerPlugin):
         observer = _chosen("observer", now.settings[OBSERVER], {name: name for name in now.observers})
         if observer is not None:
             self._choose({OBSERVER: observer})
-        law = _chosen("gains", now.law, {name: name for name in now.laws})
+        law = _chosen("law", now.law, {name: name for name in now.laws})
         if law is not None:
             self._choose(now.laws[law])
-        imgui.TextUnformatted("K_e = " + ", ".join(f"{gain:.3g}" for gain in now.gains))
+        if now.gains:
+            imgui.TextUnformatted("K_e = " + ", ".join(f"{gain:.3g}" for gain in now.gains))
         feedback = _chosen("rate fed back", now.settings[FEEDBACK], FEEDBACKS)
         if feedback is not None:
             self._choose({FEEDBACK: feedback})

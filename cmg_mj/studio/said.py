@@ -38,7 +38,7 @@ class Standing(messages.Snapshot):
         time_s: Of the simulation [s].
         settings: What can be changed, by field named as with `--set`, as it is; None is the scenario file's default.
         observers: Those that can be chosen.
-        gains: Of the law, on x1, x2, x3, x_e.
+        gains: Of the law, on x1, x2, x3, x_e, if it is of that kind.
         laws: Laws that can be chosen: name -> the settings that make it.
         law: Which of them it is.
         stopped: Why the controller has stopped.

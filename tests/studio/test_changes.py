@@ -116,6 +116,15 @@ def test_gains_and_feedback() -> None:
         studio.send(Choose(laws["Table 2"]))
         assert studio.standing().gains == (35.0, 4.0, -1.0, 0.3)
         studio.run(4.0)
+        studio.send(Choose(laws["LQG"]))
+        assert "lqg takes nothing of the observer" in studio.standing().note
+        studio.send(Choose({FEEDBACK: "observer"}), Choose(laws["LQG"]))
+        said = studio.standing()
+        assert (said.law, said.gains, said.note) == ("LQG", (), "")
+        assert np.isfinite(studio.rows[-1, U + 1])
+        before = studio.rows[-2:, U + 1]
+        assert abs(before[1] - before[0]) < 1e-3  # the integrator goes on
+        studio.run(4.0)
         assert not studio.live.stopped
 
 

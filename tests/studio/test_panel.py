@@ -11,10 +11,12 @@ from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
 from cmg_mj.studio import panel as module
-from cmg_mj.studio.choices import BIAS, FEEDBACK, GAINS, LQR, OBSERVER, WEIGHTS
+from cmg_mj.studio.choices import BIAS, FEEDBACK, LAW, OBSERVER
 from cmg_mj.studio.panel import Panel
 from cmg_mj.studio.said import Choose, PushNow, Standing, StartAgain
 from tests.studio.session import session
+
+LQG = {"rate_hz": 200.0, "rate_limit_rad_s": 4.7, "angles": "measured", "trim_s": 0.0, "kind": "lqg"}
 
 
 class Screen:
@@ -89,7 +91,7 @@ def test_it_is_drawn_from_the_first_frame_on(
         ("Button", pressed("Push -"), PushNow(-1.0, 0.1)),
         ("Combo", picked("observer", "adaptive"), Choose({OBSERVER: "adaptive"})),
         ("Combo", picked("rate fed back", "the gyro's"), Choose({FEEDBACK: "fog"})),
-        ("Combo", picked("gains", "LQR"), Choose({GAINS: None, LQR: WEIGHTS})),
+        ("Combo", picked("law", "LQG"), Choose({LAW: LQG})),
     ],
 )
 def test_what_is_pressed_is_sent(
