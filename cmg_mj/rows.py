@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,23 @@ from cmg_mj.trajectory import ESTIMATES, Layout, Trajectory
 
 TICKS_A_PIECE = 256
 """So many ticks wait until they are made into columns together, which is much cheaper than one by one."""
+
+
+class Piece(NamedTuple):
+    """Ticks as columns, (n_ticks, n_worlds) each."""
+
+    x1: np.ndarray
+    x2: np.ndarray
+    x3: np.ndarray
+    y1: np.ndarray
+    fog: np.ndarray
+    u: np.ndarray
+    estimates: list[dict[str, np.ndarray]]
+    """Of the observer in the loop and each companion, signal by signal."""
+    columns: list[np.ndarray]
+    """The trajectory's after its time, in its order."""
+    ended: np.ndarray | None
+    """Which worlds have ended; None for one world."""
 
 
 class Rows:
@@ -78,8 +96,17 @@ class Rows:
         """Make the waiting ticks into columns: to the metrics, and to the trajectory if it is kept."""
         if not self._waiting:
             return
-        qs, vs, ticks, torques, runnings = zip(*self._waiting, strict=True)
+        piece = self._piece(self._waiting)
         self._waiting = []
+        x1, x2, x3, y1, fog, u, estimates, columns, ended = piece
+        self._metrics.update(x1, x2, x3, u, fog, estimates, self._references.rates(x2), y1)
+        if self._keep:
+            if ended is not None:
+                columns = [np.where(ended, np.nan, column) for column in columns]
+            self._pieces.append(columns)
+
+    def _piece(self, waiting: Sequence[tuple]) -> Piece:
+        qs, vs, ticks, torques, runnings = zip(*waiting, strict=True)
         q, v = self._columns(qs), self._columns(vs)
         *signals, estimates = zip(*ticks, strict=True)
         y1, y2, acceleration, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
@@ -92,26 +119,22 @@ class Rows:
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)
         named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
-        self._metrics.update(x1, x2, x3, u, fog, named, self._references.rates(x2), y1)
-        if self._keep:
-            columns = [
-                x1,
-                x2,
-                x3,
-                y1,
-                y2,
-                acceleration,
-                fog,
-                u,
-                x_e,
-                push,
-                *(part for parts in estimated for part in parts),
-                *q,
-                *v,
-            ]
-            if ended is not None:
-                columns = [np.where(ended, np.nan, column) for column in columns]
-            self._pieces.append(columns)
+        columns = [
+            x1,
+            x2,
+            x3,
+            y1,
+            y2,
+            acceleration,
+            fog,
+            u,
+            x_e,
+            push,
+            *(part for parts in estimated for part in parts),
+            *q,
+            *v,
+        ]
+        return Piece(x1, x2, x3, y1, fog, u, named, columns, ended)
 
     def _columns(self, ticks: Sequence) -> np.ndarray:
         """(n_ticks, n_signals[, n_worlds]) -> (n_signals, n_ticks, n_worlds)."""
@@ -122,14 +145,25 @@ class Rows:
 
     def trajectory(self) -> Trajectory | None:
         """All that was kept."""
-        if not self._keep:
-            return None
+        return self._joined(self._pieces, 0) if self._keep else None
+
+    def since(self, tick: int) -> Trajectory:
+        """The ticks from one on, of one world whose trajectory is kept, as far as the run has come.
+
+        Those that wait go on waiting: whoever looks on changes no number.
+        """
+        first = min(tick // TICKS_A_PIECE, len(self._pieces))
+        pieces = self._pieces[first:]
+        if self._waiting:
+            pieces = [*pieces, self._piece(self._waiting).columns]
+        return self._joined(pieces, TICKS_A_PIECE * first).from_tick(tick - TICKS_A_PIECE * first)
+
+    def _joined(self, pieces: Sequence[list[np.ndarray]], first: int) -> Trajectory:
+        """Pieces as one trajectory, whose first tick has this number."""
         columns = {}
         names = self._layout.columns()
         for i, name in enumerate(names):
-            whole = (
-                np.concatenate([piece[i] for piece in self._pieces]) if self._pieces else np.zeros((0, len(self._bias)))
-            )
+            whole = np.concatenate([piece[i] for piece in pieces]) if pieces else np.zeros((0, len(self._bias)))
             columns[name] = whole[:, 0] if self._single else whole
         n_ticks = len(columns[names[0]])
-        return Trajectory({"time_s": np.arange(n_ticks) * self._dt, **columns}, layout=self._layout)
+        return Trajectory({"time_s": np.arange(first, first + n_ticks) * self._dt, **columns}, layout=self._layout)

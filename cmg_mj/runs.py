@@ -6,7 +6,7 @@ import dataclasses
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cmg_mj.comparison import Compared
 from cmg_mj.distribution_plot import plot_worlds
@@ -15,11 +15,14 @@ from cmg_mj.experiment import Experiment
 from cmg_mj.plots import plot_run
 from cmg_mj.report import run_title
 from cmg_mj.run_folder import RunFolder, claimed, write_text
-from cmg_mj.simulate import Outcome, Result
+from cmg_mj.simulate import Driver, Result
 from cmg_mj.standings import standings, worlds_table
 from cmg_mj.summary_keys import finite
 from cmg_mj.trajectory import Trajectory
 from cmg_mj.worlds_table import save_table
+
+if TYPE_CHECKING:
+    from cmg_mj.recording import Run
 
 
 def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[str, Any]:
@@ -162,21 +165,31 @@ def _plot(path: Path, trajectory: Trajectory, summary: dict[str, Any], experimen
     )
 
 
+def to_record(experiment: Experiment, result: Result) -> Run:
+    """One world's run as recordings take it."""
+    from cmg_mj.recording import Run
+
+    assert result.trajectory is not None
+    summary = summary_of(experiment, result)
+    return Run(experiment.scenario.observer.kind, result.trajectory, summary, result.outcomes[0])
+
+
+def recording_title(experiment: Experiment, driver: Driver) -> str:
+    """A recording's title: the scenario's, and that it ran on the board if it did."""
+    title = experiment.scenario.title
+    return (title or "Run") + ", on the board" if driver == "board" else title
+
+
 def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
-    from cmg_mj.recording import Run, write_recording  # 0.4 s of import, needed only here
+    from cmg_mj.recording import write_recording  # 0.4 s of import, needed only here
 
     experiment, first = runs[0]
     scenario = experiment.scenario
-    recorded = []
-    for e, result in runs:
-        assert result.trajectory is not None
-        outcome: Outcome = result.outcomes[0]
-        recorded.append(Run(e.scenario.observer.kind, result.trajectory, summary_of(e, result), outcome))
     write_recording(
         path,
         experiment.plant,
-        recorded,
-        title=(scenario.title or "Run") + ", on the board" if first.driver == "board" else scenario.title,
+        [to_record(e, result) for e, result in runs],
+        title=recording_title(experiment, first.driver),
         pushes=scenario.push,
         settings=scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,

@@ -198,6 +198,7 @@ def simulate(
     driver: Driver = "native",
     keep_trajectory: bool = True,
     on_progress: Callable[[float], None] | None = None,
+    on_start: Callable[[Rows], None] | None = None,
     threads: int = 0,
 ) -> Result:
     """Run one world, or as many as there are plants.
@@ -212,6 +213,7 @@ def simulate(
         driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only).
         keep_trajectory: Whether to keep every tick; without it memory does not grow with the duration.
         on_progress: Called after every tick with the simulated time [s]; a KeyboardInterrupt it raises ends the run.
+        on_start: Called before the first tick with the rows, of which `since` shows what there is meanwhile.
         threads: On which many worlds are stepped; 0: as many as there are processors.
 
     Returns:
@@ -239,6 +241,8 @@ def simulate(
     metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, floors)
     beside = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds)
     rows = Rows(plants, observers, controller.extra_signals, metrics, beside, dt, keep=keep_trajectory, single=single)
+    if on_start is not None:
+        on_start(rows)
     ends: list[Outcome | None] = [None] * len(plants)
     native = driver == "native"
     torque: Scalar = 0.0

@@ -141,6 +141,10 @@ class Trajectory:
         columns = {name: values if name == "time_s" else values[:, worlds] for name, values in self.columns.items()}
         return replace(self, columns=columns)
 
+    def from_tick(self, tick: int) -> Trajectory:
+        """The rows from one on."""
+        return replace(self, columns={name: values[tick:] for name, values in self.columns.items()})
+
     def between(self, start_s: float, end_s: float) -> Trajectory:
         """The rows from one time to another, both included."""
         kept = (self["time_s"] >= start_s - 1e-9) & (self["time_s"] <= end_s + 1e-9)

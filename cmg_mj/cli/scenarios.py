@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, check_observer, names_of, of_a_run
+from cmg_mj.cli.live import live_options, live_run
 from cmg_mj.cli.terminal import (
     INTERRUPTED,
     WRONG_INPUT,
@@ -50,8 +52,18 @@ LAST_WORLD = 2**63 - 1
     help="Which world of the seed: N has the noise of world N of a comparison or a sweep.  [default: 0]",
 )
 @click.option("--plot", is_flag=True, help="Write plot.png as well.")
+@live_options
 @users_code()
-def run(chosen: Chosen, observer: str | None, driver: Driver, world: int, plot: bool) -> None:
+def run(
+    chosen: Chosen,
+    observer: str | None,
+    driver: Driver,
+    world: int,
+    plot: bool,
+    live: bool,
+    connect: str | None,
+    pace: str,
+) -> None:
     """Run a scenario and write a folder.
 
     Its files: summary.json, trajectory.parquet, recording.rrd (a rerun recording), and scenario.toml, which has every
@@ -70,14 +82,20 @@ def run(chosen: Chosen, observer: str | None, driver: Driver, world: int, plot: 
         say("[compare] is for cmg-mj compare; this is one run")
     what = runs.file_name(scenario.observer.kind)
     folder = chosen.folder(what, runs.files_of_run(plot=plot), experiment, driver, world)
-    with CtrlC() as ctrl_c:
+    shown = live_run(experiment, live, connect, pace, driver, world)
+    with CtrlC() as ctrl_c, shown or nullcontext():
         with progress(scenario.title or chosen.name, scenario.duration_s, ctrl_c) as on_progress:
-            result = experiment.run(driver=driver, world=world, on_progress=on_progress)
+            options = {"on_progress": on_progress} if shown is None else shown.options(on_progress)
+            result = experiment.run(driver=driver, world=world, **options)
+        if shown is not None:
+            shown.ended(result)
         summary = runs.summary_of(experiment, result)
         try:
             place = runs.save_run(folder, experiment, result, plot=plot)
         finally:
             show(summary, report.summary_table(summary), chosen.as_json)
+    if shown is not None and shown.lost:
+        say(f"the viewer did not get all of it: {shown.lost}; the run and its files are whole")
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", chosen.as_json)
     outcome = result.outcomes[0]
     if outcome.kind == "stopped":

@@ -43,12 +43,13 @@ LANE, COLUMN = 40.0, 820.0
 ALL = "All observers"
 
 
-def default_blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint:
+def default_blueprint(plant: Plant, branches: Sequence[Branch], *, live: bool = False) -> rrb.Blueprint:
     """Lay out a recording.
 
     Args:
         plant: The rig.
         branches: The runs.
+        live: Whether the viewer shows what comes last, and not all of it from the beginning.
 
     Returns:
         A dashboard for one run; for several, one that compares them, and a tab for each. Of more than a few observers
@@ -64,7 +65,7 @@ def default_blueprint(plant: Plant, branches: Sequence[Branch]) -> rrb.Blueprint
         rrb.Tabs(*boards, active_tab=0) if len(boards) > 1 else boards[0],
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following" if live else "playing"),
         auto_views=False,
         auto_layout=False,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import mujoco
@@ -10,7 +11,7 @@ import rerun as rr
 
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
-from cmg_mj.recording.framing import Ball
+from cmg_mj.recording.framing import ball
 from cmg_mj.recording.run import Run, torque_steps
 from cmg_mj.recording.shapes import shapes
 from cmg_mj.recording.timeline import TIMELINE, column, instant
@@ -31,7 +32,7 @@ PUSH_LENGTH, PUSH_RADIUS = 0.8, 0.047
 """Of the strongest push's arrow, in radii of the rig."""
 
 
-def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes: Sequence[Push], rig: Ball) -> None:
+def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes: Sequence[Push]) -> None:
     """Record the rig of one run under `<branch>/rig`.
 
     Args:
@@ -40,10 +41,28 @@ def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes
         plant: The rig.
         run: The run.
         pushes: Torques from outside.
-        rig: Its size, by which arrows and floors go.
     """
-    _log_shapes(rec, branch, plant, rig.radius)
-    time, qpos = pose_samples(plant, run)
+    radius = size(plant)
+    log_shapes(rec, branch, plant, radius)
+    log_poses(rec, branch, plant, *pose_samples(plant, run))
+    log_torques(rec, branch, plant, torque_steps(pushes, run.outcome.time_s), strongest(pushes), radius)
+
+
+def size(plant: Plant) -> float:
+    """Radius of the rig where it starts, by which arrows and floors go [m]."""
+    return ball(plant, np.empty((0, plant.model.nq))).radius
+
+
+def log_poses(rec: rr.RecordingStream, branch: str, plant: Plant, time: np.ndarray, qpos: np.ndarray) -> None:
+    """Record poses of all bodies.
+
+    Args:
+        rec: The recording.
+        branch: The run's branch.
+        plant: The rig.
+        time: (n,) [s].
+        qpos: Joint angles, (n, n_joints) [rad].
+    """
     positions, quaternions = body_poses(plant, qpos)
     at = column(time)
     for body in range(1, plant.model.nbody):
@@ -53,7 +72,6 @@ def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes
         translation, quaternion = _turned_back(plant, cube, qpos)
         poses = rr.Transform3D.columns(translation=translation, quaternion=quaternion)
         rec.send_columns(_slowed_path(branch, plant, cube), [at], poses)
-    _log_push(rec, branch, plant, pushes, run.outcome.time_s, rig.radius)
 
 
 def body_path(branch: str, plant: Plant, body: int) -> str:
@@ -77,9 +95,13 @@ def pose_samples(plant: Plant, run: Run) -> tuple[np.ndarray, np.ndarray]:
     if n == 0:
         return np.zeros(1), plant.new_data().qpos[None].copy()
     time = trajectory["time_s"]
-    stride = max(1, round(1.0 / (POSE_RATE_HZ * (time[1] - time[0])))) if n > 1 else 1
-    kept = np.union1d(np.arange(0, n, stride), n - 1)
+    kept = np.union1d(np.arange(0, n, pose_stride(time[1] - time[0]) if n > 1 else 1), n - 1)
     return time[kept], trajectory.qpos()[kept]
+
+
+def pose_stride(dt: float) -> int:
+    """Of so many ticks, dt [s] apart, one has its poses recorded."""
+    return max(1, round(1.0 / (POSE_RATE_HZ * dt)))
 
 
 def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -119,8 +141,8 @@ def _slowed_path(branch: str, plant: Plant, cube: Cube) -> str:
     return f"{body_path(branch, plant, int(plant.model.dof_bodyid[cube.flywheel_dof]))}/slowed"
 
 
-def _log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float) -> None:
-    """One static entity a geom and a site, under its body."""
+def log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float) -> None:
+    """Record the rig's looks: one static entity a geom and a site, under its body."""
     model = plant.drawn_model
     parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
     for cube in plant.cubes:
@@ -130,20 +152,37 @@ def _log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: floa
         rec.log(f"{parents[body]}/{path}", shape, static=True)
 
 
-def _log_push(
-    rec: rr.RecordingStream, branch: str, plant: Plant, pushes: Sequence[Push], end_s: float, radius: float
+def strongest(pushes: Sequence[Push]) -> float:
+    """The largest torque that ever acts, by which the arrows' lengths go [N m]."""
+    return max((abs(torque) for _, torque in torque_steps(pushes, math.inf)), default=0.0)
+
+
+def log_torques(
+    rec: rr.RecordingStream,
+    branch: str,
+    plant: Plant,
+    steps: Sequence[tuple[float, float]],
+    largest: float,
+    radius: float,
 ) -> None:
-    """An arrow on the frame's upper edge that shows the torque as the force of a hand, while it lasts."""
+    """An arrow on the frame's upper edge that shows the torque as the force of a hand, while it lasts.
+
+    Args:
+        rec: The recording.
+        branch: The run's branch.
+        plant: The rig.
+        steps: (time [s], torque from then on [N m]).
+        largest: What `strongest` gives.
+        radius: Of the rig [m].
+    """
     path = f"{body_path(branch, plant, plant.frame)}/push"
-    steps = torque_steps(pushes, end_s)
-    strongest = max((abs(torque) for _, torque in steps), default=0.0)
     tip, direction = _edge(plant)
     for time, torque in steps:
         rec.set_time(TIMELINE, duration=instant(time))
-        if abs(torque) <= 1e-9 * strongest:
+        if abs(torque) <= 1e-9 * largest:
             rec.log(path, rr.Clear(recursive=False))
             continue
-        vector = direction * (PUSH_LENGTH * radius * torque / strongest)
+        vector = direction * (PUSH_LENGTH * radius * torque / largest)
         looks = {"radii": [PUSH_RADIUS * radius], "colors": [PUSH_COLOR], "labels": [f"push {torque:+.3g} N m"]}
         rec.log(path, rr.Arrows3D(vectors=[vector], origins=[tip - vector], **looks))
     rec.reset_time()

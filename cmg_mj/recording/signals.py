@@ -167,40 +167,55 @@ def log_series(rec: rr.RecordingStream, branch: Lines) -> None:
         rec: The recording.
         branch: What they are of.
     """
+    log_looks(rec, branch)
+    log_values(rec, branch)
+
+
+def log_looks(rec: rr.RecordingStream, branch: Lines) -> None:
+    """How the series are drawn."""
     for row in branch.series.values():
-        path = f"{branch.path}/{row.path}"
         n = 1 if row.values.ndim == 1 else row.values.shape[1]
         style = rr.SeriesLines(colors=[row.color] * n, widths=[row.width] * n, names=[row.name] * n)
-        rec.log(path, style, static=True)
+        rec.log(f"{branch.path}/{row.path}", style, static=True)
+
+
+def log_values(rec: rr.RecordingStream, branch: Lines) -> None:
+    """The series' values."""
+    for row in branch.series.values():
         if len(row.time):
-            rec.send_columns(path, [column(row.time, branch.timeline)], rr.Scalars.columns(scalars=row.values))
+            scalars = rr.Scalars.columns(scalars=row.values)
+            rec.send_columns(f"{branch.path}/{row.path}", [column(row.time, branch.timeline)], scalars)
 
 
-def log_phases(
-    rec: rr.RecordingStream,
-    branch: Branch,
-    pushes: Sequence[Push],
-    settings: MetricsSettings,
-    until_s: float,
-) -> None:
-    """Record what the rig is doing as a lane of states.
+def phase_steps(run: Run, pushes: Sequence[Push], settings: MetricsSettings, until_s: float) -> list[tuple[float, str]]:
+    """What the rig is doing as the steps of a lane, which a run that was not done ends.
 
     Args:
-        rec: The recording.
-        branch: The run.
+        run: The run.
         pushes: Torques from outside.
         settings: The settle band.
         until_s: Until when a fall is shown; at least a little longer than the run, or it could not be seen [s].
+
+    Returns:
+        (time [s], name of the phase from then on), in order of time.
     """
-    path, outcome = f"{branch.path}/phase", branch.run.outcome
-    states = rr.StateConfiguration(values=list(PHASES), colors=list(PHASES.values()))
-    rec.log(path, states, static=True)
-    steps = phases(branch.run, pushes, settings)
+    steps, outcome = phases(run, pushes, settings), run.outcome
     if outcome.kind in ENDINGS:
         steps.append((max(until_s, 1.05 * outcome.time_s, outcome.time_s + 0.1), NO_PHASE))
+    return steps
+
+
+def log_lane(rec: rr.RecordingStream, branch: str) -> None:
+    """The lane of phases of a branch, in its colours and still empty."""
+    states = rr.StateConfiguration(values=list(PHASES), colors=list(PHASES.values()))
+    rec.log(f"{branch}/phase", states, static=True)
+
+
+def log_phases(rec: rr.RecordingStream, branch: str, steps: Sequence[tuple[float, str]]) -> None:
+    """Record phases: (time [s], name)."""
     for time, name in steps:
         rec.set_time(TIMELINE, duration=instant(time))
-        rec.log(path, rr.StateChange(state=name))
+        rec.log(f"{branch}/phase", rr.StateChange(state=name))
     rec.reset_time()
 
 

@@ -36,21 +36,35 @@ def recorded(path: Path, name: str, application: str, blueprint: rrb.Blueprint) 
         InputError: The environment turns rerun off.
         OSError: The file cannot be written.
     """
-    with _strict(), rr.RecordingStream(application) as rec:
-        if not rr.is_enabled(rec):
-            raise InputError("the environment variable RERUN turns recording off: unset it")
+    with strict(), rr.RecordingStream(application) as rec:
+        require_enabled(rec)
         # Rerun's own writing to a file hides a full disk, or waits for ever.
         memory = rec.memory_recording()
         try:
             rec.send_blueprint(blueprint, make_active=False, make_default=True)
-            rec.set_log_time_enabled(False)
-            rec.set_log_tick_enabled(False)
-            rec.send_recording_name(name)
+            set_up(rec, name)
             yield rec
         finally:  # of what is left in it, rerun would complain on standard error
             content = memory.drain_as_bytes()
     with whole_file(path) as temporary:
         temporary.write_bytes(content)
+
+
+def require_enabled(rec: rr.RecordingStream) -> None:
+    """Refuse to record where the environment turns rerun off.
+
+    Raises:
+        InputError: It does.
+    """
+    if not rr.is_enabled(rec):
+        raise InputError("the environment variable RERUN turns recording off: unset it")
+
+
+def set_up(rec: rr.RecordingStream, name: str) -> None:
+    """Give a recording its name, and simulated time as its only time."""
+    rec.set_log_time_enabled(False)
+    rec.set_log_tick_enabled(False)
+    rec.send_recording_name(name)
 
 
 def application_of(names: Sequence[str], branches: Sequence[Lines]) -> str:
@@ -71,7 +85,7 @@ def log_page(rec: rr.RecordingStream, path: str, page: str) -> None:
 
 
 @contextmanager
-def _strict() -> Iterator[None]:
+def strict() -> Iterator[None]:
     """Let rerun raise where it would only warn."""
     before = rr.strict_mode()
     rr.set_strict_mode(True)

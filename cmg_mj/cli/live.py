@@ -1,0 +1,84 @@
+"""The options with which a run is shown while it goes on, and what is said of it."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import click
+
+from cmg_mj.cli.arguments import refuse_given
+from cmg_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from cmg_mj.experiment import Experiment
+    from cmg_mj.live import LiveRun
+    from cmg_mj.simulate import Driver
+
+HERE = "127.0.0.1:9876"
+"""Where rerun listens if it is not told otherwise."""
+
+
+def live_options(command: Callable) -> Callable:
+    """Options of a command whose run can be looked at while it goes on: `live`, `connect`, `pace`."""
+    for decorate in reversed(
+        (
+            click.option("--live", is_flag=True, help="Show the run in a rerun viewer while it goes on."),
+            click.option(
+                "--connect",
+                metavar="[ADDRESS]",
+                is_flag=False,
+                flag_value=HERE,
+                help=f"The same in a viewer that runs already: PORT or HOST:PORT.  [default: {HERE}]",
+            ),
+            click.option(
+                "--pace",
+                metavar="FACTOR",
+                default="1",
+                show_default=True,
+                help="With --live or --connect: times real time; max for as fast as it goes.",
+            ),
+        )
+    ):
+        command = decorate(command)
+    return command
+
+
+def factor_of(pace: str) -> float:
+    """Simulated seconds a second; inf for as fast as it goes."""
+    if pace == "max":
+        return math.inf
+    try:
+        factor = float(pace)
+    except ValueError:
+        factor = math.nan
+    if not 0.0 <= factor < math.inf:
+        raise InputError(f"--pace {pace!r}: must be a number such as 0.5 or 4, or max for as fast as it goes")
+    return factor or math.inf
+
+
+def live_run(
+    experiment: Experiment, live: bool, connect: str | None, pace: str, driver: Driver, world: int
+) -> LiveRun | None:
+    """The run as it is to be shown; None if it is not.
+
+    Raises:
+        InputError: There is no viewer, or the options do not go together.
+    """
+    if not live and connect is None:
+        refuse_given(["pace"], "goes with --live or --connect; without a viewer a run goes as fast as it can")
+        return None
+    if live and connect is not None:
+        raise InputError("--live starts a viewer, --connect takes one that runs already: give one of them")
+    factor = factor_of(pace)
+    # Rerun reads it when it is imported. What it would say of a viewer that has gone, the command says at the end.
+    os.environ.setdefault("RUST_LOG", "off")
+    from cmg_mj.live import LiveRun, Pace
+    from cmg_mj.recording.viewer import require_listening, start_viewer, url_of
+
+    if connect is not None:
+        require_listening(connect)
+    url = url_of(connect) if connect is not None else start_viewer().url
+    return LiveRun(experiment, url, Pace(factor), driver=driver, world=world)

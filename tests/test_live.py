@@ -1,0 +1,118 @@
+"""A run in a viewer while it goes on: what is streamed, and that the run does not care what becomes of the viewer."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from cmg_mj.errors import InputError
+from cmg_mj.experiment import prepare
+from cmg_mj.live import LiveRun, Pace
+from cmg_mj.recording import live as stream
+from cmg_mj.recording.viewer import Viewer, start_viewer, url_of
+from cmg_mj.run_folder import RunFolder
+from cmg_mj.runs import save_run, summary_of
+from cmg_mj.scenario import load_scenario
+from cmg_mj.trajectory import Trajectory
+from tests.command import cmg_mj, cmg_mj_process
+from tests.run_folders import assert_whole
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+SHORT = ("duration_s=1.5", "push.0.start_s=0.4", "push.0.duration_s=0.1")
+TWO_ENDS = ("tilt/settle_band", "command/limit", "bias/true")
+"""Straight lines, of which a recording has the ends and a stream the ends of every piece."""
+NOT_ALIKE = "/__properties"
+"""The name of the recording, and when it was made."""
+
+
+@pytest.fixture
+def receiver() -> Iterator[Viewer]:
+    """A viewer without a screen that keeps all it is sent in a file."""
+    viewer = start_viewer(["--save", "received.rrd"])
+    yield viewer
+    end(viewer, signal.SIGKILL)
+
+
+def end(viewer: Viewer, how: signal.Signals) -> None:
+    """The viewer and what started it, and nothing else: they have a session of their own."""
+    if viewer.process.poll() is None:
+        os.killpg(viewer.process.pid, how)
+        viewer.process.wait()
+
+
+def content(path: Path) -> dict[tuple[str, str], dict[int | None, object]]:
+    """(entity, component) -> time [ns], None where there is none, -> value: all that a recording holds."""
+    found: dict[tuple[str, str], dict[int | None, object]] = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a stream has no footer
+        chunks = list(RrdReader(path).stream())
+    for chunk in chunks:
+        batch = chunk.to_record_batch()
+        names = [name for name in batch.schema.names if name != "sim_time" and not name.startswith("rerun.controls")]
+        times = [None] * batch.num_rows
+        if not chunk.is_static:
+            times = batch.column("sim_time").to_numpy(zero_copy_only=False).astype(np.int64).tolist()
+        for name in names:
+            rows = found.setdefault((chunk.entity_path, name), {})
+            for at, value in zip(times, batch.column(name).to_pylist(), strict=True):
+                if value is not None:
+                    assert at is None or at not in rows or rows[at] == value
+                    rows[at] = value
+    return found
+
+
+def assert_alike(streamed: Path, saved: Path) -> None:
+    ours, whole = content(streamed), content(saved)
+    assert {key for key in ours if NOT_ALIKE not in key[0]} == {key for key in whole if NOT_ALIKE not in key[0]}
+    for key, rows in whole.items():
+        if key[0].startswith(NOT_ALIKE):
+            continue
+        if key[0].endswith(TWO_ENDS) and key[1] == "Scalars:scalars":
+            assert {str(value) for value in ours[key].values()} == {str(value) for value in rows.values()}
+            assert (min(ours[key]), max(ours[key])) == (min(rows), max(rows))
+        else:
+            assert ours[key] == rows, key
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        SHORT,
+        (*SHORT, 'companions=["adaptive", "linear"]', "plant.equilibrium_bias_deg=0.5"),
+        (*SHORT, "push.0.torque_n_m=40.0"),  # falls
+        (*SHORT, "push.0.start_s=0.401", "push.0.duration_s=0.001", "plant.initial_tilt_deg=0.0"),
+        ("duration_s=0.005", "push=[]"),
+    ],
+    ids=["push", "companions", "fall", "between ticks", "one tick"],
+)
+def test_the_stream_is_the_recording(receiver: Viewer, settings: tuple[str, ...]) -> None:
+    """Every entity, every component, every value at its time."""
+    experiment = prepare(load_scenario("push_recovery", settings))
+    view = LiveRun(experiment, receiver.url, Pace(10.0))
+    with view:
+        result = experiment.run(**view.options())
+        view.ended(result)
+        save_run(RunFolder(Path("it"), []), experiment, result)
+    assert view.lost == ""
+    until_it_is_still(Path("received.rrd"))
+    assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
+
+
+def until_it_is_still(path: Path) -> None:
+    sizes = [-1, -2]
+    while sizes[-1] != sizes[-2]:
+        time.sleep(0.5)
+        sizes.append(path.stat().st_size)
