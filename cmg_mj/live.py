@@ -6,14 +6,15 @@ import math
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cmg_mj.experiment import Experiment
-from cmg_mj.recording.growing import Shown
-from cmg_mj.recording.live import Live
 from cmg_mj.rows import Rows
 from cmg_mj.runs import recording_title, to_record
 from cmg_mj.simulate import Driver, Result
+
+if TYPE_CHECKING:
+    from cmg_mj.recording.growing import Shown
 
 PIECES_HZ = 20.0
 """So often a viewer is given what there is: the eye takes it for motion."""
@@ -55,6 +56,24 @@ class Pace:
             self._start -= ahead
 
 
+def shown_before(experiment: Experiment, driver: Driver = "native", world: int = 0) -> Shown:
+    """What a viewer is told of a run before its first tick."""
+    from cmg_mj.recording.growing import Shown
+
+    scenario, plant = experiment.scenario, experiment.plant
+    return Shown(
+        scenario.observer.kind,
+        plant,
+        experiment.law.dt,
+        recording_title(experiment, driver),
+        scenario.push,
+        scenario.metrics,
+        experiment.law.rate_limit,
+        math.degrees(plant.apparent_bias(scenario.sensors.accelerometer)),
+        experiment.as_toml(driver, world),
+    )
+
+
 class LiveRun:
     """One run, streamed to a viewer while it goes on; what it computes is the same as without one.
 
@@ -71,24 +90,14 @@ class LiveRun:
     def __init__(
         self, experiment: Experiment, url: str, pace: Pace, *, driver: Driver = "native", world: int = 0
     ) -> None:
-        scenario, plant = experiment.scenario, experiment.plant
+        from cmg_mj.recording.live import Live  # 0.4 s of import, needed only here
+
         self._experiment = experiment
         self._pace = pace
         self._ticks = 0
         self._shown_at = -math.inf
         self._rows: Rows | None = None
-        shown = Shown(
-            scenario.observer.kind,
-            plant,
-            experiment.law.dt,
-            recording_title(experiment, driver),
-            scenario.push,
-            scenario.metrics,
-            experiment.law.rate_limit,
-            math.degrees(plant.apparent_bias(scenario.sensors.accelerometer)),
-            experiment.as_toml(driver, world),
-        )
-        self._view = Live(url, shown)
+        self._view = Live(url, shown_before(experiment, driver, world))
 
     @property
     def lost(self) -> str:

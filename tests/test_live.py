@@ -11,19 +11,24 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun as rr
 from rerun.chunk import RrdReader
 
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import prepare
-from cmg_mj.live import LiveRun, Pace
+from cmg_mj.live import LiveRun, Pace, shown_before
+from cmg_mj.push import Push
 from cmg_mj.recording import live as stream
+from cmg_mj.recording.growing import Growing
+from cmg_mj.recording.stream import set_up
 from cmg_mj.recording.viewer import Viewer, start_viewer, url_of
 from cmg_mj.run_folder import RunFolder
-from cmg_mj.runs import save_run, summary_of
+from cmg_mj.runs import save_run, summary_of, to_record
 from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
 from tests.command import cmg_mj, cmg_mj_process
@@ -109,6 +114,33 @@ def test_the_stream_is_the_recording(receiver: Viewer, settings: tuple[str, ...]
     assert view.lost == ""
     until_it_is_still(Path("received.rrd"))
     assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 3, 64])
+@pytest.mark.parametrize("push", [(0.05, 0.05), (0.051, 0.001), (0.052, 0.07)], ids=str)
+def test_wherever_it_is_cut_into_pieces(ticks: int, push: tuple[float, float], tmp_path: Path) -> None:
+    """With pushes that begin and end at ticks and between them; a second one comes before the rig has settled."""
+    pushes = [Push(torque_n_m=2.0, start_s=push[0], duration_s=push[1])]
+    pushes.append(Push(torque_n_m=-1.0, start_s=0.2, duration_s=0.015))
+    scenario = load_scenario("push_recovery", ["duration_s=0.6", "plant.timestep_s=0.001"])
+    experiment = prepare(scenario.model_copy(update={"push": pushes}))
+    result = experiment.run()
+    assert result.trajectory is not None
+    growing = Growing(shown_before(experiment), rows(result.trajectory, 0, 0))
+    with rr.RecordingStream("cmg-mj") as rec:
+        memory = rec.memory_recording()
+        set_up(rec, "")
+        growing.begin(rec)
+        for first in range(0, len(result.trajectory) - ticks, ticks):
+            growing.add(rec, rows(result.trajectory, first, first + ticks))
+        growing.end(rec, to_record(experiment, result))
+        Path("streamed.rrd").write_bytes(memory.drain_as_bytes())
+    save_run(RunFolder(Path("it"), []), experiment, result)
+    assert_alike(Path("streamed.rrd"), Path("it/recording.rrd"))
+
+
+def rows(trajectory: Trajectory, first: int, end: int) -> Trajectory:
+    return replace(trajectory, columns={name: values[first:end] for name, values in trajectory.columns.items()})
 
 
 def until_it_is_still(path: Path) -> None:
