@@ -30,6 +30,7 @@ from cmg_mj.recording.signals import (
     phase_steps,
     series,
 )
+from cmg_mj.recording.stream import log_page
 from cmg_mj.simulate import Outcome
 from cmg_mj.trajectory import Trajectory
 
@@ -94,6 +95,7 @@ class Growing:
         log_looks(rec, self.branch)
         log_lane(rec, self.path)
         log_scenario(rec, self.shown.scenario_toml)
+        log_page(rec, "summary", f"# {self.shown.title or 'Run'}\n\nIt goes on; its figures come when it has ended.")
 
     def add(self, rec: rr.RecordingStream, piece: Trajectory) -> None:
         """Record the next ticks."""
