@@ -7,7 +7,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -19,19 +18,20 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from cmg_mj.errors import InputError
+from cmg_mj.cli.live import factor_of
 from cmg_mj.experiment import prepare
 from cmg_mj.live import LiveRun, Pace, shown_before
 from cmg_mj.push import Push
-from cmg_mj.recording import live as stream
+from cmg_mj.recording import viewer
 from cmg_mj.recording.growing import Growing
+from cmg_mj.recording.live import GONE, STUCK
 from cmg_mj.recording.stream import set_up
 from cmg_mj.recording.viewer import Viewer, start_viewer, url_of
 from cmg_mj.run_folder import RunFolder
-from cmg_mj.runs import save_run, summary_of, to_record
+from cmg_mj.runs import save_run, to_record
 from cmg_mj.scenario import load_scenario
 from cmg_mj.trajectory import Trajectory
-from tests.command import cmg_mj, cmg_mj_process
+from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, cmg_mj_process, environment
 from tests.run_folders import assert_whole
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -148,3 +148,162 @@ def until_it_is_still(path: Path) -> None:
     while sizes[-1] != sizes[-2]:
         time.sleep(0.5)
         sizes.append(path.stat().st_size)
+
+
+def column(path: Path) -> dict[str, list[float]]:
+    return {name: values.tolist() for name, values in Trajectory.load(path).columns.items()}
+
+
+def test_the_figures_are_those_of_a_run_that_nobody_looks_at(receiver: Viewer) -> None:
+    """Bit for bit; and nothing more is said, but where the viewer is."""
+    arguments = ["run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--json"]
+    live = cmg_mj_process(*arguments, "--out=live", "--connect", receiver.port, "--pace=5", cwd=Path())
+    alone = cmg_mj_process(*arguments, "--out=alone", cwd=Path())
+    assert live == alone
+    assert live.status == 0
+    assert column(Path("live/trajectory.parquet")) == column(Path("alone/trajectory.parquet"))
+    assert Path("received.rrd").stat().st_size > 100_000
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
+def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, how: signal.Signals) -> None:
+    """Killed, or standing still, half a second after the run began: it takes no longer than it must."""
+    arguments = ["run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--out=it", "--json"]
+    command = [*COMMAND, *arguments, "--connect", str(receiver.port), "--pace=2"]
+    with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+        while Path("received.rrd").stat().st_size < 100_000:
+            time.sleep(0.05)
+        began = time.monotonic()
+        os.killpg(receiver.process.pid, how)
+        out, err = run.communicate(timeout=HANGS_AFTER_S)
+        took = time.monotonic() - began
+    assert run.returncode == 0, err
+    why = {signal.SIGKILL: GONE, signal.SIGSTOP: STUCK}[how]
+    assert err == f"cmg-mj: the viewer did not get all of it: {why}; the run and its files are whole\n"
+    assert json.loads(out)["outcome"] == "done"
+    assert len(assert_whole("it")) == 600
+    assert took < 30.0
+
+
+def test_ctrl_c_keeps_what_was_recorded(receiver: Viewer, ctrl_c: None) -> None:
+    command = [*COMMAND, "run", "push_recovery", "--out=it", "--connect", str(receiver.port)]
+    with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+        while Path("received.rrd").stat().st_size < 150_000:
+            time.sleep(0.05)
+        run.send_signal(signal.SIGINT)
+        _, err = run.communicate(timeout=HANGS_AFTER_S)
+    assert run.returncode == 130
+    assert err.splitlines()[-1].startswith("cmg-mj: interrupted at ")
+    assert 10 < len(assert_whole("it")) < 2000
+    until_it_is_still(Path("received.rrd"))
+    assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
+
+
+def test_a_viewer_is_heard_on_this_machine_alone(receiver: Viewer) -> None:
+    listening = subprocess.run(["ss", "-ltnH"], capture_output=True, text=True, check=True).stdout.splitlines()
+    places = [line.split()[3] for line in listening if line.split()[3].endswith(f":{receiver.port}")]
+    assert places == [f"127.0.0.1:{receiver.port}"]
+
+
+def test_a_run_ends_and_its_viewer_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command that starts one: here with a viewer that needs no screen, of which rerun has several kinds."""
+    monkeypatch.setattr(viewer, "start_viewer", lambda: start_viewer(["--serve-grpc"]))
+    said = cmg_mj(
+        "run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--live", "--pace=max", "--out=it"
+    )
+    started = viewer._started[-1]
+    try:
+        assert said.status == 0, said
+        assert started.process.poll() is None
+    finally:
+        end(started, signal.SIGKILL)
+
+
+def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    said = cmg_mj("run", "push_recovery", "--live", "--out=it")
+    assert said.complaint.startswith("--live: no viewer could be started: neither WAYLAND_DISPLAY nor ")
+    assert not Path("it").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (
+            ["--connect={unused}"],
+            "--connect '{unused}': no viewer listens there (connection refused); start one with: ",
+        ),
+        (["--connect=localhost"], "--connect 'localhost': no address of a viewer; give PORT, HOST:PORT or "),
+        (["--connect=http://localhost:1"], "--connect 'http://localhost:1': no address of a viewer; "),
+        (["--connect=1:2:3"], "--connect '1:2:3': no address of a viewer; "),
+        (["--connect=localhost:99999"], "--connect 'localhost:99999': no address of a viewer; "),
+        (["--connect={unused}", "--live"], "--live starts a viewer, --connect takes one that runs already: give one"),
+        (["--live", "--pace=fast"], "--pace 'fast': must be a number such as 0.5 or 4, or max for as fast as it goes"),
+        (["--live", "--pace=-1"], "--pace '-1': must be "),
+        (["--live", "--pace=nan"], "--pace 'nan': must be "),
+        (["--pace=2"], "--pace: goes with --live or --connect; "),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_what_is_wrong_is_said_before_the_run(arguments: list[str], complaint: str) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        unused = probe.getsockname()[1]
+    said = cmg_mj("run", "push_recovery", "--out=it", *(argument.format(unused=unused) for argument in arguments))
+    assert said.complaint.startswith(complaint.format(unused=unused))
+    assert not Path("it").exists()
+
+
+@pytest.mark.parametrize(
+    ("address", "url"),
+    [
+        ("9877", "rerun+http://127.0.0.1:9877/proxy"),
+        ("elsewhere:9876", "rerun+http://elsewhere:9876/proxy"),
+        ("[::1]:9876", "rerun+http://[::1]:9876/proxy"),
+        ("rerun+http://127.0.0.1:1/proxy", "rerun+http://127.0.0.1:1/proxy"),
+    ],
+)
+def test_addresses(address: str, url: str) -> None:
+    assert url_of(address) == url
+
+
+class Clock:
+    """A clock that only sleeping moves."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.slept: list[float] = []
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.slept.append(round(seconds, 9))
+        self.now += seconds
+
+
+def test_a_pace_is_kept() -> None:
+    """Twice real time; a tick that took long is made up for, a pause of seconds is not."""
+    clock = Clock()
+    pace = Pace(2.0, clock, clock.sleep)
+    clock.now += 5.0  # nothing counts before the start
+    pace.start()
+    pace.wait(0.1)
+    clock.now += 0.06
+    pace.wait(0.2)
+    pace.wait(0.3)
+    assert clock.slept == [0.05, 0.04]
+    clock.now += 10.0
+    pace.wait(0.4)
+    pace.wait(0.5)
+    assert clock.slept == [0.05, 0.04, 0.05]
+
+
+def test_as_fast_as_it_goes_nothing_is_waited_for() -> None:
+    clock = Clock()
+    pace = Pace(factor_of("max"), clock, clock.sleep)
+    pace.wait(1000.0)
+    assert clock.slept == []
+    assert factor_of("0") == factor_of("max")
+    assert factor_of("0.5") == 0.5

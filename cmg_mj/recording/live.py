@@ -12,8 +12,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from cmg_mj.recording.growing import Growing, Shown
+from cmg_mj.recording.relay import Relay
 from cmg_mj.recording.run import Run
 from cmg_mj.recording.stream import application_of, require_enabled, set_up, strict
+from cmg_mj.recording.viewer import parts_of, url_of
 from cmg_mj.trajectory import Trajectory
 
 TAKES_S = 1.0
@@ -52,6 +54,7 @@ class Live:
 
     def __enter__(self) -> Live:
         self._strict.__enter__()
+        self._relay = Relay(*parts_of(self._url))
         self._thread.start()
         return self
 
@@ -83,7 +86,7 @@ class Live:
         self._growing = Growing(self._shown, empty)
         branch = self._growing.branch
         self._rec = rr.RecordingStream(f"{application_of([self._shown.name], [branch])} live")
-        self._rec.connect_grpc(self._url)
+        self._rec.connect_grpc(url_of(str(self._relay.port)))
         set_up(self._rec, f"{self._shown.title or 'Run'}: {branch.label}, live")
         self._layout(self._growing.blueprint(), active=True)
         self._growing.begin(self._rec)
@@ -101,13 +104,15 @@ class Live:
                     self.lost = reason
                     return
                 self._done += 1
+            if self._done:
+                self._rec.disconnect()  # returns when the viewer has had the last of it
         except Exception as error:  # the run must not care
             self.lost = f"it could not be fed ({' '.join(str(error).split())})"
 
     def _not_taken(self) -> str:
         """Wait until what was sent is taken; why it is not.
 
-        Rerun itself waits without end once it has 100 MB for a viewer that stands still.
+        Rerun itself waits without end once it has 100 MB for a viewer that stands still: it never gets so much.
         """
         while True:
             asked = time.monotonic()
@@ -132,3 +137,5 @@ class Live:
                 break
         if self._thread.is_alive():
             self.lost = STUCK
+        self._relay.cut()  # rerun waits for an answer at exit too
+        self._thread.join(TAKES_S)

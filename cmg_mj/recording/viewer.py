@@ -66,8 +66,8 @@ def url_of(address: str) -> str:
     Raises:
         InputError: It is none of these.
     """
-    host, port = _parts(address)
-    return f"rerun+http://{host}:{port}/proxy"
+    host, port = parts_of(address)
+    return f"rerun+http://{f'[{host}]' if ':' in host else host}:{port}/proxy"
 
 
 def require_listening(address: str) -> None:
@@ -76,9 +76,9 @@ def require_listening(address: str) -> None:
     Raises:
         InputError: Nobody does, or it is no address.
     """
-    host, port = _parts(address)
+    host, port = parts_of(address)
     try:
-        socket.create_connection((host.strip("[]"), port), ANSWERS_WITHIN_S).close()
+        socket.create_connection((host, port), ANSWERS_WITHIN_S).close()
     except OSError as error:
         raise InputError(
             f"--connect {address!r}: no viewer listens there ({(error.strerror or str(error)).lower()}); "
@@ -86,8 +86,8 @@ def require_listening(address: str) -> None:
         ) from error
 
 
-def _parts(address: str) -> tuple[str, int]:
-    """Host and port."""
+def parts_of(address: str) -> tuple[str, int]:
+    """Host and port of an address that `url_of` takes."""
     plain = f"{LOOPBACK}:{address}" if address.isdigit() else address
     try:
         split = urlsplit(plain if "://" in plain else f"rerun+http://{plain}")
@@ -98,7 +98,7 @@ def _parts(address: str) -> tuple[str, int]:
         raise InputError(
             f"--connect {address!r}: no address of a viewer; give PORT, HOST:PORT or rerun+http://HOST:PORT/proxy"
         )
-    return f"[{host}]" if ":" in host else host, port
+    return host, port
 
 
 def start_viewer(options: Sequence[str] = ()) -> Viewer:
