@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,9 +59,9 @@ def end(viewer: Viewer, how: signal.Signals) -> None:
         viewer.process.wait()
 
 
-def content(path: Path) -> dict[tuple[str, str], dict[int | None, object]]:
+def content(path: Path) -> dict[tuple[str, str], dict[Any, Any]]:
     """(entity, component) -> time [ns], None where there is none, -> value: all that a recording holds."""
-    found: dict[tuple[str, str], dict[int | None, object]] = {}
+    found: dict[tuple[str, str], dict[Any, Any]] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a stream has no footer
         chunks = list(RrdReader(path).stream())
