@@ -164,7 +164,7 @@ class Result:
         )
 
 
-def _moments(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, Scalar]]:
+def moments(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, Scalar]]:
     """The moments at which the loop must look: (step, steps until the next, push torque, one or a world's each)."""
     changes: dict[int, Scalar] = {0: 0.0, steps: 0.0}
     for push in pushes:
@@ -252,7 +252,7 @@ def simulate(
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
     try:
         with drive:
-            for step, count, held in _moments(steps, controller.beat, pushes, timestep):
+            for step, count, held in moments(steps, controller.beat, pushes, timestep):
                 if held is not torque:
                     torque = held
                     worlds.push(torque)
