@@ -3,28 +3,39 @@
 from __future__ import annotations
 
 import ast
+import runpy
 import subprocess
 import sys
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import cmg_mj
 from tests.command import HANGS_AFTER_S, ROOT, environment
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 SAYS = {
     "bias_estimation": "found",
+    "bode_and_step": "phase margin 65.9 deg",
     "control_callback": "the tilt is",
+    "gymnasium_env": "observer and law: stood until 4.00 s",
     "many_worlds": "homogeneous beside ltv: better",
+    "mujoco_viewer": "pushed at 1.00 s; at 4.00 s the tilt is",
     "own_law": "own_law:Leaning: 5 of 5 stood",
     "own_loop": "estimated tilt rate",
     "own_observer": "own_observer:HalfDifference: 0 of 5 fell",
     "python_control": "slowest pole -0.20",
+    "replay_a_log": "super_twisting: velocity RMS error",
     "runner": "the callback's run is the same: True",
+    "sweep_biases": "homogeneous at e = 2.0 deg: 0 of 5 stood",
     "tuning": "better",
 }
 """Example -> a part of what it prints."""
+OPTIONS = {"mujoco_viewer": ["--headless"]}
+"""The same loop where there is no screen."""
 
 
 def test_there_is_an_example_for_each() -> None:
@@ -34,7 +45,12 @@ def test_there_is_an_example_for_each() -> None:
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_runs(path: Path, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, path], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=HANGS_AFTER_S
+        [sys.executable, path, *OPTIONS.get(path.stem, [])],
+        cwd=tmp_path,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=HANGS_AFTER_S,
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert SAYS[path.stem] in done.stdout
@@ -46,4 +62,42 @@ def test_is_short_and_says_what_it_is(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert len(text.splitlines()) < 40
     assert ast.get_docstring(ast.parse(text))
-    assert f"examples/{path.name}" in (ROOT / "README.md").read_text(encoding="utf-8")
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    assert any(f"examples/{path.name}" in page.read_text(encoding="utf-8") for page in pages)
+
+
+class StandIn:
+    """A viewer that is closed after a second of simulated time; at half of it somebody presses space."""
+
+    def __init__(self, model: Any, data: Any, key_callback: Any) -> None:
+        self.data, self.key_callback, self.synced = data, key_callback, 0
+        seen.append(self)
+
+    def __enter__(self) -> StandIn:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def is_running(self) -> bool:
+        return self.data.time < 1.0
+
+    def sync(self) -> None:
+        self.synced += 1
+        if abs(self.data.time - 0.5) < 1e-9:
+            self.key_callback(ord("x"))
+            self.key_callback(ord(" "))
+
+
+seen: list[StandIn] = []
+
+
+def test_the_viewers_loop_at_a_viewer(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """In real time, with a push where the key was pressed."""
+    monkeypatch.setattr("mujoco.viewer.launch_passive", StandIn)
+    monkeypatch.setattr(sys, "argv", ["mujoco_viewer.py"])
+    began = time.monotonic()
+    runpy.run_path(str(ROOT / "examples" / "mujoco_viewer.py"))
+    assert time.monotonic() - began > 0.9
+    assert "pushed at 0.50 s; at 1.00 s the tilt is" in capsys.readouterr().out
+    assert seen[-1].synced == pytest.approx(1.0 / cmg_mj.load_plant(model="scissored_pair.xml").timestep, abs=1)

@@ -1,0 +1,30 @@
+"""The rig as a Gymnasium environment: an agent that does nothing, and the bench's own observer and law as one."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+
+import cmg_mj
+import cmg_mj.environment
+
+env = gymnasium.make(cmg_mj.environment.ID, scenario="push_recovery", settings=["duration_s=4.0"])
+rig = cmg_mj.load_plant(model="scissored_pair.xml")
+law = cmg_mj.Law(dt=0.005)
+observer = cmg_mj.make_observer("homogeneous", law.dt, rig.reduced)
+
+for agent in ("nothing", "observer and law"):
+    y, info = env.reset(seed=3)
+    state = observer.init(cmg_mj.Measurement(*y, 0.0))
+    estimate, x_e, u = (y[0], 0.0, y[1]), 0.0, 0.0
+    total, over = 0.0, False
+    while not over:
+        if agent == "observer and law":
+            u, x_e = law(y[0], estimate[1], y[1], x_e)
+        y, reward, fell, ended, info = env.step(np.array([u / law.rate_limit]))
+        state, estimate = observer.step(state, cmg_mj.Measurement(*y, 0.0), u)
+        total += float(reward)
+        over = fell or ended
+    end = "fell" if fell else "stood"
+    print(f"{agent}: {end} until {info['time_s']:.2f} s, sum of rewards {total:.2f}")
+env.close()
