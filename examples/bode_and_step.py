@@ -1,4 +1,4 @@
-"""A Bode plot of the loop and its answer to a steady torque, with python-control; an argument names a file to draw to."""
+"""A Bode plot of the loop and its answer to a steady torque, with python-control; drawn to the file that is named."""
 
 # pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 # (python-control has no types)

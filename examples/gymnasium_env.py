@@ -15,16 +15,15 @@ observer = cmg_mj.make_observer("homogeneous", law.dt, rig.reduced)
 
 for agent in ("nothing", "observer and law"):
     y, info = env.reset(seed=3)
-    state = observer.init(cmg_mj.Measurement(*y, 0.0))
+    state = observer.init(cmg_mj.Measurement(y[0], y[1], 0.0))
     estimate, x_e, u = (y[0], 0.0, y[1]), 0.0, 0.0
-    total, over = 0.0, False
-    while not over:
+    total, fell, ended = 0.0, False, False
+    while not (fell or ended):
         if agent == "observer and law":
             u, x_e = law(y[0], estimate[1], y[1], x_e)
         y, reward, fell, ended, info = env.step(np.array([u / law.rate_limit]))
-        state, estimate = observer.step(state, cmg_mj.Measurement(*y, 0.0), u)
+        state, estimate = observer.step(state, cmg_mj.Measurement(y[0], y[1], 0.0), u)
         total += float(reward)
-        over = fell or ended
     end = "fell" if fell else "stood"
     print(f"{agent}: {end} until {info['time_s']:.2f} s, sum of rewards {total:.2f}")
 env.close()

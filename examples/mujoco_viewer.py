@@ -1,7 +1,4 @@
-"""A loop of your own in MuJoCo's viewer: space pushes the rig. Without a screen (--headless) it is pushed at 1 s.
-
-On macOS start it with mjpython.
-"""
+"""A loop of your own in MuJoCo's viewer (macOS: mjpython): space pushes the rig; --headless pushes it at 1 s."""
 
 from __future__ import annotations
 

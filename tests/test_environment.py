@@ -77,7 +77,7 @@ def test_a_fall_ends_it_and_never_pays() -> None:
     """Who does nothing falls, and has less than who stands, though it is over sooner."""
     env = ScissoredPair("push_recovery", ["duration_s=5.0"], in_rad_s=True)
     _, _, standing = acting(env, 0)
-    env.reset(seed=0)
+    _, info = env.reset(seed=0)
     total, fell = 0.0, False
     while not fell:
         _, reward, fell, ended, info = env.step(np.zeros(1))
@@ -175,7 +175,7 @@ env.close()
         capture_output=True,
         text=True,
     )
-    if done.returncode and ("OpenGL" in done.stderr or "EGL" in done.stderr):
+    if done.returncode and "MUJOCO_GL" not in os.environ and ("OpenGL" in done.stderr or "EGL" in done.stderr):
         pytest.skip("nothing draws here")
     assert (done.returncode, done.stdout) == (0, "(480, 640, 3) uint8 True\n"), done.stderr
 
