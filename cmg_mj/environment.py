@@ -147,6 +147,8 @@ class ScissoredPair(gymnasium.Env):
     def _start(self, experiment: Experiment, seed: int) -> None:
         self.experiment = experiment
         scenario, plant, dt = experiment.scenario, experiment.plant, experiment.law.dt
+        if len(plant.axes) > 1:
+            raise InputError(f"environment: {plant.path} has {len(plant.axes)} axes, of which an action turns one")
         self._worlds = OneWorld(plant)
         self._sensors = at_work(scenario.sensors, plant.timestep, seed, self._world)
         self._gyro = References(scenario.sensors.mems_gyro, dt, seed, self._world)
