@@ -155,9 +155,10 @@ def column(path: Path) -> dict[str, list[float]]:
     return {name: values.tolist() for name, values in Trajectory.load(path).columns.items()}
 
 
-def test_the_figures_are_those_of_a_run_that_nobody_looks_at(receiver: Viewer) -> None:
-    """Bit for bit; and nothing more is said, but where the viewer is."""
-    arguments = ["run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--json"]
+@pytest.mark.parametrize("driver", ["native", "callback"])
+def test_the_figures_are_those_of_a_run_that_nobody_looks_at(receiver: Viewer, driver: str) -> None:
+    """Bit for bit, and nothing more is said. The callback is one for the whole process, the view's thread included."""
+    arguments = ["run", "push_recovery", f"--driver={driver}", *(f"--set={setting}" for setting in SHORT), "--json"]
     live = cmg_mj_process(*arguments, "--out=live", "--connect", receiver.port, "--pace=5", cwd=Path())
     alone = cmg_mj_process(*arguments, "--out=alone", cwd=Path())
     assert live == alone

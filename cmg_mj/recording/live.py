@@ -28,7 +28,8 @@ GONE, STUCK = "it has gone", "it takes no more"
 class Live:
     """A run streamed to a viewer while it goes on.
 
-    Use it as a context manager around the run and the writing of its files; `begin`, `add` and `end` return at once.
+    Use it as a context manager around the run and the writing of its files; `begin`, before the first step, `add` and
+    `end` wait for nothing.
 
     Args:
         url: Of the viewer, which listens: `viewer.url_of`.
@@ -72,7 +73,9 @@ class Live:
         Args:
             empty: The trajectory before the first tick.
         """
-        self._jobs.put(lambda: self._begin(empty))
+        # Here and not in the thread: it sets MuJoCo's control callback, which is the whole process's, aside for a while.
+        self._growing = Growing(self._shown, empty)
+        self._jobs.put(self._begin)
 
     def add(self, piece: Trajectory) -> None:
         """Show the next ticks."""
@@ -82,8 +85,7 @@ class Live:
         """Show the last ticks, and what is known only of a run that has ended."""
         self._jobs.put(lambda: self._layout(self._growing.end(self._rec, run), active=False))
 
-    def _begin(self, empty: Trajectory) -> None:
-        self._growing = Growing(self._shown, empty)
+    def _begin(self) -> None:
         branch = self._growing.branch
         self._rec = rr.RecordingStream(f"{application_of([self._shown.name], [branch])} live")
         self._rec.connect_grpc(url_of(str(self._relay.port)))
