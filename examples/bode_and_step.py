@@ -1,4 +1,4 @@
-"""A Bode plot of the loop and its answer to a steady torque, with python-control; drawn to the file that is named."""
+"""A Bode plot of the loop and its answer to a steady torque, with python-control. An argument: a file to draw to."""
 
 # pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 # (python-control has no types)
@@ -14,7 +14,7 @@ import numpy as np
 import cmg_mj
 
 model = cmg_mj.load_plant(model="scissored_pair.xml").reduced
-K = np.array([cmg_mj.Law(dt=0.005).gains])
+K = np.array([cmg_mj.StateFeedback(dt=0.005).gains])
 
 # The loop, cut at the command. What is held for a control period comes half of it late.
 loop = control.ss(model.A_e, model.B_e, K, 0.0)

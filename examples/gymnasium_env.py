@@ -10,19 +10,20 @@ import cmg_mj.environment
 
 env = gymnasium.make(cmg_mj.environment.ID, scenario="push_recovery", settings=["duration_s=4.0"])
 rig = cmg_mj.load_plant(model="scissored_pair.xml")
-law = cmg_mj.Law(dt=0.005)
+law = cmg_mj.StateFeedback(dt=0.005)
 observer = cmg_mj.make_observer("homogeneous", law.dt, rig.reduced)
 
 for agent in ("nothing", "observer and law"):
-    y, info = env.reset(seed=3)
-    state = observer.init(cmg_mj.Measurement(y[0], y[1], 0.0))
-    estimate, x_e, u = (y[0], 0.0, y[1]), 0.0, 0.0
+    observed, info = env.reset(seed=3)
+    y = cmg_mj.Measurement(observed[0], observed[1], 0.0)
+    state, estimate, memory, u = observer.init(y), (y.y1, 0.0, y.y2), law.init(y), 0.0
     total, fell, ended = 0.0, False, False
     while not (fell or ended):
         if agent == "observer and law":
-            u, x_e = law(y[0], estimate[1], y[1], x_e)
-        y, reward, fell, ended, info = env.step(np.array([u / law.rate_limit]))
-        state, estimate = observer.step(state, cmg_mj.Measurement(y[0], y[1], 0.0), u)
+            memory, u = law.step(memory, y, cmg_mj.Fed(y.y1, estimate[1], y.y2), u)
+        observed, reward, fell, ended, info = env.step(np.array([u / law.rate_limit]))
+        y = cmg_mj.Measurement(observed[0], observed[1], 0.0)
+        state, estimate = observer.step(state, y, u)
         total += float(reward)
     end = "fell" if fell else "stood"
     print(f"{agent}: {end} until {info['time_s']:.2f} s, sum of rewards {total:.2f}")

@@ -73,7 +73,7 @@ class Live:
         Args:
             empty: The trajectory before the first tick.
         """
-        # Here and not in the thread: it sets MuJoCo's control callback, which is the whole process's, aside for a while.
+        # Not in the thread: it sets MuJoCo's control callback, the whole process's, aside for a while.
         self._growing = Growing(self._shown, empty)
         self._jobs.put(self._begin)
 
