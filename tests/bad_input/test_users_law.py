@@ -293,6 +293,14 @@ def test_a_law_for_one_world_among_many(quick: str, given: type, fragments: list
     assert not Path("compared").exists()
 
 
+def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
+    """A batch that was not rehearsed on arrays stops, rather than go on with an estimate that nobody made."""
+    settings = ["push=[]", "duration_s=0.1", f"controller.kind={named(ChangesWhatItIsGiven)}"]
+    result = prepare(load_scenario("push_recovery", settings)).run_many(2)
+    assert [outcome.kind for outcome in result.outcomes] == ["stopped"] * 2
+    assert "raised ValueError: output array is read-only" in result.outcomes[0].reason
+
+
 @table(
     ("raises", FailsLater, "law FailsLater raised ZeroDivisionError: division by zero at t = 0.15 s; "),
     ("NaN", GivesNan, "law GivesNan returned nan for u at t = 0.15 s; "),

@@ -162,6 +162,34 @@ def test_the_error_is_what_the_filter_says() -> None:
     assert np.abs(found.mean(axis=0) / sigma).max() < 0.04
 
 
+def test_its_noises_are_those_of_the_observer_kalman() -> None:
+    """As docs/assumptions.md has them."""
+    assert told(law()) == (0.03, 0.082, 0.017)
+
+
+def test_it_rests_where_gravity_bears_the_torque() -> None:
+    """A torque on the rig, which both gimbals' shares of gravity hold: nothing to be done."""
+    of, torque = law(), 0.1
+    x1 = -torque / (2.0 * paper.gravity_torque)
+    state = of.init(Measurement(x1, 0.0))._replace(torque=torque)
+    state, u = of.step(state, Measurement(x1, 0.0), fed(0.0, 0.0, 0.0), 0.0)
+    assert u == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(state, (x1, 0.0, 0.0, torque, 0.0), atol=1e-12)
+
+
+@pytest.mark.parametrize("tilt", [-0.1, 0.1])
+@pytest.mark.parametrize("gimbal", [-0.2, 0.2])
+def test_at_the_limit_it_expects_what_was_commanded_and_does_not_wind_up(tilt: float, gimbal: float) -> None:
+    of = law(rate_limit=0.5)
+    state, u = of.step(of.init(Measurement(tilt, gimbal)), Measurement(tilt, gimbal), fed(0.0, 0.0, 0.0), 0.0)
+    assert u == -math.copysign(0.5, tilt)
+    F, G = held(*rig(), of.dt)
+    np.testing.assert_allclose(state[:4], F @ [tilt, 0.0, gimbal, 0.0] + G[:, 0] * u, rtol=1e-9)
+    # The integrator's next step would add k4 x3 to the demand, whose sign is that of u.
+    winds = of.gains[3] * gimbal * u > 0.0
+    assert state.x_e == (0.0 if winds else pytest.approx(-of.dt * (gimbal + 0.5 * of.dt * u)))
+
+
 def test_a_sensor_without_noise_is_taken() -> None:
     of = law(noise=TiltNoise(0.0, 0.0, 0.0, 0.0))
     np.testing.assert_allclose(np.diag(of.innovation_gain[[0, 2]]), 1.0, atol=0.01)
