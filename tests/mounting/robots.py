@@ -12,7 +12,8 @@ EXAMPLES = Path(__file__).parents[2] / "examples" / "robots"
 def gymnasium_asset(name: str) -> Path:
     """One of the robots that Gymnasium brings."""
     found = find_spec("gymnasium")
-    assert found is not None and found.origin is not None
+    assert found is not None
+    assert found.origin is not None
     return Path(found.origin).parent / "envs" / "mujoco" / "assets" / name
 
 
