@@ -38,6 +38,7 @@ class Axis:
         encoders: Those of the gimbals' encoders.
         gyro: That of the gyro along the line.
         bias: e [rad].
+        initial_tilt: From the equilibrium, at the start [rad].
     """
 
     name: str
@@ -52,6 +53,7 @@ class Axis:
     encoders: list[int]
     gyro: int
     bias: float = 0.0
+    initial_tilt: float = 0.0
 
     @cached_property
     def servos(self) -> list[int]:

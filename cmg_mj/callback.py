@@ -9,13 +9,14 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
+from cmg_mj.axes_controller import AxesController
 from cmg_mj.controller import Controller
 from cmg_mj.engine import control_callback
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.plant import Plant
 
 
-def control(plant: Plant, controller: Controller, data: mujoco.MjData) -> bool:
+def control(plant: Plant, controller: Controller | AxesController, data: mujoco.MjData) -> bool:
     """Sample what is due at this physics step, and set the servos' commands if it is a control tick.
 
     Call it before every `mujoco.mj_step`, after the torques from outside have been set. Where something is due it runs
@@ -42,7 +43,9 @@ def _forward(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return data.sensordata
 
 
-def _tick(plant: Plant, controller: Controller, data: mujoco.MjData, sense: Callable[[], np.ndarray]) -> bool:
+def _tick(
+    plant: Plant, controller: Controller | AxesController, data: mujoco.MjData, sense: Callable[[], np.ndarray]
+) -> bool:
     """Sample what is due, from sensordata as `sense` gives it, and set the servos if it is a control tick."""
     step = round(data.time / plant.model.opt.timestep)
     if step % controller.beat:
@@ -55,7 +58,7 @@ def _tick(plant: Plant, controller: Controller, data: mujoco.MjData, sense: Call
                 f"control() was last called at step {controller.step} and now at step {step}: call it at least every "
                 f"{controller.beat} physics steps, before the step"
             )
-    if not math.isfinite(plant.axis.line.lean(data.qpos)):
+    if not math.isfinite(plant.lean(data.qpos)):
         raise RunStopped(f"the plant diverged at t = {data.time:g} s")
     if not controller.update(step, plant.ideal(sense().tolist(), data.qvel.tolist())):
         return False
@@ -63,11 +66,12 @@ def _tick(plant: Plant, controller: Controller, data: mujoco.MjData, sense: Call
     return True
 
 
-def _hold(plant: Plant, controller: Controller, data: mujoco.MjData) -> None:
+def _hold(plant: Plant, controller: Controller | AxesController, data: mujoco.MjData) -> None:
     """Set the servos' commands to those of the last tick."""
-    if controller.turning is not None:
-        for cube in plant.cubes:
-            data.ctrl[cube.servo] = cube.direction * controller.turning
+    for axis, part in zip(plant.axes, controller.parts, strict=True):
+        if part.turning is not None:
+            for cube in axis.cubes:
+                data.ctrl[cube.servo] = cube.direction * part.turning
 
 
 class ControlCallback:
@@ -85,7 +89,7 @@ class ControlCallback:
         controller: Its controller.
     """
 
-    def __init__(self, plant: Plant, controller: Controller) -> None:
+    def __init__(self, plant: Plant, controller: Controller | AxesController) -> None:
         self.plant = plant
         self.controller = controller
         self._scratch = mujoco.MjData(plant.model)
@@ -96,8 +100,9 @@ class ControlCallback:
     def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Take the control decision if this call is the first at a sampling instant."""
         _hold(self.plant, self.controller, data)
-        for cube in self.plant.cubes:
-            data.ctrl[cube.motor] = cube.speed
+        for axis in self.plant.axes:
+            for cube in axis.cubes:
+                data.ctrl[cube.motor] = cube.speed
         if self._is_instant(model.opt.timestep, data.time):
             _tick(self.plant, self.controller, data, lambda: self._sense(data))
 
@@ -131,7 +136,7 @@ class ControlCallback:
 
 
 @contextmanager
-def installed(plant: Plant, controller: Controller) -> Iterator[ControlCallback]:
+def installed(plant: Plant, controller: Controller | AxesController) -> Iterator[ControlCallback]:
     """Install the controller as MuJoCo's control callback, and take it out again even on an exception.
 
     `mjcb_control` is one pointer for the whole process: while it is installed, only this plant may be stepped.

@@ -24,7 +24,7 @@ Feedback = Literal["observer", "fog", "truth"]
 Angles = Literal["measured", "estimated"]
 
 
-CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s"})
+CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s", "axis"})
 """Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
 
 RIDES_ALONG = 20
@@ -65,6 +65,7 @@ class Controller:
         trim_s: For so long from the start, the integrator is held at the value that the observer's bias estimate asks
             for, k_e1/k_e4 e, instead of finding it by integration [s].
         backlash: Between the servos' motors and the gimbals, one for all worlds or (n_worlds,) [rad].
+        axis: The number of the rig's axis, on which the noise depends.
 
     Attributes:
         extra_signals: Names of what the observer, then each companion, estimates beyond x.
@@ -93,6 +94,7 @@ class Controller:
         companions: Mapping[str, Observer] | None = None,
         trim_s: float = 0.0,
         backlash: Scalar = 0.0,
+        axis: int = 0,
     ) -> None:
         self.observer = observer
         self.law = law
@@ -103,6 +105,9 @@ class Controller:
         self.timestep = timestep
         self.seed = seed
         self.worlds = worlds
+        self.axis = axis
+        self.turns_gimbals = True
+        """Whether `update` does: with other axes, what a turn couples comes in between."""
         self.feedback: Feedback = feedback
         self.angles: Angles = angles
         self.companions = dict(companions or {})
@@ -118,9 +123,14 @@ class Controller:
         self.gimbal_angle = GimbalAngle(self.directions, self.gimbal_zero)
         self.reset()
 
+    @property
+    def parts(self) -> Sequence[Controller]:
+        """Those of the axes: of a rig's only one itself."""
+        return (self,)
+
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
-        self._sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds)
+        self._sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds, self.axis)
         self.tick: Tick | None = None
         self.turning: Scalar = None
         """The rate at which the gimbals are turned since the last tick: its u, behind the backlash [rad/s]."""
@@ -155,7 +165,7 @@ class Controller:
         if law is not None and law.dt != self.law.dt:
             raise InputError(f"controller.rate_hz: stays {1.0 / self.law.dt:g} Hz while it runs")
         if sensors is not None:
-            sampled = at_work(sensors, self.timestep, self.seed, self.worlds)
+            sampled = at_work(sensors, self.timestep, self.seed, self.worlds, self.axis)
             if math.gcd(self.period, *(sensor.beat for sensor in sampled)) != self.beat:
                 raise InputError("sensors: their rates stay while it runs")
             self._sampled, self.sensors = sampled, sensors
@@ -195,8 +205,13 @@ class Controller:
             return False
         accelerometers, encoders, fog = self._sampled
         u = self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), ideal.rate).u
-        self.turning = u if self._gap is None else self._gap(u)
+        if self.turns_gimbals:
+            self.turn(u)
         return True
+
+    def turn(self, u: Scalar) -> None:
+        """Turn the gimbals at a rate from now on [rad/s]."""
+        self.turning = u if self._gap is None else self._gap(u)
 
     def decide(
         self, step: int, forces: Sequence[Scalar], encoders: Sequence[Scalar], fog: Scalar, rate: Scalar

@@ -19,3 +19,12 @@ class Ideal(NamedTuple):
     """What a gyro on the frame shows along the tilt axis [rad/s]."""
     rate: Scalar
     """The true tilt rate, q_b' [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
+
+
+class Ideals(NamedTuple):
+    """The same of a rig of several axes."""
+
+    axes: Sequence[Ideal]
+    """What those of each axis would show."""
+    turn_rate: Scalar
+    """What a gyro on the frame shows upward [rad/s]."""

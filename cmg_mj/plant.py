@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import mujoco
@@ -14,6 +16,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from cmg_mj.accelerometer import Accelerometer
+from cmg_mj.axes_controller import AxesController
 from cmg_mj.axis import Axis, find_axis, read_reduced
 from cmg_mj.backlash import ARCMIN_A_DEGREE
 from cmg_mj.complaint import complaint
@@ -22,7 +25,7 @@ from cmg_mj.elementwise import Scalar
 from cmg_mj.engine import control_callback, quiet
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.grid import fitting_step
-from cmg_mj.ideal import Ideal
+from cmg_mj.ideal import Ideals
 from cmg_mj.known_rigs import RigFacts
 from cmg_mj.laws import Law, StateFeedback
 from cmg_mj.line import HingeLine
@@ -37,6 +40,7 @@ from cmg_mj.rig_parts import KEYFRAME, Cube, axes_in
 from cmg_mj.sensors import Sensors
 from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
+from cmg_mj.turning import coupling
 from cmg_mj.variations import at_speed, place_accelerometers, vary
 
 JOINT_KINDS = {
@@ -58,7 +62,13 @@ class Plant:
         backlash: Between the servos' motors and the gimbals [rad].
     """
 
-    def __init__(self, settings: PlantSettings, path: Path, period_s: float | None = None) -> None:
+    def __init__(
+        self,
+        settings: PlantSettings,
+        path: Path,
+        period_s: float | None = None,
+        of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+    ) -> None:
         self.path = path
         self.model, self.hints = load_rig(path, lock=settings.lock_thrust_bearing)
         self._as_filed = self.model
@@ -67,14 +77,20 @@ class Plant:
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in names else None
         sites = [self.model.site(i).name for i in range(self.model.nsite)]
         self._axes_as_filed = tuple(find_axis(self.model, self.key, name) for name in axes_in([*names, *sites]))
-        self._take(settings, period_s)
+        self._take(settings, period_s, of_axes)
 
-    def changed(self, settings: PlantSettings, period_s: float | None = None) -> Plant:
+    def changed(
+        self,
+        settings: PlantSettings,
+        period_s: float | None = None,
+        of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+    ) -> Plant:
         """The same rig with other settings, without compiling its file again.
 
         Args:
             settings: They name the same model file, and take the thrust bearing alike.
             period_s: Where they leave the physics step open, what whole steps must fill [s].
+            of_axes: What axes have of their own.
 
         Returns:
             Another plant.
@@ -83,33 +99,39 @@ class Plant:
             InputError: With these settings the physics fails.
         """
         other = copy.copy(self)
-        other.__dict__.pop("drawn_model", None)
-        other._take(settings, period_s)
+        for made in ("drawn_model", "coupling"):
+            other.__dict__.pop(made, None)
+        other._take(settings, period_s, of_axes)
         return other
 
-    def _take(self, settings: PlantSettings, period_s: float | None) -> None:
+    def _take(self, settings: PlantSettings, period_s: float | None, of_axes: Mapping[str, PlantSettings]) -> None:
         """Change the model as the settings say, and fit the physics step."""
-        self.settings = settings
+        self.settings, self._of_axes = settings, of_axes
         self.backlash = math.radians(settings.gimbal_backlash_arcmin / ARCMIN_A_DEGREE)
         self.model = copy.copy(self._as_filed)
         axes = []
         for axis in self._axes_as_filed:
-            bias = math.radians(settings.equilibrium_bias_deg)
-            changed = replace(axis, bias=bias, radial_tilt=place_accelerometers(self.model, settings, axis, self.path))
+            own = of_axes.get(axis.name, settings)
+            changed = replace(
+                axis,
+                bias=math.radians(own.equilibrium_bias_deg),
+                initial_tilt=math.radians(own.initial_tilt_deg),
+                radial_tilt=place_accelerometers(self.model, own, axis, self.path),
+            )
             if settings.flywheel_speed_rad_s is not None:
                 cubes = at_speed(self.model, self.key, axis.cubes, settings.flywheel_speed_rad_s, self.path)
                 changed = replace(changed, cubes=cubes)
                 changed = replace(changed, reduced=read_reduced(self._as_filed, self.key, changed))
             axes.append(changed)
         self.axes = tuple(axes)
-        own = float(self.model.opt.timestep)
+        filed = float(self.model.opt.timestep)
         vary(self.model, settings, self.path, self.axes)
         shaken = (
             max(abs(cube.speed) for axis in self.axes for cube in axis.cubes)
             if settings.flywheel_imbalance_kg_m
             else 0.0
         )
-        self.largest_step = largest_step(self.model, self.key, own, shaken)
+        self.largest_step = largest_step(self.model, self.key, filed, shaken)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
                 f"{self._blamed}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
@@ -137,8 +159,48 @@ class Plant:
                 lock_thrust_bearing(spec, self.path)
             model = compile_model(spec, self.path)
         for axis in self._axes_as_filed:
-            place_accelerometers(model, self.settings, axis, self.path)
+            place_accelerometers(model, self._of_axes.get(axis.name, self.settings), axis, self.path)
         return model
+
+    # --- several axes ---------------------------------------------------------------------------------------
+
+    def along(self, axis: str) -> Plant:
+        """The rig as one of its axes sees it: with that axis alone.
+
+        Args:
+            axis: Its name.
+
+        Returns:
+            The rig, whose `reduced`, `cubes`, `ideal`, `controller`, ... are that axis'.
+
+        Raises:
+            InputError: There is no such axis.
+        """
+        found = [own for own in self.axes if own.name == axis]
+        if not found:
+            raise InputError(f"{self.path}: no axis {axis!r}; {nearest(axis, self.axis_names)}")
+        other = copy.copy(self)
+        other.axes = tuple(found)
+        return other
+
+    @property
+    def axis_names(self) -> list[str]:
+        """Names of the axes; of a rig's only one it may be empty."""
+        return [axis.name for axis in self.axes]
+
+    @cached_property
+    def coupling(self) -> np.ndarray:
+        """What a turn about the vertical couples the axes by: see `turning.coupling`."""
+        return coupling(self._as_filed, self.key, self.axes)
+
+    def lean(self, qpos: Any) -> Scalar:
+        """The tilt from the keyframe of the axis that is farthest from it [rad]."""
+        if len(self.axes) == 1:
+            return self.axis.line.lean(qpos)
+        leans = np.array([axis.line.lean(qpos) for axis in self.axes])
+        farthest = np.argmax(np.where(np.isnan(leans), np.inf, np.abs(leans)), axis=0)
+        lean = np.take_along_axis(leans, farthest[None], axis=0)[0]
+        return lean if lean.ndim else float(lean)
 
     # --- the only axis, or the first -----------------------------------------------------------------------
 
@@ -189,9 +251,12 @@ class Plant:
             raise InputError(f"{self.path}: tilts about no hinge of its own at one address; use plant.axis.line")
         return line
 
-    def ideal(self, sensordata: Any, qvel: Any) -> Ideal:
-        """What perfect sensors of the axis show: see `Axis.ideal`."""
-        return self.axis.ideal(sensordata, qvel)
+    def ideal(self, sensordata: Any, qvel: Any) -> Any:
+        """What perfect sensors show: of the axis (see `Axis.ideal`), or `Ideals` of several."""
+        if len(self.axes) == 1:
+            return self.axis.ideal(sensordata, qvel)
+        upward = sensordata[self.axis.gyro + 1]
+        return Ideals([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
 
     def gimbal_angle(self, qpos: Any) -> Scalar:
         """True x3 of the axis: see `Axis.gimbal_angle`."""
@@ -213,7 +278,7 @@ class Plant:
         backlash: Scalar | None = None,
         processor: Processor | None = None,
         **options: Any,
-    ) -> Controller:
+    ) -> Any:
         """A fresh controller for this rig.
 
         Args:
@@ -227,11 +292,20 @@ class Plant:
                 parameter of the observer, if that is given by name.
 
         Returns:
-            The controller.
+            The controller, a `Controller`; of a rig of several axes an `AxesController` of one an axis, all made alike,
+            whose gimbals also turn against what a turn about the vertical couples.
 
         Raises:
             InputError: The observer does not exist or refuses a parameter, or a rate does not fit the physics step.
         """
+        if len(self.axes) > 1:
+            if processor is not None:
+                raise InputError(f"{self.path}: tilts about several axes; a board or other processor takes one")
+            alike = {"law": law, "sensors": sensors, "tilt": tilt, "backlash": backlash, **options}
+            rigs = [self.along(name) for name in self.axis_names]
+            return AxesController(
+                [rig.controller(observer, **alike, axis=i) for i, rig in enumerate(rigs)], self.coupling
+            )
         law = law or StateFeedback(dt=0.005)
         sensors = sensors or Sensors()
         parameters = {name: options.pop(name) for name in options.keys() - CONTROLLER_OPTIONS}
@@ -277,7 +351,7 @@ class Plant:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""
         mujoco.mj_resetDataKeyframe(self.model, data, self.key)
         for axis in self.axes:
-            axis.line.tilt(data, -axis.bias + math.radians(self.settings.initial_tilt_deg))
+            axis.line.tilt(data, -axis.bias + axis.initial_tilt)
         with control_callback(None):  # the first control tick is the first step's
             mujoco.mj_forward(self.model, data)
 
@@ -304,6 +378,7 @@ def load_plant(
     settings: PlantSettings | None = None,
     beside: Path | None = None,
     period_s: float | None = None,
+    of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
     **fields: object,
 ) -> Plant:
     """Load a rig.
@@ -312,6 +387,7 @@ def load_plant(
         settings: Its settings; or give them as keyword arguments.
         beside: A folder that a relative model path may start from.
         period_s: Where the settings leave the physics step open, what whole steps must fill, say a control period [s].
+        of_axes: What axes of several have of their own: equilibrium bias, initial tilt, places of the accelerometers.
         **fields: Fields of `PlantSettings`.
 
     Returns:
@@ -327,4 +403,4 @@ def load_plant(
         except ValidationError as error:
             raise InputError(f"plant.{complaint(PlantSettings, error.errors()[0], fields)}") from error
     with control_callback(None):  # compiling a model runs it
-        return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside), period_s)
+        return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside), period_s, of_axes)

@@ -25,11 +25,13 @@ class Push:
         start_s: When it begins [s].
         duration_s: How long it lasts [s].
         torque_n_m: Torque about the tilt axis [N m].
+        axis: Name of that axis, on a rig of several.
     """
 
     start_s: Instant
     duration_s: Duration = 0.1
     torque_n_m: float = 1.0
+    axis: str | None = None
 
     @property
     def end_s(self) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from cmg_mj.floors import FLOORS
 from cmg_mj.mems_gyro import MemsGyro
-from cmg_mj.sensors import normals
+from cmg_mj.sensors import AN_AXIS, normals
 
 ZERO, MEMS_GYRO = "zero", "mems_gyro"
 RATES = (ZERO, MEMS_GYRO)
@@ -28,10 +28,11 @@ class References:
         dt: Control period [s].
         seed: Seed of the sensors' noise.
         worlds: The number of one world, or the numbers of many: the gyro's noise depends on (seed, number) alone.
+        axis: The number of the axis: each has a gyro of its own.
     """
 
-    def __init__(self, gyro: MemsGyro, dt: float, seed: int, worlds: int | Sequence[int]) -> None:
-        self._read = gyro.meter(dt, normals(seed, worlds, STREAM, gyro.channels))
+    def __init__(self, gyro: MemsGyro, dt: float, seed: int, worlds: int | Sequence[int], axis: int = 0) -> None:
+        self._read = gyro.meter(dt, normals(seed, worlds, STREAM + AN_AXIS * axis, gyro.channels))
 
     def rates(self, x2: np.ndarray) -> dict[str, np.ndarray]:
         """What each says at the next ticks.

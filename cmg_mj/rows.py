@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import NamedTuple
 
@@ -48,6 +48,7 @@ class Rows:
         dt: Control period [s].
         keep: Whether to keep the pieces for a trajectory.
         single: Whether the ticks hold floats (one world) or arrays (n_worlds,).
+        joints: Whether to keep the joints.
     """
 
     def __init__(
@@ -61,12 +62,13 @@ class Rows:
         *,
         keep: bool,
         single: bool,
+        joints: bool = True,
     ) -> None:
         self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
-        self._layout = Layout(
-            tuple(observers), tuple(map(tuple, extras)), tuple(plants[0].joint_names), plants[0].joint_kinds
-        )
+        of_joints = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ()
+        self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), *of_joints)
+        self._joints = joints
         self._estimated = [(*ESTIMATES, *names) for names in extras]
         self._metrics = metrics
         self._references = references
@@ -131,8 +133,8 @@ class Rows:
             x_e,
             push,
             *(part for parts in estimated for part in parts),
-            *q,
-            *v,
+            *(q if self._joints else ()),
+            *(v if self._joints else ()),
         ]
         return Piece(x1, x2, x3, y1, fog, u, named, columns, ended)
 
@@ -167,3 +169,28 @@ class Rows:
             columns[name] = whole[:, 0] if self._single else whole
         n_ticks = len(columns[names[0]])
         return Trajectory({"time_s": np.arange(first, first + n_ticks) * self._dt, **columns}, layout=self._layout)
+
+
+class RowsOfAxes:
+    """The rows of a rig of several axes.
+
+    Args:
+        rows: Those of each axis, by its name; the first have the joints.
+    """
+
+    def __init__(self, rows: Mapping[str, Rows]) -> None:
+        self.rows = rows
+
+    def trajectory(self) -> Trajectory | None:
+        """All that was kept."""
+        return self._joined({name: rows.trajectory() for name, rows in self.rows.items()})
+
+    def since(self, tick: int) -> Trajectory:
+        """The ticks from one on: see `Rows.since`."""
+        found = self._joined({name: rows.since(tick) for name, rows in self.rows.items()})
+        assert found is not None
+        return found
+
+    def _joined(self, trajectories: Mapping[str, Trajectory | None]) -> Trajectory | None:
+        kept = {name: trajectory for name, trajectory in trajectories.items() if trajectory is not None}
+        return Trajectory.joined(kept) if kept else None

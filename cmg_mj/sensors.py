@@ -27,6 +27,8 @@ from cmg_mj.timing import steps_until, whole_steps
 
 FLICKER = 4
 """The stream of the accelerometers' 1/f noise: 0 to 2 are the sensors' white noise, 3 is the cheap gyro's."""
+AN_AXIS = 16
+"""So many streams are an axis'."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -262,7 +264,9 @@ def _drift(sensor: Accelerometer, noise: Iterator) -> Callable[[], Any]:
     return drift
 
 
-def at_work(sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence[int]) -> list[SampledSensor]:
+def at_work(
+    sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence[int], axis: int = 0
+) -> list[SampledSensor]:
     """What the controller reads, at work: the accelerometers, the encoders, the gyro.
 
     Args:
@@ -270,6 +274,7 @@ def at_work(sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence
         timestep: Physics step [s].
         seed: The run's seed.
         worlds: The number of one world, on floats, or the numbers of many, on arrays.
+        axis: The number of the axis whose they are: each has noise of its own.
 
     Returns:
         The sensors, sampled.
@@ -279,7 +284,7 @@ def at_work(sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence
     """
 
     def noise(stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
-        return normals(seed, worlds, stream, channels)
+        return normals(seed, worlds, stream + AN_AXIS * axis, channels)
 
     pair = sensors.accelerometer
     drift = _drift(pair, noise(FLICKER, len(CORNERS_HZ) * pair.channels)) if pair.bias_instability_ug else None

@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 import statistics
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cmg_mj.axes_controller import AxesController
 from cmg_mj.callback import installed
 from cmg_mj.controller import Controller, Tick
 from cmg_mj.elementwise import Scalar, where
@@ -23,10 +24,11 @@ from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.references import RATES, References
-from cmg_mj.rows import Rows
+from cmg_mj.rows import Rows, RowsOfAxes
 from cmg_mj.stacked import of_worlds
 from cmg_mj.timing import whole_steps
 from cmg_mj.trajectory import Trajectory
+from cmg_mj.whole_rig import of_the_rig
 from cmg_mj.worlds import ManyWorlds, OneWorld
 from cmg_mj.worlds_table import as_table, riding_along, world_rows
 
@@ -164,18 +166,26 @@ class Result:
         )
 
 
-def moments(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> Iterator[tuple[int, int, Scalar]]:
-    """The moments at which the loop must look: (step, steps until the next, push torque, one or a world's each)."""
-    changes: dict[int, Scalar] = {0: 0.0, steps: 0.0}
+def moments(
+    steps: int, beat: int, pushes: Sequence[Push], timestep: float, axes: Sequence[str] = ("",)
+) -> Iterator[tuple[int, int, list[Scalar]]]:
+    """The moments at which the loop must look: (step, steps until the next, each axis' torque, one or a world's each).
+
+    A push about an axis that the rig does not have, since it is locked, moves nothing.
+    """
+    changes: dict[int, list[Scalar]] = {0: [0.0] * len(axes), steps: [0.0] * len(axes)}
     for push in pushes:
         for time, torque in ((push.start_s, push.torque_n_m), (push.end_s, -push.torque_n_m)):
             step = whole_steps(time, timestep, "push", f"{time:g} s")
-            changes[step] = changes.get(step, 0.0) + torque
+            change = changes.setdefault(step, [0.0] * len(axes))
+            about = push.axis or axes[0]
+            if about in axes:
+                change[axes.index(about)] += torque
     edges = sorted(step for step in changes if step <= steps)
-    torque: Scalar = 0.0
+    torques: list[Scalar] = [0.0] * len(axes)
     for start, end in itertools.pairwise(edges):
-        torque = torque + changes[start]
-        held = where(abs(torque) > 1e-12, torque, 0.0)
+        torques = [torque + change for torque, change in zip(torques, changes[start], strict=True)]
+        held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in torques]
         first = min(-(-start // beat) * beat, end)  # the first beat not before the push's edge
         if first > start:
             yield start, first - start, held
@@ -189,16 +199,16 @@ def moments(steps: int, beat: int, pushes: Sequence[Push], timestep: float) -> I
 @quiet()
 def simulate(
     plant: Plant | Sequence[Plant],
-    controller: Controller,
+    controller: Controller | AxesController,
     duration_s: float,
     *,
-    observers: Sequence[str],
+    observers: Sequence[str] | Mapping[str, Sequence[str]],
     pushes: Sequence[Push] = (),
     settings: MetricsSettings | None = None,
     driver: Driver = "native",
     keep_trajectory: bool = True,
     on_progress: Callable[[float], None] | None = None,
-    on_start: Callable[[Rows], None] | None = None,
+    on_start: Callable[[Rows | RowsOfAxes], None] | None = None,
     threads: int = 0,
 ) -> Result:
     """Run one world, or as many as there are plants.
@@ -207,7 +217,7 @@ def simulate(
         plant: The rig; or one a world, which may differ in numbers but not in structure.
         controller: A fresh controller, made for one world or for as many as there are plants.
         duration_s: Simulated time [s].
-        observers: Names of the controller's observer and companions.
+        observers: Names of the controller's observer and companions; or of each axis' if they differ.
         pushes: Torques from outside; of many worlds a torque may be an array (n_worlds,).
         settings: What counts as settled and fallen.
         driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only).
@@ -232,33 +242,34 @@ def simulate(
     steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
     worlds: Any = OneWorld(rig) if single else ManyWorlds(plants, threads)
     fall = np.radians(settings.fall_angle_deg).item()
-    dt = controller.law.dt
-    sensors = of_worlds(controller.sensors, len(plants))
-    targets = {BIAS: [plant.apparent_bias(own.accelerometer) for plant, own in zip(plants, sensors, strict=True)]}
-    limit = controller.law.rate_limit
-    noises = [plant.facts.noise(own) for plant, own in zip(plants, sensors, strict=True)]
-    floors = Floors(noises, max(dt, 1.0 / controller.sensors.accelerometer.rate_hz))
-    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, floors)
-    beside = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds)
-    rows = Rows(plants, observers, controller.extra_signals, metrics, beside, dt, keep=keep_trajectory, single=single)
+    names = rig.axis_names
+    parts = list(zip(names, controller.parts, strict=True))
+    of_each = observers if isinstance(observers, Mapping) else dict.fromkeys(names, observers)
+    judged = [
+        _judged(plants, name, part, of_each[name], pushes, settings, keep=keep_trajectory, joints=name == names[0])
+        for name, part in parts
+    ]
+    rows = [own for own, _ in judged]
+    collected = rows[0] if len(rows) == 1 else RowsOfAxes(dict(zip(names, rows, strict=True)))
     if on_start is not None:
-        on_start(rows)
+        on_start(collected)
     ends: list[Outcome | None] = [None] * len(plants)
     native = driver == "native"
-    torque: Scalar = 0.0
-    of_each: Scalar = torque if single else np.zeros(len(plants))
+    torques: Sequence[Scalar] | None = None
+    pushed: Sequence[Scalar] = ()
     step = 0
 
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
     try:
         with drive:
-            for step, count, held in moments(steps, controller.beat, pushes, timestep):
-                if held is not torque:
-                    torque = held
-                    worlds.push(torque)
-                    of_each = torque if single else np.broadcast_to(torque, len(plants))
+            for step, count, held in moments(steps, controller.beat, pushes, timestep, names):
+                if held is not torques:
+                    torques = held
+                    for axis, torque in enumerate(torques):
+                        worlds.push(torque, axis)
+                    pushed = torques if single else [np.broadcast_to(torque, len(plants)) for torque in torques]
                 q, v = worlds.state()
-                lean = rig.axis.line.lean(q)
+                lean = rig.lean(q)
                 if single:
                     if not abs(lean) <= fall:
                         ends[0] = _fallen(lean, step * timestep)
@@ -274,18 +285,21 @@ def simulate(
                 if native:
                     due = step % controller.beat == 0
                     ticked = due and controller.update(step, rig.ideal(worlds.sense(), v))
-                    if ticked and controller.tick is not None:
-                        if not single:
-                            _stop_blind(worlds, controller.tick, ends, step * timestep)
-                        worlds.command(controller.turning)
+                    if ticked:
+                        for axis, part in enumerate(controller.parts):
+                            if not single:
+                                assert part.tick is not None
+                                _stop_blind(worlds, part.tick, ends, step * timestep)
+                            worlds.command(part.turning, axis)
                     worlds.advance(count)
                 else:
                     ticked = step % controller.period == 0
                     worlds.advance(count)
                 if ticked:
-                    tick = controller.tick
-                    assert tick is not None
-                    rows.add(q, v, tick, of_each, None if single else worlds.running.copy())
+                    running = None if single else worlds.running.copy()
+                    for own, part, torque in zip(rows, controller.parts, pushed, strict=True):
+                        assert part.tick is not None
+                        own.add(q, v, part.tick, torque, running)
                     if on_progress:
                         on_progress((step + count) * timestep)
     except RunStopped as error:
@@ -293,12 +307,45 @@ def simulate(
         ends = [end or Outcome("stopped", step * timestep, str(error), shared) for end in ends]
     except KeyboardInterrupt:
         ends = [end or Outcome("interrupted", step * timestep) for end in ends]
-    rows.flush()
+    for own in rows:
+        own.flush()
     outcomes = [end or Outcome("done", duration_s) for end in ends]
-    summaries = [metrics.summary(i, outcome.kind == "done") for i, outcome in enumerate(outcomes)]
+    summaries = [
+        of_the_rig(
+            {name: metrics.summary(i, outcome.kind == "done") for name, (_, metrics) in zip(names, judged, strict=True)}
+        )
+        for i, outcome in enumerate(outcomes)
+    ]
     numbers = (controller.worlds,) if isinstance(controller.worlds, int) else tuple(controller.worlds)
     longest = max(outcome.time_s for outcome in outcomes)
-    return Result(outcomes, summaries, rows.trajectory(), longest, tuple(observers), controller.seed, numbers, driver)
+    loop = tuple(of_each[names[0]])
+    return Result(outcomes, summaries, collected.trajectory(), longest, loop, controller.seed, numbers, driver)
+
+
+def _judged(
+    rigs: Sequence[Plant],
+    axis: str,
+    controller: Controller,
+    observers: Sequence[str],
+    pushes: Sequence[Push],
+    settings: MetricsSettings,
+    *,
+    keep: bool,
+    joints: bool,
+) -> tuple[Rows, Metrics]:
+    """What collects and judges the ticks of one axis: see `simulate`."""
+    plants = [plant.along(axis) for plant in rigs]
+    sensors = of_worlds(controller.sensors, len(plants))
+    targets = {BIAS: [plant.apparent_bias(own.accelerometer) for plant, own in zip(plants, sensors, strict=True)]}
+    dt, limit = controller.law.dt, controller.law.rate_limit
+    noises = [plant.facts.noise(own) for plant, own in zip(plants, sensors, strict=True)]
+    floors = Floors(noises, max(dt, 1.0 / controller.sensors.accelerometer.rate_hz))
+    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, floors)
+    beside = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds, controller.axis)
+    single = isinstance(controller.worlds, int)
+    extras = controller.extra_signals
+    rows = Rows(plants, observers, extras, metrics, beside, dt, keep=keep, single=single, joints=joints)
+    return rows, metrics
 
 
 def _stop_blind(worlds: ManyWorlds, tick: Tick, ends: list[Outcome | None], time: float) -> None:

@@ -49,8 +49,12 @@ KEYS = {
 """Summary key -> what it is. In this order they stand in every table."""
 
 
-NESTED = ("companions", "references")
-"""Parts of a summary that hold the figures of what rode along, by name."""
+AXES = "axes"
+"""The part of a summary that holds the figures of each axis of several, by name."""
+RODE_ALONG = ("companions", "references")
+"""Parts that hold the figures of what rode along, by name."""
+NESTED = (*RODE_ALONG, AXES)
+"""Parts that hold figures of others by name."""
 
 
 RIDING = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "velocity_fit", "velocity_fit_push")

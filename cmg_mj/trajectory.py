@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, nearest
 
 SIGNALS = (
     "x1_rad",
@@ -57,12 +57,16 @@ class Layout:
         extra_signals: For each of them the names of what it estimates beyond x.
         joints: In the order of qpos; a hinge has the columns `angle/<joint>_rad` and `rate/<joint>_rad_s`.
         kinds: Of each joint `hinge`, `slide`, `ball` or `free`: see `POSITIONS` and `RATES`; none if all are hinges.
+        axes: Of a rig of several axes a layout each, without joints: the columns of an axis begin with `<axis>/`.
+        name: Of the axis.
     """
 
     observers: tuple[str, ...] = ()
     extra_signals: tuple[tuple[str, ...], ...] = ()
     joints: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
+    axes: tuple[Layout, ...] = ()
+    name: str = ""
 
     def positions(self) -> list[str]:
         """Names of the columns that make up qpos, in order."""
@@ -79,16 +83,30 @@ class Layout:
 
     def columns(self) -> list[str]:
         """Names of all columns after `time_s`, in order."""
-        return [
-            *SIGNALS,
-            *(
-                f"estimate/{observer}/{name}"
-                for observer, more in zip(self.observers, self.extra_signals, strict=True)
-                for name in (*ESTIMATES, *more)
-            ),
-            *self.positions(),
-            *self.rates(),
+        return [*self._signals(), *self.positions(), *self.rates()]
+
+    def _signals(self) -> list[str]:
+        """Those that are no joints'."""
+        if self.axes:
+            return [f"{own.name}/{column}" for own in self.axes for column in own._signals()]
+        estimates = [
+            f"estimate/{observer}/{name}"
+            for observer, more in zip(self.observers, self.extra_signals, strict=True)
+            for name in (*ESTIMATES, *more)
         ]
+        return [*SIGNALS, *estimates]
+
+    @staticmethod
+    def loaded(kept: Mapping[str, Any]) -> Layout:
+        """What `asdict` made of one, and JSON of that."""
+        return Layout(
+            tuple(kept["observers"]),
+            tuple(map(tuple, kept["extra_signals"])),
+            tuple(kept["joints"]),
+            tuple(kept.get("kinds", ())),
+            tuple(map(Layout.loaded, kept.get("axes", ()))),
+            kept.get("name", ""),
+        )
 
 
 @dataclass(frozen=True)
@@ -126,6 +144,45 @@ class Trajectory:
         """Names of the rig's joints, in the order of qpos."""
         return self.layout.joints
 
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the rig's axes, if it has several."""
+        return tuple(own.name for own in self.layout.axes)
+
+    def along(self, axis: str) -> Trajectory:
+        """One axis of several, with the columns that a rig of one axis has.
+
+        Args:
+            axis: Its name.
+
+        Returns:
+            Its trajectory, with all joints.
+
+        Raises:
+            InputError: There is no such axis.
+        """
+        if axis not in self.axes:
+            raise InputError(f"axis {axis!r}: {nearest(axis, self.axes)}")
+        own = replace(
+            self.layout.axes[self.axes.index(axis)], joints=self.layout.joints, kinds=self.layout.kinds, name=""
+        )
+        columns = {"time_s": self["time_s"]}
+        for name in own.columns():
+            columns[name] = self.columns[name if name in self.columns else f"{axis}/{name}"]
+        return replace(self, columns=columns, layout=own)
+
+    @staticmethod
+    def joined(axes: Mapping[str, Trajectory]) -> Trajectory:
+        """The trajectories of a rig's axes as one; the first has the joints."""
+        first = next(iter(axes.values()))
+        parts = tuple(replace(own.layout, joints=(), kinds=(), name=name) for name, own in axes.items())
+        layout = replace(first.layout, axes=parts)
+        columns = {"time_s": first["time_s"]}
+        for part, own in zip(parts, axes.values(), strict=True):
+            columns |= {f"{part.name}/{name}": own[name] for name in part.columns()}
+        joints = (*layout.positions(), *layout.rates())
+        return Trajectory(columns | {name: first[name] for name in joints}, layout=layout)
+
     def qpos(self) -> np.ndarray:
         """Joint positions as MuJoCo has them, (n_ticks, nq) [rad, m, quaternions w, x, y, z]."""
         return np.stack([self.columns[name] for name in self.layout.positions()], axis=-1)
@@ -133,7 +190,7 @@ class Trajectory:
     def world(self, index: int) -> Trajectory:
         """One world of many, up to its end."""
         columns = {name: values if name == "time_s" else values[:, index] for name, values in self.columns.items()}
-        kept = np.isfinite(columns["x1_rad"])
+        kept = np.isfinite(columns[self.layout.columns()[0] if self.layout.axes else SIGNALS[0]])
         return replace(self, columns={name: values[kept] for name, values in columns.items()})
 
     def of_worlds(self, worlds: np.ndarray | slice) -> Trajectory:
@@ -188,13 +245,7 @@ class Trajectory:
             raise InputError(f"{path}: a Parquet file, but not a trajectory written by cmg-mj")
         try:
             stored = json.loads(text)
-            kept = stored.pop("layout")
-            layout = Layout(
-                tuple(kept["observers"]),
-                tuple(map(tuple, kept["extra_signals"])),
-                tuple(kept["joints"]),
-                tuple(kept.get("kinds", ())),
-            )
+            layout = Layout.loaded(stored.pop("layout"))
         except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InputError(
                 f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"

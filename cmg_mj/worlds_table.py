@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cmg_mj.summary_keys import NESTED
+from cmg_mj.summary_keys import NESTED, RODE_ALONG
 from cmg_mj.trajectory import whole_file
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def world_rows(
 
 def riding_along(summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """Of a summary the figures of everything that rode along, by name: companions, then references."""
-    return {name: figures for nested in NESTED for name, figures in summary.get(nested, {}).items()}
+    return {name: figures for nested in RODE_ALONG for name, figures in summary.get(nested, {}).items()}
 
 
 def as_table(rows: Iterable[Mapping[str, Any]]) -> pa.Table:
