@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from cmg_mj.axes_controller import AxesController
 from cmg_mj.board import Board, on_a_board
 from cmg_mj.controller import Controller
 from cmg_mj.design import Design, design
@@ -24,9 +25,9 @@ from cmg_mj.plant import Plant, load_plant
 from cmg_mj.pool import differs, pooled, structure
 from cmg_mj.processor import Processor
 from cmg_mj.push import Push
-from cmg_mj.resolved import resolved
+from cmg_mj.resolved import resolved, with_axes
 from cmg_mj.resources import folder
-from cmg_mj.scenario import as_fields, base_of, located, parse_scenario
+from cmg_mj.scenario import as_fields, base_of, located, of_axis, parse_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.simulate import Driver, Result, simulate
 from cmg_mj.stacked import stacked
@@ -44,12 +45,14 @@ class Experiment:
     Attributes:
         scenario: What it was made from.
         plant: The rig.
-        design: The law and the observers.
+        design: The law and the observers; of several axes the first one's.
+        axes: One an axis, if the rig has several, or if the scenario says of an axis what it has of its own.
     """
 
     scenario: Scenario
     plant: Plant
     design: Design
+    axes: tuple[Experiment, ...] = ()
 
     @property
     def law(self) -> Law:
@@ -58,12 +61,12 @@ class Experiment:
 
     @property
     def observer_names(self) -> list[str]:
-        """The observer in the loop, then the companions."""
+        """The observer in the loop, then the companions; of several axes the first one's."""
+        if self.axes:
+            return self.axes[0].observer_names
         return [self.scenario.observer.kind, *self.scenario.companion_names()]
 
-    def controller(
-        self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, **others: Any
-    ) -> Controller:
+    def controller(self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, **others: Any) -> Any:
         """A fresh controller.
 
         Args:
@@ -72,8 +75,15 @@ class Experiment:
             **others: `observer`, `law`, `sensors`, `tilt` and `backlash` instead of the scenario's.
 
         Returns:
-            The controller.
+            The controller; of several axes an `AxesController`.
+
+        Raises:
+            InputError: A processor is to take the decisions of several axes.
         """
+        if self.axes:
+            if processor is not None:
+                raise InputError(f"{self.plant.path}: a board or other processor runs one axis, not several")
+            return self._of_axes([own.controller(worlds, **others, axis=i) for i, own in enumerate(self.axes)])
         settings = self.scenario.controller
         given: dict[str, Any] = {"sensors": self.scenario.sensors} | others
         given.setdefault("law", self.design.fresh_law())
@@ -89,9 +99,18 @@ class Experiment:
             processor=processor,
         )
 
+    def _of_axes(self, controllers: Sequence[Controller]) -> Any:
+        """The controllers of the axes as one."""
+        if len(controllers) == 1:
+            return controllers[0]
+        against = self.scenario.controller.against_turning
+        return AxesController(controllers, self.plant.coupling if against else None)
+
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
         """Run one world. Options are those of `simulate`."""
         if driver == "board":
+            if len(self.axes) > 1:
+                raise InputError(f"driver = 'board': {self.plant.path}: the board runs one axis, not several")
             with on_a_board(self.controller()) as board:
                 return self.run_on(board, world, **options)
         return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
@@ -130,7 +149,13 @@ class Experiment:
             return run_together(self.varied(vary), numbers, **options)
         rigs = [self.plant] * len(numbers) if plants is None else list(plants)
         _require_alike([self.plant, *rigs], len(rigs), len(numbers))
-        return self.simulate(rigs, self.controller(numbers, **_of_the_rigs(rigs)), **options)
+        controllers = [own.controller(numbers, **_of_the_rigs(rigs, i)) for i, own in enumerate(self._parts)]
+        return self.simulate(rigs, self._of_axes(controllers), **options)
+
+    @property
+    def _parts(self) -> tuple[Experiment, ...]:
+        """One an axis."""
+        return self.axes or (self,)
 
     def varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
         """The scenario with other settings in each world; worlds with equal settings share one.
@@ -204,7 +229,7 @@ class Experiment:
             plant,
             controller,
             scenario.duration_s,
-            observers=self.observer_names,
+            observers={name: own.observer_names for name, own in zip(self.plant.axis_names, self._parts, strict=True)},
             pushes=scenario.push if pushes is None else pushes,
             settings=scenario.metrics,
             **options,
@@ -213,15 +238,19 @@ class Experiment:
     @property
     def hints(self) -> list[str]:
         """What is no mistake and yet likely to make the rig fall, in clauses."""
-        return hints(self.scenario, self.design, self.plant.facts)
+        if not self.axes:
+            return hints(self.scenario, self.design, self.plant.facts)
+        return [f"{own.plant.axis.name}: {hint}" for own in self.axes for hint in own.hints]
 
     def rehearse(self, worlds: int | None = None) -> None:
         """Try every observer once, on floats or on arrays of so many worlds: see `Design.rehearse`."""
-        self.design.rehearse(worlds)
+        for own in self._parts:
+            own.design.rehearse(worlds)
 
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
-        return resolved(self.scenario, self.design, self.plant.path, self.plant.timestep)
+        fields = resolved(self.scenario, self.design, self.plant.path, self.plant.timestep)
+        return with_axes(fields, {own.plant.axis.name: own.resolved() for own in self.axes})
 
     @functools.cached_property
     def differences(self) -> dict[str, Any]:
@@ -278,9 +307,9 @@ def run_together(experiments: Sequence[Experiment], worlds: Sequence[int], **opt
             f"run_many: {len(worlds)} worlds and {len(experiments)} plants; give at least one, and as many of each"
         )
     _require_alike([each.plant for each in experiments], len(experiments), len(worlds))
-    common = structure(first.scenario, first.design)
+    common = _structure(first)
     for other in {id(each): each for each in experiments}.values():
-        field = differs(common, structure(other.scenario, other.design))
+        field = differs(common, _structure(other))
         if field:
             raise InputError(f"run_many: {field} differs, which worlds of one batch must have in common")
     rigs, controller, pushes = of_one_batch(experiments, worlds)
@@ -300,17 +329,31 @@ def of_one_batch(
     Returns:
         For `Experiment.simulate`.
     """
-    law, sensors, pushes = pooled(
-        [(each.design.fresh_law(), each.scenario.sensors, tuple(each.scenario.push)) for each in experiments]
-    )
     rigs = [each.plant for each in experiments]
-    given = {"law": law, "sensors": sensors} | _of_the_rigs(rigs) | others
-    return rigs, experiments[0].controller(worlds, **given), pushes
+    first = experiments[0]
+    controllers, pushes = [], ()
+    for i, own in enumerate(first._parts):
+        parts = [each._parts[i] for each in experiments]
+        law, sensors, pushes = pooled(
+            [(each.design.fresh_law(), each.scenario.sensors, tuple(each.scenario.push)) for each in parts]
+        )
+        given = {"law": law, "sensors": sensors} | _of_the_rigs(rigs, i) | others
+        controllers.append(own.controller(worlds, **given))
+    return rigs, first._of_axes(controllers), pushes
 
 
-def _of_the_rigs(rigs: Sequence[Plant]) -> dict[str, Any]:
-    """What a controller of many worlds has of their rigs."""
-    return {"tilt": stacked([rig.radial_tilt for rig in rigs]), "backlash": stacked([rig.backlash for rig in rigs])}
+def _structure(experiment: Experiment) -> dict[str, str]:
+    """What worlds that run together have in common, of every axis."""
+    if not experiment.axes:
+        return structure(experiment.scenario, experiment.design)
+    parts = [(own.plant.axis.name, _structure(own)) for own in experiment.axes]
+    return {f"axes.{name}.{field}": value for name, found in parts for field, value in found.items()}
+
+
+def _of_the_rigs(rigs: Sequence[Plant], axis: int) -> dict[str, Any]:
+    """What a controller of many worlds has of an axis of their rigs."""
+    tilts = stacked([rig.axes[axis].radial_tilt for rig in rigs])
+    return {"tilt": tilts, "backlash": stacked([rig.backlash for rig in rigs]), "axis": axis}
 
 
 def _require_alike(rigs: Sequence[Plant], plants: int, worlds: int) -> None:
@@ -339,12 +382,13 @@ def load_rig(scenario: Scenario, like: Plant | None = None) -> Plant:
     try:
         period = common_period(scenario) if scenario.plant.timestep_s is None else None
         settings = scenario.plant
+        of_axes = {name: of_axis(scenario, name).plant for name in scenario.axes}
         same = ("model", "lock_thrust_bearing")
         if like is not None and all(getattr(like.settings, name) == getattr(settings, name) for name in same):
-            plant = like.changed(settings, period)
+            plant = like.changed(settings, period, of_axes)
             check_steps(scenario, plant.timestep)
             return plant
-        plant = load_plant(settings, period_s=period)
+        plant = load_plant(settings, period_s=period, of_axes=of_axes)
         check_steps(scenario, plant.timestep)
         if plant.path.resolve().parent != folder("models").resolve():
             _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
@@ -367,4 +411,29 @@ def prepare(scenario: Scenario, plant: Plant | None = None) -> Experiment:
         InputError: Something in the scenario does not fit.
     """
     plant = load_rig(scenario) if plant is None else plant
-    return Experiment(scenario, plant, design(scenario, plant.facts))
+    try:
+        check_axes(scenario, plant)
+    except InputError as error:
+        raise InputError(located(scenario._where, str(error))) from error
+    if len(plant.axes) == 1 and not scenario.axes:
+        return Experiment(scenario, plant, design(scenario, plant.facts))
+    rigs = [(of_axis(scenario, name), plant.along(name)) for name in plant.axis_names]
+    axes = tuple(Experiment(own, rig, design(own, rig.facts)) for own, rig in rigs)
+    return Experiment(scenario, plant, axes[0].design, axes)
+
+
+def check_axes(scenario: Scenario, plant: Plant) -> None:
+    """Whatever names an axis names one of the rig's; on a rig of several every push does.
+
+    Raises:
+        InputError: It does not.
+    """
+    known = [*plant.axis_names, *plant.settings.locked_axes]
+    for name in scenario.axes:
+        if name not in known:
+            raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
+    for i, push in enumerate(scenario.push):
+        if push.axis is None and len(known) > 1:
+            raise InputError(f"push.{i}.axis: the rig has several axes: which of {', '.join(known)}?")
+        if push.axis is not None and push.axis not in known:
+            raise InputError(f"push.{i}.axis = {push.axis!r}: the rig has no such axis; {nearest(push.axis, known)}")

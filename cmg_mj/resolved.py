@@ -18,7 +18,7 @@ from cmg_mj.laws.registry import GIVEN as GIVEN_TO_LAWS
 from cmg_mj.observers import GIVEN
 from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.resources import folder
-from cmg_mj.schema import ControllerSettings, Scenario
+from cmg_mj.schema import AxisPlant, ControllerSettings, Scenario
 
 
 def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float) -> dict[str, Any]:
@@ -51,8 +51,33 @@ def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float)
         "kind": scenario.observer.kind,
         **_parameters(scenario.observer.parameters, design.observer(), GIVEN),
     }
+    if not scenario.axes:
+        fields.pop("axes")
     fields["versions"] = versions()
     return _plain(fields)
+
+
+OF_AN_AXIS = ("plant", "controller", "observer", "sensors")
+"""Sections of which an axis may have something of its own."""
+
+
+def with_axes(fields: dict[str, Any], axes: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    """The resolved scenario of a rig with what each axis has, written out.
+
+    Args:
+        fields: Of the rig.
+        axes: The resolved scenario of each axis, by its name.
+
+    Returns:
+        The rig's, with [axes] in it: all that an axis may have of its own.
+    """
+    if not axes:
+        return fields
+    found = {name: {section: own[section] for section in OF_AN_AXIS} for name, own in axes.items()}
+    for own in found.values():
+        own["plant"] = {name: value for name, value in own["plant"].items() if name in AxisPlant.model_fields}
+        own["controller"] = {name: value for name, value in own["controller"].items() if name != "rate_hz"}
+    return {**fields, "axes": found}
 
 
 def _parameters(given: dict[str, Any], made: Any, by_bench: Collection[str]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from cmg_mj.overrides import override
 from cmg_mj.own_class import as_json
 from cmg_mj.plausible import out_of_size, unreadable
 from cmg_mj.resources import bundled, find, folder
-from cmg_mj.schema import ControllerSettings, ObserverSettings, Scenario
+from cmg_mj.schema import AxisSettings, ControllerSettings, ObserverSettings, Scenario
 
 LARGEST_FILE = 1_000_000
 """Bytes of a scenario file; the longest that a run writes has three thousand."""
@@ -131,7 +131,60 @@ def parse_scenario(fields: Mapping[str, Any], where: str = "") -> Scenario:
     if wrong:
         raise InputError(located(where, _clauses(wrong)))
     scenario._where = where
+    for axis in scenario.axes:
+        of_axis(scenario, axis)
     return scenario
+
+
+def of_axis(scenario: Scenario, axis: str) -> Scenario:
+    """A scenario as one axis of several has it.
+
+    Args:
+        scenario: Of the whole rig.
+        axis: The axis' name.
+
+    Returns:
+        The scenario with what [axes.NAME] gives it in the place of what holds for all. Where that names another
+        observer or law, no parameter of the common one is left.
+
+    Raises:
+        InputError: A field is unknown or not allowed.
+    """
+    own = scenario.axes.get(axis)
+    if own is None:
+        return scenario.model_copy(update={"axes": {}})
+    fields = as_fields(scenario.model_copy(update={"axes": {}}))
+    where = f"{scenario._where}, [axes.{axis}]".removeprefix(", ")
+    if "rate_hz" in own.controller:
+        raise InputError(located(where, "controller.rate_hz: is the same on all axes; set it in [controller]"))
+    for name, section in as_fields_of(own).items():
+        common = fields.setdefault(name, {})
+        if section.get("kind", common.get("kind")) != common.get("kind"):
+            kept = ControllerSettings.model_fields.keys() - {"gains", "lqr"} if name == "controller" else ()
+            common = {field: common[field] for field in kept if field in common}
+        if name == "controller" and {"gains", "lqr"} & section.keys():
+            common = {field: value for field, value in common.items() if field not in ("gains", "lqr")}
+        fields[name] = _merged(common, section)
+    return parse_scenario(fields, where)
+
+
+def as_fields_of(own: AxisSettings) -> dict[str, Any]:
+    """What an axis has of its own as the content of its section, empty sections left out."""
+    return {name: section for name, section in own.model_dump(mode="json", exclude_none=True).items() if section}
+
+
+def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """A section with another's fields in the place of its own, down to the last."""
+    both = {
+        name: _merged(common[name], own[name])
+        for name in common.keys() & own.keys()
+        if _are_sections(common[name], own[name])
+    }
+    return {**common, **own, **both}
+
+
+def _are_sections(*values: Any) -> bool:
+    return all(isinstance(value, Mapping) for value in values)
 
 
 def unknown_to_law(kind: str, given: Iterable[str]) -> list[str]:

@@ -49,6 +49,8 @@ class ControllerSettings(BaseModel):
     """Which rate the law uses."""
     angles: Angles = "measured"
     """Whether the law uses the measured angles, as (8), or the estimated ones, as the text after (10)."""
+    against_turning: bool = True
+    """Several axes: whether the gimbals also turn against what a turn about the vertical couples."""
     trim_s: Instant = 0.0
     """For so long from the start the integrator is held where the observer's bias estimate asks for it."""
 
@@ -105,6 +107,33 @@ class CompareSettings(BaseModel):
         return list(OBSERVERS) if self.observers == "all" else list(dict.fromkeys(self.observers))
 
 
+class AxisPlant(BaseModel):
+    """What of [plant] an axis may have of its own."""
+
+    model_config = FORBID
+    equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] | None = None
+    """e about this axis."""
+    initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] | None = None
+    """x1(0) about this axis."""
+    accelerometer_inner_m: Positive | None = None
+    """Distance of its inner accelerometer."""
+    accelerometer_outer_m: Positive | None = None
+    """Distance of its outer accelerometer."""
+
+
+class AxisSettings(BaseModel):
+    """What one axis of several has of its own, in the words of the sections that hold for all."""
+
+    model_config = FORBID
+    plant: AxisPlant = Field(default_factory=AxisPlant)
+    controller: dict[str, Any] = Field(default_factory=dict)
+    """Fields of [controller] but rate_hz."""
+    observer: dict[str, Any] = Field(default_factory=dict)
+    """Fields of [observer]."""
+    sensors: dict[str, Any] = Field(default_factory=dict)
+    """Sections of [sensors]."""
+
+
 class Scenario(BaseModel):
     """One experiment."""
 
@@ -118,6 +147,8 @@ class Scenario(BaseModel):
     companions: list[str] | Literal["all"] = Field(default_factory=list)
     """Observers that ride along open loop, with their default parameters."""
     sensors: Sensors = Field(default_factory=Sensors)
+    axes: dict[str, AxisSettings] = Field(default_factory=dict)
+    """What axes of several have of their own, by name."""
     push: list[Push] = Field(default_factory=list)
     metrics: MetricsSettings = Field(default_factory=MetricsSettings)
     compare: CompareSettings | None = None
@@ -130,10 +161,14 @@ class Scenario(BaseModel):
     """What to call it in an error: the file, and what was changed in it."""
 
     def with_observer(self, kind: str) -> Scenario:
-        """The same experiment with another observer in the loop; its own keeps the parameters given for it."""
+        """The same experiment with another observer in the loop; its own keeps the parameters given for it.
+
+        On a rig of several axes it is that of all.
+        """
         if kind == self.observer.kind:
             return self
-        return self.model_copy(update={"observer": ObserverSettings(kind=kind)})
+        axes = {name: own.model_copy(update={"observer": {}}) for name, own in self.axes.items()}
+        return self.model_copy(update={"observer": ObserverSettings(kind=kind), "axes": axes})
 
     def with_law(self, kind: str) -> Scenario:
         """The same experiment with another control law, with its default parameters."""
@@ -141,7 +176,8 @@ class Scenario(BaseModel):
             return self
         fields: dict[str, Any] = {name: getattr(self.controller, name) for name in ControllerSettings.model_fields}
         own = ControllerSettings(**fields | {"kind": kind, "gains": None, "lqr": None})
-        return self.model_copy(update={"controller": own})
+        axes = {name: own_axis.model_copy(update={"controller": {}}) for name, own_axis in self.axes.items()}
+        return self.model_copy(update={"controller": own, "axes": axes})
 
     def companion_names(self) -> list[str]:
         """The companions, spelled out, without the observer itself."""
