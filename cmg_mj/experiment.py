@@ -428,7 +428,7 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
     Raises:
         InputError: It does not.
     """
-    known = [*plant.axis_names, *plant.settings.locked_axes]
+    known = [*plant.axis_names, *getattr(plant.settings, "locked_axes", ())]
     for name in scenario.axes:
         if name not in known:
             raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
