@@ -11,6 +11,7 @@ from cmg_mj.known_rigs import RigFacts
 from cmg_mj.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.laws.protocol import needs
 from cmg_mj.loop_check import closed_loop, hints
+from cmg_mj.push import Push
 from cmg_mj.resolved import resolved
 from cmg_mj.schema import ControllerSettings, Scenario
 
@@ -55,9 +56,13 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
         *([("", f"accelerometer: {assignments(imperfections)}")] if imperfections else []),
         *([("compare", f"{', '.join(compare.names())}; {compare.worlds} worlds")] if compare else []),
-        *(("push", f"{p.torque_n_m:g} N m from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
+        *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     return lines(f"{name}: valid", [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))])
+
+
+def _about(push: Push) -> str:
+    return "" if push.axis is None else f" about {push.axis}"
 
 
 def _law_rows(

@@ -147,8 +147,7 @@ class ScissoredPair(gymnasium.Env):
     def _start(self, experiment: Experiment, seed: int) -> None:
         self.experiment = experiment
         scenario, plant, dt = experiment.scenario, experiment.plant, experiment.law.dt
-        if len(plant.axes) > 1:
-            raise InputError(f"environment: {plant.path} has {len(plant.axes)} axes, of which an action turns one")
+        self.experiment.only_axis("an environment")
         self._worlds = OneWorld(plant)
         self._sensors = at_work(scenario.sensors, plant.timestep, seed, self._world)
         self._gyro = References(scenario.sensors.mems_gyro, dt, seed, self._world)
@@ -167,7 +166,7 @@ class ScissoredPair(gymnasium.Env):
     def _to_tick(self) -> Literal["tick", "end", "fall"]:
         """From moment to moment, as `simulate` goes, until a decision is due."""
         plant, worlds = self.experiment.plant, self._worlds
-        for step, count, torque in self._moments:
+        for step, count, (torque,) in self._moments:
             first, self._step, self._count = self._step < 0, step, count
             if torque is not self._torque:
                 self._torque = torque

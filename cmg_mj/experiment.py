@@ -82,7 +82,8 @@ class Experiment:
         """
         if self.axes:
             if processor is not None:
-                raise InputError(f"{self.plant.path}: a board or other processor runs one axis, not several")
+                self.only_axis("a board or other processor")
+                others["processor"] = processor
             return self._of_axes([own.controller(worlds, **others, axis=i) for i, own in enumerate(self.axes)])
         settings = self.scenario.controller
         given: dict[str, Any] = {"sensors": self.scenario.sensors} | others
@@ -109,8 +110,7 @@ class Experiment:
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
         """Run one world. Options are those of `simulate`."""
         if driver == "board":
-            if len(self.axes) > 1:
-                raise InputError(f"driver = 'board': {self.plant.path}: the board runs one axis, not several")
+            self.only_axis("the board")
             with on_a_board(self.controller()) as board:
                 return self.run_on(board, world, **options)
         return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
@@ -234,6 +234,22 @@ class Experiment:
             settings=scenario.metrics,
             **options,
         )
+
+    def only_axis(self, what: str) -> None:
+        """What takes one axis refuses a rig of several.
+
+        Args:
+            what: It.
+
+        Raises:
+            InputError: The rig has several.
+        """
+        if len(self.axes) > 1:
+            names = self.plant.axis_names
+            raise InputError(
+                f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one; lock the "
+                f'others, as with --set plant.locked_axes=["{names[-1]}"]'
+            )
 
     @property
     def hints(self) -> list[str]:

@@ -141,7 +141,8 @@ class LiveRun:
 
     def ended(self, result: Result) -> None:
         """Show the end."""
-        self._view.end(to_record(self._experiment, result))
+        (run,) = to_record(self._experiment, result)
+        self._view.end(run)
 
     def _show(self) -> None:
         assert self._rows is not None

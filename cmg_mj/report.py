@@ -20,7 +20,7 @@ from cmg_mj.observers.registry import OF_OBSERVERS
 from cmg_mj.own_class import Kind
 from cmg_mj.resources import bundled
 from cmg_mj.scenario import load_scenario
-from cmg_mj.summary_keys import KEYS, RIDING, difference, heading, spread, written
+from cmg_mj.summary_keys import AXES, KEYS, RIDING, difference, heading, spread, written
 from cmg_mj.worlds_table import riding_along
 
 WIDEST = 8
@@ -134,19 +134,27 @@ def summary_table(summary: Mapping[str, Any]) -> Group:
         title_justify="left",
         show_header=False,
     )
+    axes = summary.get(AXES) or {"": summary}
+    table.show_header = len(axes) > 1
     table.add_column()
-    table.add_column(justify="right")
+    for name in axes:
+        table.add_column(name, justify="right")
     table.add_row("Outcome", end)
     for key in KEYS:
         if key in summary:
-            table.add_row(_capitalised(heading(key)), written(key, summary[key]))
+            table.add_row(_capitalised(heading(key)), *(written(key, own.get(key)) for own in axes.values()))
+    return Group(table, *(riding for name, own in axes.items() if (riding := _riding(name, own)).row_count))
+
+
+def _riding(axis: str, summary: Mapping[str, Any]) -> Table:
+    """How well those that rode along estimated an axis' rate."""
     riding = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1))
-    riding.add_column("Riding along", vertical="bottom", overflow="fold")
+    riding.add_column(f"Riding along, {axis}" if axis else "Riding along", vertical="bottom", overflow="fold")
     for key in RIDING:
         riding.add_column(heading(key).replace(" [", "\n["), justify="right", vertical="bottom")
     for name, figures in riding_along(summary).items():
         riding.add_row(name, *(written(key, figures.get(key)) for key in RIDING))
-    return Group(table, riding) if riding.row_count else Group(table)
+    return riding
 
 
 def _title(text: str) -> Text:

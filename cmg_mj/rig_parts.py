@@ -50,6 +50,11 @@ class Cube:
     gimbal_zero: float
     speed: float
 
+    @property
+    def of_axis(self) -> str:
+        """Its name without the axis': `cube1` of `roll/cube1`."""
+        return self.name.rpartition("/")[2]
+
 
 def lacks(spec: mujoco.MjSpec) -> list[str]:
     """What a parsed model lacks: a rig has certain joints, actuators, sensors and a keyframe, by name.

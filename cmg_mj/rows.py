@@ -66,8 +66,8 @@ class Rows:
     ) -> None:
         self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
-        of_joints = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ()
-        self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), *of_joints)
+        names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
+        self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), names, kinds)
         self._joints = joints
         self._estimated = [(*ESTIMATES, *names) for names in extras]
         self._metrics = metrics

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from cmg_mj.report import run_title
 from cmg_mj.run_folder import RunFolder, claimed, write_text
 from cmg_mj.simulate import Driver, Result
 from cmg_mj.standings import standings, worlds_table
-from cmg_mj.summary_keys import finite
+from cmg_mj.summary_keys import AXES, RODE_ALONG, finite
 from cmg_mj.trajectory import Trajectory
 from cmg_mj.worlds_table import save_table
 
@@ -44,9 +45,10 @@ def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[s
     return finite(summary | result.summaries[world])
 
 
-def files_of_run(*, plot: bool = False) -> list[str]:
-    """Names of what a run writes."""
-    return ["trajectory.parquet", "summary.json", "scenario.toml", "recording.rrd", *(["plot.png"] if plot else [])]
+def files_of_run(experiment: Experiment, *, plot: bool = False) -> list[str]:
+    """Names of what a run writes; of a rig of several axes a plot each."""
+    plots = [f"plot-{name}.png" for name in experiment.plant.axis_names] if len(experiment.axes) > 1 else ["plot.png"]
+    return ["trajectory.parquet", "summary.json", "scenario.toml", "recording.rrd", *(plots if plot else [])]
 
 
 @quiet()
@@ -72,11 +74,11 @@ def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *
         lambda path: _write_json(path, summary),
         lambda path: experiment.save(path, result.driver, _world(result)),
         lambda path: _record(path, [(experiment, result)]),
-        lambda path: _plot(path, trajectory, summary, experiment),
+        *(partial(_plot, run=own, experiment=experiment) for own in to_record(experiment, result)),
     )
     with claimed(folder) as it:
         complete = result.outcomes[0].kind in ("done", "fell")
-        return it.write(dict(zip(files_of_run(plot=plot), writers, strict=False)), complete=complete)
+        return it.write(dict(zip(files_of_run(experiment, plot=plot), writers, strict=False)), complete=complete)
 
 
 def files_of_comparison(kinds: Sequence[str], *, plot: bool = False) -> list[str]:
@@ -154,24 +156,40 @@ def _which(result: Result, at: int = 0) -> dict[str, Any]:
     return driver | ({"world": world} if world else {})
 
 
-def _plot(path: Path, trajectory: Trajectory, summary: dict[str, Any], experiment: Experiment) -> None:
+def _plot(path: Path, run: Run, experiment: Experiment) -> None:
+    about = f", {run.axis}" if run.axis else ""
     plot_run(
         path,
-        trajectory,
-        run_title(summary),
-        summary,
+        run.trajectory,
+        run_title(run.summary) + about,
+        run.summary,
         settle_band_deg=experiment.scenario.metrics.settle_band_deg,
         rate_limit_rad_s=experiment.law.rate_limit,
     )
 
 
-def to_record(experiment: Experiment, result: Result) -> Run:
-    """One world's run as recordings take it."""
+def to_record(experiment: Experiment, result: Result, *, compared: bool = False) -> list[Run]:
+    """One world's run as recordings take it: of several axes a run each, by the axis' name.
+
+    Args:
+        experiment: What was run.
+        result: Its result.
+        compared: Whether there are others beside it: it then has its observer in its name.
+
+    Returns:
+        The runs.
+    """
     from cmg_mj.recording import Run
 
     assert result.trajectory is not None
-    summary = summary_of(experiment, result)
-    return Run(experiment.scenario.observer.kind, result.trajectory, summary, result.outcomes[0])
+    summary, outcome, observer = summary_of(experiment, result), result.outcomes[0], experiment.scenario.observer.kind
+    if not result.trajectory.axes:
+        return [Run(observer, result.trajectory, summary, outcome)]
+    common = {key: value for key, value in summary.items() if key not in (AXES, *RODE_ALONG)}
+    return [
+        Run(f"{observer}, {axis}" if compared else axis, result.trajectory.along(axis), common | own, outcome, axis)
+        for axis, own in summary[AXES].items()
+    ]
 
 
 def recording_title(experiment: Experiment, driver: Driver) -> str:
@@ -188,7 +206,7 @@ def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
     write_recording(
         path,
         experiment.plant,
-        [to_record(e, result) for e, result in runs],
+        [run for e, result in runs for run in to_record(e, result, compared=len(runs) > 1)],
         title=recording_title(experiment, first.driver),
         pushes=scenario.push,
         settings=scenario.metrics,

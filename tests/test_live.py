@@ -134,7 +134,7 @@ def test_wherever_it_is_cut_into_pieces(ticks: int, push: tuple[float, float], t
         growing.begin(rec)
         for first in range(0, len(result.trajectory) - ticks, ticks):
             growing.add(rec, rows(result.trajectory, first, first + ticks))
-        growing.end(rec, to_record(experiment, result))
+        growing.end(rec, *to_record(experiment, result))
         Path("streamed.rrd").write_bytes(memory.drain_as_bytes())
     save_run(RunFolder(Path("it"), []), experiment, result)
     assert_alike(Path("streamed.rrd"), Path("it/recording.rrd"))

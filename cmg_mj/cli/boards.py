@@ -67,6 +67,7 @@ def export(
     check_installed()
     experiment = prepare(Chosen(scenario, settings, None, out, as_json).scenario(observer))
     say_hints(experiment.hints)
+    experiment.only_axis("export")
     controller = experiment.controller()
     name = name_of(controller.observer, asked)
     place = Path("runs") / f"export-{name}-{precision}" if out is None else named(out)

@@ -81,7 +81,7 @@ def run(
     if scenario.compare:
         say("[compare] is for cmg-mj compare; this is one run")
     what = runs.file_name(scenario.observer.kind)
-    folder = chosen.folder(what, runs.files_of_run(plot=plot), experiment, driver, world)
+    folder = chosen.folder(what, runs.files_of_run(experiment, plot=plot), experiment, driver, world)
     shown = live_run(experiment, live, connect, pace, driver, world)
     with CtrlC() as ctrl_c, shown or nullcontext():
         with progress(scenario.title or chosen.name, scenario.duration_s, ctrl_c) as on_progress:
@@ -216,10 +216,15 @@ def check(file: str) -> None:
 
     is_model = Path(file).suffix.lower() == ".xml"
     scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file)
-    rig = known_rig(scenario.plant)
-    if rig is None:
-        from cmg_mj.experiment import load_rig  # MuJoCo, which a bundled rig does without
+    describe = rig_description if is_model else description
+    of_axes = scenario.axes or any(push.axis for push in scenario.push)
+    rig = None if of_axes else known_rig(scenario.plant)
+    if rig is not None:
+        words = [describe(file, scenario, design(scenario, rig), rig)]
+    else:
+        from cmg_mj.experiment import prepare  # MuJoCo, which a bundled rig does without
 
-        rig = load_rig(scenario).facts
-    words = (rig_description if is_model else description)(file, scenario, design(scenario, rig), rig)
-    click.echo(words, file=own_stdout())
+        experiment = prepare(scenario)
+        parts = [(f"{file}, axis {own.plant.axis.name}", own) for own in experiment.axes] or [(file, experiment)]
+        words = [describe(name, own.scenario, own.design, own.plant.facts) for name, own in parts]
+    click.echo("\n".join(words), file=own_stdout())

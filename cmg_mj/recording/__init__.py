@@ -53,24 +53,26 @@ def write_recording(
         raise ValueError(f"a recording needs runs of different names, not {names}")
     settings = settings or MetricsSettings()
     labels = shortened(names).values()
+    rigs = [plant if run.axis is None else plant.along(run.axis) for run in runs]
     branches = [
         Branch(
             path=f"/{part}",
             label=label,
-            series={row.path: row for row in series(run, plant, settings, rate_limit_rad_s)},
+            series={row.path: row for row in series(run, rig, settings, rate_limit_rad_s)},
             run=run,
-            rig=_around(run, plant),
+            rig=_around(run, rig),
         )
-        for part, label, run in zip(numbered(names), labels, runs, strict=True)
+        for part, label, run, rig in zip(numbered(names), labels, runs, rigs, strict=True)
     ]
     title_line = f"{title or 'Run'}: {', '.join(labels)}"
     with recorded(path, title_line, application_of(names, branches), default_blueprint(plant, branches)) as rec:
         end = max(run.outcome.time_s for run in runs)
-        for branch in branches:
-            log_rig(rec, branch.path, plant, branch.run, pushes)
+        for branch, rig in zip(branches, rigs, strict=True):
+            felt = branch.run.felt(pushes)
+            log_rig(rec, branch.path, rig, branch.run, felt)
             log_series(rec, branch)
             log_lane(rec, branch.path)
-            log_phases(rec, branch.path, phase_steps(branch.run, pushes, settings, end))
+            log_phases(rec, branch.path, phase_steps(branch.run, felt, settings, end))
         log_results(rec, runs, title, pushes, settings)
         log_scenario(rec, scenario_toml)
 

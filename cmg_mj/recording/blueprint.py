@@ -94,7 +94,7 @@ def _all_riding_along(branch: Branch) -> rrb.Container:
 def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]:
     """The best runs over each other, then, if there are more, all of them."""
     few = best_runs([branch.run for branch in branches])
-    cube = plant.cubes[0].name
+    cube = plant.cubes[0].of_axis
     shown = [branch for branch in branches if branch.run.name in few]
     tilt = [overlay(what, branches, cube, Choice(few)) for what in COMPARED_TILT_PLOTS]
     actuators = [overlay(what, branches, cube, Choice(few)) for what in COMPARED_ACTUATOR_PLOTS]

@@ -29,12 +29,18 @@ class Run:
         trajectory: One world's ticks, columns (n_ticks,).
         summary: The run's numbers, by the names that `--json` prints.
         outcome: How it ended.
+        axis: Which of the rig's axes, if it has several: trajectory and numbers are that axis'.
     """
 
     name: str
     trajectory: Trajectory
     summary: Mapping[str, Any]
     outcome: Outcome
+    axis: str | None = None
+
+    def felt(self, pushes: Sequence[Push]) -> list[Push]:
+        """Those of the pushes that are about this axis."""
+        return [push for push in pushes if self.axis is None or push.axis == self.axis]
 
     @property
     def observers(self) -> dict[str, Mapping[str, Any]]:

@@ -129,7 +129,7 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
         rows.append(_bounds("command/limit", "rate limit", time, rate_limit))
     for i, cube in enumerate(plant.cubes):
         color = CUBES[i % len(CUBES)]
-        part = rr.escape_entity_path_part(cube.name)
+        part = rr.escape_entity_path_part(cube.of_axis)
         angle = t[f"angle/{cube.name}/gimbal_rad"] - cube.gimbal_zero
         speed = t[f"rate/{cube.name}/flywheel_rad_s"] * np.sign(cube.speed)
         width = 3.0 if i == 0 and len(plant.cubes) > 1 else 1.5  # the cubes' speeds agree: one must shine through

@@ -103,7 +103,10 @@ def _outcome(run: Run) -> str:
 def _pushes(pushes: Sequence[Push]) -> str:
     if not pushes:
         return "No push."
-    listed = (f"{p.torque_n_m:+g} N m for {p.duration_s:g} s at {p.start_s:g} s" for p in pushes)
+    listed = (
+        f"{p.torque_n_m:+g} N m{f' about {p.axis}' if p.axis else ''} for {p.duration_s:g} s at {p.start_s:g} s"
+        for p in pushes
+    )
     return "Pushes: " + "; ".join(listed) + "."
 
 

@@ -47,6 +47,8 @@ def rig_of(scenario: Scenario) -> RigFacts:
     known = known_rig(scenario.plant)
     if known is not None:
         return known
-    from cmg_mj.experiment import load_rig  # brings MuJoCo
+    from cmg_mj.experiment import prepare  # brings MuJoCo
 
-    return load_rig(scenario).facts
+    experiment = prepare(scenario)
+    experiment.only_axis("replay")
+    return experiment.plant.facts

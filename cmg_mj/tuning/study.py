@@ -179,6 +179,7 @@ def tune(
     densities = sorted(dict.fromkeys(noise_ug_rthz or [own]))
     kind, settings = scenario.observer.kind, scenario.observer
     experiment = prepare(scenario)
+    experiment.only_axis("tuning")
     experiment.rehearse(worlds=2)
     given = parameters_of(kind, experiment.design.observer(), settings.parameters)
     numbers = numbers_of(kind, given, _maker(experiment), parameters)
