@@ -23,6 +23,8 @@ def read_off() -> dict[str, Any]:
                 plant = load_plant(model=name, lock_thrust_bearing=locked)
             except InputError:  # a module, which is no rig by itself
                 continue
+            if len(plant.axes) > 1:
+                continue
             cubes = [cube.name for cube in plant.cubes]
             rigs[name_of(name, locked=locked)] = {
                 "cubes": cubes,
