@@ -12,8 +12,9 @@ import numpy as np
 
 from cmg_mj.accelerometer import Accelerometer
 from cmg_mj.elementwise import Scalar
+from cmg_mj.felt_inertia import at_keyframe, inertia_about
 from cmg_mj.ideal import Ideal
-from cmg_mj.line import HingeLine, Line, line_at_site, line_of_joint
+from cmg_mj.line import Line, line_at_site, line_of_joint
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.rig_parts import LINE, Cube, cubes_of
 from cmg_mj.tilt import RadialTilt
@@ -124,7 +125,7 @@ def find_axis(model: mujoco.MjModel, key: int, name: str) -> Axis:
         The axis, without bias.
     """
     prefix = f"{name}/" if name else ""
-    data = _at_keyframe(model, key)
+    data = at_keyframe(model, key)
     joint, site = _id(model, "joint", prefix + LINE), _id(model, "site", prefix + LINE)
     if joint >= 0:
         line: Line | None = line_of_joint(model, joint, key)
@@ -164,18 +165,10 @@ def _cube(model: mujoco.MjModel, key: int, line: Line, name: str) -> Cube:
     zero = float(model.key_qpos[key, angle])
     speed = float(model.key_ctrl[key, motor])
     # A quarter turn back, the flywheel's momentum lies along the tilt axis; u > 0 turns it away from there.
-    inertia = _inertia_about(model, key, line, {angle: zero - QUARTER_TURN})
+    inertia = inertia_about(model, key, line, {angle: zero - QUARTER_TURN})
     direction = math.copysign(1.0, inertia.row[spin] * speed)
     addresses = angle, int(model.jnt_dofadr[gimbal]), int(model.jnt_qposadr[flywheel]), spin
     return Cube(name, *addresses, servo, motor, direction, zero, speed)
-
-
-@dataclass(frozen=True)
-class _Inertia:
-    """About a line: `row` couples a tilt with every joint, (nv,); `own` is the tilt's [kg m^2]."""
-
-    row: np.ndarray
-    own: float
 
 
 def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
@@ -191,62 +184,18 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     """
     n = len(axis.cubes)
     line = axis.line
-    upright = _inertia_about(model, key, line, {})
-    turned = _inertia_about(
-        model, key, line, {c.gimbal: c.gimbal_zero - c.direction * QUARTER_TURN for c in axis.cubes}
-    )
+    upright = inertia_about(model, key, line, {})
+    turned = inertia_about(model, key, line, {c.gimbal: c.gimbal_zero - c.direction * QUARTER_TURN for c in axis.cubes})
     J1 = upright.own / n
     J2 = turned.own / n - J1
     J_d = sum(abs(turned.row[c.flywheel_dof]) for c in axis.cubes) / n
     momentum = sum(turned.row[c.flywheel_dof] * c.speed for c in axis.cubes)
-    data = _at_keyframe(model, key)
+    data = at_keyframe(model, key)
     data.qvel[:] = 0.0
     line.tilt(data, QUARTER_TURN)
     mujoco.mj_forward(model, data)
     gravity_torque = -(line.motion(model, data) @ data.qfrc_bias) / n
     return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n)
-
-
-def _inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int, float]) -> _Inertia:
-    """The inertia of all that tilts at the keyframe, with some joint angles replaced.
-
-    What a hinge's body hangs on may move: the tilt then feels less inertia, that which is left when all that nothing
-    holds gives way. Under a body that stands on the floor the floor does not.
-    """
-    data = _at_keyframe(model, key)
-    for address, angle in angles.items():
-        data.qpos[address] = angle
-    mujoco.mj_forward(model, data)
-    dense = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, dense)
-    motion = line.motion(model, data)
-    row = motion @ dense
-    own = row @ motion
-    loose = _loose(model, data) if isinstance(line, HingeLine) else []
-    loose = [dof for dof in loose if not motion[dof]]
-    if loose:
-        gives = row[loose]
-        own = own - gives @ np.linalg.solve(dense[np.ix_(loose, loose)], gives)
-    return _Inertia(row, float(own))
-
-
-def _loose(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
-    """Degrees of freedom that neither a constraint nor a servo holds, flywheels and gimbals left out."""
-    held = set()
-    for constraint in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (data.eq_active == 1)):
-        held.add(int(model.jnt_dofadr[model.eq_obj1id[constraint]]))
-    for actuator in range(model.nu):
-        holds = model.actuator_biasprm[actuator, 1:3].any()  # a servo of position or rate
-        if holds and int(model.actuator_trntype[actuator]) == int(mujoco.mjtTrn.mjTRN_JOINT):
-            held.add(int(model.jnt_dofadr[model.actuator_trnid[actuator, 0]]))
-    return [dof for dof in range(model.nv) if dof not in held]
-
-
-def _at_keyframe(model: mujoco.MjModel, key: int) -> mujoco.MjData:
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, key)
-    mujoco.mj_forward(model, data)
-    return data
 
 
 def _id(model: mujoco.MjModel, kind: str, name: str) -> int:
