@@ -56,6 +56,11 @@ class Axis:
     bias: float = 0.0
     initial_tilt: float = 0.0
 
+    @property
+    def prefix(self) -> str:
+        """What its elements' names begin with."""
+        return f"{self.name}/" if self.name else ""
+
     @cached_property
     def servos(self) -> list[int]:
         """The gimbal servos' controls."""

@@ -146,8 +146,10 @@ def _type_at(place: Any, location: Sequence[Any]) -> Any:
     for part in location:
         if isinstance(part, int):
             place = _types_in(place)[0] if get_origin(place) is list else float
+        elif get_origin(place) is dict:  # [versions], [axes]
+            place = get_args(place)[1]
         else:
-            place = _section(place).get(part, str)  # below [versions] there is text
+            place = _section(place).get(part, str)
     return place
 
 

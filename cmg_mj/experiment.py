@@ -446,10 +446,14 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
     """
     known = [*plant.axis_names, *getattr(plant.settings, "locked_axes", ())]
     for name in scenario.axes:
+        if known == [""]:
+            raise InputError(f"axes.{name}: the rig has one axis, without a name; what it has stands in [plant], ...")
         if name not in known:
             raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
     for i, push in enumerate(scenario.push):
         if push.axis is None and len(known) > 1:
             raise InputError(f"push.{i}.axis: the rig has several axes: which of {', '.join(known)}?")
+        if push.axis is not None and known == [""]:
+            raise InputError(f"push.{i}.axis = {push.axis!r}: the rig has one axis, without a name; leave it out")
         if push.axis is not None and push.axis not in known:
             raise InputError(f"push.{i}.axis = {push.axis!r}: the rig has no such axis; {nearest(push.axis, known)}")

@@ -132,7 +132,7 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         )
     for name, (to, was) in given.items():
         if to is not None:
-            sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, f"{axis.name}/{name}".lstrip("/"))
+            sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, axis.prefix + name)
             site = int(model.sensor_objid[sensor])
             arm = model.site_pos[site] - axis.point
             model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (to / was - 1.0)

@@ -192,7 +192,7 @@ def _edge(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     """The frame's upper edge on the radial line, and where a positive torque moves it, both in the frame's axes."""
     model = plant.drawn_model
     axis, anchor = plant.axis.direction, plant.axis.point
-    site = model.site_pos[model.sensor("accelerometer_outer").objid[0]] - anchor
+    site = model.site_pos[model.sensor(plant.axis.prefix + "accelerometer_outer").objid[0]] - anchor
     radial = site - axis * (axis @ site)
     distance = float(np.linalg.norm(radial))
     radial = radial / distance
