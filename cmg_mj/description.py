@@ -14,6 +14,7 @@ from cmg_mj.loop_check import closed_loop, hints
 from cmg_mj.push import Push
 from cmg_mj.resolved import resolved
 from cmg_mj.schema import ControllerSettings, Scenario
+from cmg_mj.swing import Swing
 
 
 def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) -> str:
@@ -58,11 +59,12 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         *([("compare", f"{', '.join(compare.names())}; {compare.worlds} worlds")] if compare else []),
         *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
+    rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
     return lines(f"{name}: valid", [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))])
 
 
-def _about(push: Push) -> str:
-    return "" if push.axis is None else f" about {push.axis}"
+def _about(torque: Push | Swing) -> str:
+    return "" if torque.axis is None else f" about {torque.axis}"
 
 
 def _law_rows(

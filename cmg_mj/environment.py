@@ -157,7 +157,9 @@ class ScissoredPair(gymnasium.Env):
         self._period = whole_steps(dt, plant.timestep, "controller.rate_hz", f"{1.0 / dt:g} Hz")
         self._beat = math.gcd(self._period, *(sensor.beat for sensor in self._sensors))
         self._steps = whole_steps(scenario.duration_s, plant.timestep, "duration_s", f"{scenario.duration_s:g} s")
-        self._moments = moments(self._steps, self._beat, scenario.push, plant.timestep)
+        self._moments = moments(
+            self._steps, self._beat, scenario.push, plant.timestep, plant.axis_names, scenario.swing
+        )
         self._torque: Any = 0.0
         self._step = -1
         self._running = True

@@ -231,6 +231,7 @@ class Experiment:
             scenario.duration_s,
             observers={name: own.observer_names for name, own in zip(self.plant.axis_names, self._parts, strict=True)},
             pushes=scenario.push if pushes is None else pushes,
+            swings=scenario.swing,
             settings=scenario.metrics,
             **options,
         )
@@ -450,10 +451,12 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
             raise InputError(f"axes.{name}: the rig has one axis, without a name; what it has stands in [plant], ...")
         if name not in known:
             raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
-    for i, push in enumerate(scenario.push):
-        if push.axis is None and len(known) > 1:
-            raise InputError(f"push.{i}.axis: the rig has several axes: which of {', '.join(known)}?")
-        if push.axis is not None and known == [""]:
-            raise InputError(f"push.{i}.axis = {push.axis!r}: the rig has one axis, without a name; leave it out")
-        if push.axis is not None and push.axis not in known:
-            raise InputError(f"push.{i}.axis = {push.axis!r}: the rig has no such axis; {nearest(push.axis, known)}")
+    torques = [(f"push.{i}.axis", push.axis) for i, push in enumerate(scenario.push)]
+    torques += [(f"swing.{i}.axis", swing.axis) for i, swing in enumerate(scenario.swing)]
+    for field, axis in torques:
+        if axis is None and len(known) > 1:
+            raise InputError(f"{field}: the rig has several axes: which of {', '.join(known)}?")
+        if axis is not None and known == [""]:
+            raise InputError(f"{field} = {axis!r}: the rig has one axis, without a name; leave it out")
+        if axis is not None and axis not in known:
+            raise InputError(f"{field} = {axis!r}: the rig has no such axis; {nearest(axis, known)}")

@@ -44,10 +44,12 @@ def check_times(scenario: Scenario) -> None:
             whole_steps(period, timestep, field, shown)
         for field, time in _times(scenario):
             _check_grid(time, timestep, field, f"{time:g} s", lambda steps: f"{steps * timestep:g} s")
-    for i, push in enumerate(scenario.push):
-        if push.start_s >= scenario.duration_s:
+    torques = [(f"push.{i}", push.start_s) for i, push in enumerate(scenario.push)]
+    torques += [(f"swing.{i}", swing.start_s) for i, swing in enumerate(scenario.swing)]
+    for name, start in torques:
+        if start >= scenario.duration_s:
             raise InputError(
-                f"push.{i}.start_s = {push.start_s:g}: must be less than duration_s = {scenario.duration_s:g}, "
+                f"{name}.start_s = {start:g}: must be less than duration_s = {scenario.duration_s:g}, "
                 "where the run ends"
             )
 

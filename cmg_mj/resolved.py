@@ -51,8 +51,9 @@ def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float)
         "kind": scenario.observer.kind,
         **_parameters(scenario.observer.parameters, design.observer(), GIVEN),
     }
-    if not scenario.axes:
-        fields.pop("axes")
+    for rare in ("axes", "swing"):
+        if not fields[rare]:
+            fields.pop(rare)
     fields["versions"] = versions()
     return _plain(fields)
 

@@ -15,6 +15,7 @@ from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.push import Push
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.sensors import Sensors
+from cmg_mj.swing import Swing
 from cmg_mj.tilt import TiltNoise
 
 FORBID = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -150,6 +151,7 @@ class Scenario(BaseModel):
     axes: dict[str, AxisSettings] = Field(default_factory=dict)
     """What axes of several have of their own, by name."""
     push: list[Push] = Field(default_factory=list)
+    swing: list[Swing] = Field(default_factory=list)
     metrics: MetricsSettings = Field(default_factory=MetricsSettings)
     compare: CompareSettings | None = None
     """Written by `cmg-mj compare`, so that its scenario runs to the same comparison."""

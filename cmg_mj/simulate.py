@@ -26,6 +26,7 @@ from cmg_mj.push import Push
 from cmg_mj.references import RATES, References
 from cmg_mj.rows import Rows, RowsOfAxes
 from cmg_mj.stacked import of_worlds
+from cmg_mj.swing import Swing, swung
 from cmg_mj.timing import whole_steps
 from cmg_mj.trajectory import Trajectory
 from cmg_mj.whole_rig import of_the_rig
@@ -167,12 +168,21 @@ class Result:
 
 
 def moments(
-    steps: int, beat: int, pushes: Sequence[Push], timestep: float, axes: Sequence[str] = ("",)
+    steps: int,
+    beat: int,
+    pushes: Sequence[Push],
+    timestep: float,
+    axes: Sequence[str] = ("",),
+    swings: Sequence[Swing] = (),
 ) -> Iterator[tuple[int, int, list[Scalar]]]:
     """The moments at which the loop must look: (step, steps until the next, each axis' torque, one or a world's each).
 
     A push about an axis that the rig does not have, since it is locked, moves nothing.
     """
+
+    def at(step: int, count: int) -> list[Scalar]:
+        return swung(held, swings, axes, (step + 0.5 * count) * timestep)
+
     changes: dict[int, list[Scalar]] = {0: [0.0] * len(axes), steps: [0.0] * len(axes)}
     for push in pushes:
         for time, torque in ((push.start_s, push.torque_n_m), (push.end_s, -push.torque_n_m)):
@@ -183,17 +193,18 @@ def moments(
                 change[axes.index(about)] += torque
     edges = sorted(step for step in changes if step <= steps)
     torques: list[Scalar] = [0.0] * len(axes)
+    held = torques
     for start, end in itertools.pairwise(edges):
         torques = [torque + change for torque, change in zip(torques, changes[start], strict=True)]
         held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in torques]
         first = min(-(-start // beat) * beat, end)  # the first beat not before the push's edge
         if first > start:
-            yield start, first - start, held
+            yield start, first - start, at(start, first - start)
         last = max(end // beat * beat, first)
         for step in range(first, last, beat):
-            yield step, beat, held
+            yield step, beat, at(step, beat)
         if last < end:
-            yield last, end - last, held
+            yield last, end - last, at(last, end - last)
 
 
 @quiet()
@@ -204,6 +215,7 @@ def simulate(
     *,
     observers: Sequence[str] | Mapping[str, Sequence[str]],
     pushes: Sequence[Push] = (),
+    swings: Sequence[Swing] = (),
     settings: MetricsSettings | None = None,
     driver: Driver = "native",
     keep_trajectory: bool = True,
@@ -219,6 +231,7 @@ def simulate(
         duration_s: Simulated time [s].
         observers: Names of the controller's observer and companions; or of each axis' if they differ.
         pushes: Torques from outside; of many worlds a torque may be an array (n_worlds,).
+        swings: Others that swing.
         settings: What counts as settled and fallen.
         driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only).
         keep_trajectory: Whether to keep every tick; without it memory does not grow with the duration.
@@ -262,7 +275,7 @@ def simulate(
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
     try:
         with drive:
-            for step, count, held in moments(steps, controller.beat, pushes, timestep, names):
+            for step, count, held in moments(steps, controller.beat, pushes, timestep, names, swings):
                 if held is not torques:
                     torques = held
                     for axis, torque in enumerate(torques):

@@ -101,7 +101,7 @@ def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]
     rigs = rrb.Tabs(*(rig(branch, branch.label) for branch in shown), active_tab=0)
     names = _page_names(branches)
     board = _columns(
-        "Comparison",
+        "Comparison" if branches[0].run.axis is None else "All axes",
         [9, 8, 6],
         rrb.Vertical(rigs, pages(names, "Summary"), row_shares=[1, 1]),
         _below_lanes(shown, COMPARED_TILT_PLOTS, tilt),
