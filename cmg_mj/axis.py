@@ -163,15 +163,22 @@ def find_axis(model: mujoco.MjModel, key: int, name: str) -> Axis:
     return replace(axis, reduced=read_reduced(model, key, axis))
 
 
-def _cube(model: mujoco.MjModel, key: int, line: Line, name: str) -> Cube:
+def held_cubes(model: mujoco.MjModel, key: int, name: str) -> tuple[Cube, ...]:
+    """The modules of an axis that is locked, whose gimbals get no share of u."""
+    return tuple(_cube(model, key, None, cube) for cube in cubes_of(model, name))
+
+
+def _cube(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Cube:
     gimbal, flywheel = (_id(model, "joint", f"{name}/{joint}") for joint in ("gimbal", "flywheel"))
     servo, motor = (_id(model, "actuator", f"{name}/{drive}") for drive in ("gimbal_servo", "flywheel_motor"))
     angle, spin = int(model.jnt_qposadr[gimbal]), int(model.jnt_dofadr[flywheel])
     zero = float(model.key_qpos[key, angle])
     speed = float(model.key_ctrl[key, motor])
     # A quarter turn back, the flywheel's momentum lies along the tilt axis; u > 0 turns it away from there.
-    inertia = inertia_about(model, key, line, {angle: zero - QUARTER_TURN})
-    direction = math.copysign(1.0, inertia.row[spin] * speed)
+    direction = 0.0
+    if line is not None:
+        inertia = inertia_about(model, key, line, {angle: zero - QUARTER_TURN})
+        direction = math.copysign(1.0, inertia.row[spin] * speed)
     addresses = angle, int(model.jnt_dofadr[gimbal]), int(model.jnt_qposadr[flywheel]), spin
     return Cube(name, *addresses, servo, motor, direction, zero, speed)
 

@@ -26,10 +26,10 @@ def expected(annotation: Any) -> str:
     if origin is Literal:
         choices = ", ".join(repr(choice) for choice in arguments)
         return choices if len(arguments) == 1 else f"one of {choices}"
+    if origin is list or arguments[1:] == (...,):
+        return f"a list of {_plural(expected(arguments[0]))}"
     if origin is tuple:
         return f"a list of {len(arguments)} {_plural(expected(arguments[0]))}"
-    if origin is list:
-        return f"a list of {_plural(expected(arguments[0]))}"
     if base is bool:
         return "true or false"
     if base is str:

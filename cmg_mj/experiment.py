@@ -400,7 +400,7 @@ def load_rig(scenario: Scenario, like: Plant | None = None) -> Plant:
         period = common_period(scenario) if scenario.plant.timestep_s is None else None
         settings = scenario.plant
         of_axes = {name: of_axis(scenario, name).plant for name in scenario.axes}
-        same = ("model", "lock_thrust_bearing")
+        same = ("model", "lock_thrust_bearing", "locked_axes")
         if like is not None and all(getattr(like.settings, name) == getattr(settings, name) for name in same):
             plant = like.changed(settings, period, of_axes)
             check_steps(scenario, plant.timestep)

@@ -77,7 +77,8 @@ def known_rig(settings: PlantSettings) -> RigFacts | None:
     """
     path = find("models", settings.model, ".xml", "plant.model =")
     kept = folder("models") / FILE
-    if settings.changes() or settings.integrator != PlantSettings.integrator:
+    as_filed = not (settings.changes() or settings.locked_axes or settings.turn_rate_rad_s)
+    if not as_filed or settings.integrator != PlantSettings.integrator:
         return None  # only MuJoCo can say whether it goes with them, and at which step
     # What a linked model includes, MuJoCo looks for beside the link.
     if path.is_symlink() or path.resolve().parent != folder("models").resolve():

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
-import numpy as np
 
 from cmg_mj.errors import InputError
+from cmg_mj.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.model_files import check_files
 from cmg_mj.rig_check import Placement, numbers_that_are_none
 from cmg_mj.rig_parts import NEEDS, lacks
-
-_QPOS_SIZES = {0: 7, 1: 4, 2: 1, 3: 1}
-_QVEL_SIZES = {0: 6, 1: 3, 2: 1, 3: 1}
-"""Of a free joint, a ball, a slide and a hinge, by MuJoCo's mjtJoint."""
 
 
 def _one_line(error: Exception) -> str:
@@ -59,12 +56,13 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     return model
 
 
-def load_rig(path: Path, *, lock: bool) -> tuple[mujoco.MjModel, list[str]]:
+def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> tuple[mujoco.MjModel, list[str]]:
     """Read and compile a model, without what is only seen, and see that it is a rig.
 
     Args:
         path: The model's file.
         lock: Whether to take the yaw joint out.
+        locked_axes: Axes whose hinges to take out.
 
     Returns:
         The model, and what is right on it and yet not what the reduced model takes it for, in clauses.
@@ -93,6 +91,9 @@ def load_rig(path: Path, *, lock: bool) -> tuple[mujoco.MjModel, list[str]]:
         hints = [] if placement is None else placement.hints
     if wrong or model is None:
         raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([NEEDS] if missing else [])]))
+    if locked_axes:
+        lock_axes(spec, model, locked_axes, path)
+        model = compile_model(spec, path)
     return model, hints
 
 
@@ -110,16 +111,3 @@ def check_rig(path: Path, name: Path) -> None:
         load_rig(path, lock=False)
     except InputError as error:
         raise InputError(str(error).replace(str(path), str(name))) from error
-
-
-def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
-    """Take the yaw joint out, and its entry out of every keyframe."""
-    names = [joint.name for joint in spec.joints]
-    if "yaw" not in names:
-        raise InputError(f"plant.lock_thrust_bearing = true: {path} has no joint 'yaw' to lock")
-    before = spec.joints[: names.index("yaw")]
-    at = [sum(int(sizes[int(joint.type)]) for joint in before) for sizes in (_QPOS_SIZES, _QVEL_SIZES)]
-    spec.delete(spec.joint("yaw"))
-    for key in spec.keys:  # which may leave its rates out, or have them wrong, of which the compiler speaks
-        values = (key.qpos, at[0]), (key.qvel, at[1])
-        key.qpos, key.qvel = (np.delete(of, [index] if len(of) else []) for of, index in values)

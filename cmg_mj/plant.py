@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from cmg_mj.accelerometer import Accelerometer
 from cmg_mj.axes_controller import AxesController
-from cmg_mj.axis import Axis, find_axis, read_reduced
+from cmg_mj.axis import Axis, find_axis, held_cubes, read_reduced
 from cmg_mj.backlash import ARCMIN_A_DEGREE
 from cmg_mj.complaint import complaint
 from cmg_mj.controller import CONTROLLER_OPTIONS, Controller
@@ -29,7 +29,8 @@ from cmg_mj.ideal import Ideals
 from cmg_mj.known_rigs import RigFacts
 from cmg_mj.laws import Law, StateFeedback
 from cmg_mj.line import HingeLine
-from cmg_mj.mjcf import compile_model, load_rig, lock_thrust_bearing, parse
+from cmg_mj.locking import lock_axes, lock_thrust_bearing
+from cmg_mj.mjcf import compile_model, load_rig, parse
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.plant_settings import FINEST_STEP_S, PlantSettings
 from cmg_mj.processor import Processor, WithProcessor
@@ -41,7 +42,7 @@ from cmg_mj.sensors import Sensors
 from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
 from cmg_mj.turning import coupling
-from cmg_mj.variations import at_speed, place_accelerometers, vary
+from cmg_mj.variations import at_speed, place_accelerometers, turn, vary
 
 JOINT_KINDS = {
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name for name in ("hinge", "slide", "ball", "free")
@@ -70,13 +71,16 @@ class Plant:
         of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
     ) -> None:
         self.path = path
-        self.model, self.hints = load_rig(path, lock=settings.lock_thrust_bearing)
+        locked = settings.locked_axes
+        self.model, self.hints = load_rig(path, lock=settings.lock_thrust_bearing, locked_axes=locked)
         self._as_filed = self.model
         self.key = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, KEYFRAME))
         names = [self.model.joint(i).name for i in range(self.model.njnt)]
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in names else None
         sites = [self.model.site(i).name for i in range(self.model.nsite)]
-        self._axes_as_filed = tuple(find_axis(self.model, self.key, name) for name in axes_in([*names, *sites]))
+        axes = [name for name in axes_in([*names, *sites]) if name not in locked]
+        self._axes_as_filed = tuple(find_axis(self.model, self.key, name) for name in axes)
+        self._held = tuple(cube for name in locked for cube in held_cubes(self.model, self.key, name))
         self._take(settings, period_s, of_axes)
 
     def changed(
@@ -88,7 +92,7 @@ class Plant:
         """The same rig with other settings, without compiling its file again.
 
         Args:
-            settings: They name the same model file, and take the thrust bearing alike.
+            settings: They name the same model file, and lock the thrust bearing and axes alike.
             period_s: Where they leave the physics step open, what whole steps must fill [s].
             of_axes: What axes have of their own.
 
@@ -124,8 +128,13 @@ class Plant:
                 changed = replace(changed, reduced=read_reduced(self._as_filed, self.key, changed))
             axes.append(changed)
         self.axes = tuple(axes)
+        held = self._held
+        if settings.flywheel_speed_rad_s is not None:
+            held = at_speed(self.model, self.key, held, settings.flywheel_speed_rad_s, self.path)
+        if settings.turn_rate_rad_s:
+            turn(self.model, self.key, settings.turn_rate_rad_s, self.path)
         filed = float(self.model.opt.timestep)
-        vary(self.model, settings, self.path, self.axes)
+        vary(self.model, settings, self.path, self.axes, held)
         shaken = (
             max(abs(cube.speed) for axis in self.axes for cube in axis.cubes)
             if settings.flywheel_imbalance_kg_m
@@ -158,6 +167,9 @@ class Plant:
             if self.settings.lock_thrust_bearing:
                 lock_thrust_bearing(spec, self.path)
             model = compile_model(spec, self.path)
+            if self.settings.locked_axes:
+                lock_axes(spec, model, self.settings.locked_axes, self.path)
+                model = compile_model(spec, self.path)
         for axis in self._axes_as_filed:
             place_accelerometers(model, self._of_axes.get(axis.name, self.settings), axis, self.path)
         return model

@@ -27,6 +27,8 @@ class PlantSettings:
             the pushes' edges, follows the rig's fastest motion (`step_limit.py`) and is not above the model file's own.
         integrator: MuJoCo's integrator. Fast flywheels need RK4.
         lock_thrust_bearing: Take the yaw joint out.
+        locked_axes: Of several axes those whose hinges are taken out. Their cubes stay: wheels turning, gimbals held.
+        turn_rate_rad_s: At which the rig turns about the vertical from the start, held by its `yaw_servo` [rad/s].
         gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
         gimbal_friction_n_m: Dry friction of each gimbal [N m].
         gimbal_damping_n_m_s: Viscous friction of each gimbal [N m s/rad].
@@ -48,6 +50,8 @@ class PlantSettings:
     timestep_s: Annotated[float, Field(ge=FINEST_STEP_S, le=0.1)] | None = None
     integrator: Integrator = "RK4"
     lock_thrust_bearing: bool = False
+    locked_axes: tuple[str, ...] = ()
+    turn_rate_rad_s: float = 0.0
     gimbal_armature_kg_m2: NonNegative | None = None
     gimbal_friction_n_m: NonNegative | None = None
     gimbal_damping_n_m_s: NonNegative | None = None

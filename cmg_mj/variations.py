@@ -25,12 +25,15 @@ _INTEGRATORS = {
     "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
 }
 
+YAW_SERVO = "yaw_servo"
+
 
 def vary(
     model: mujoco.MjModel,
     settings: PlantSettings,
     path: Path,
     axes: Sequence[Axis],
+    held: Sequence[Cube] = (),
 ) -> None:
     """Change a compiled model as its settings say.
 
@@ -39,6 +42,7 @@ def vary(
         settings: What is to differ; what is left out stays.
         path: The file, for messages.
         axes: What the rig tilts about.
+        held: Modules of axes that are locked.
 
     Raises:
         InputError: The body that tilts has no mass of its own to move or no joint for friction, or a servo is none that
@@ -47,7 +51,7 @@ def vary(
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    cubes = [cube for axis in axes for cube in axis.cubes]
+    cubes = [*(cube for axis in axes for cube in axis.cubes), *held]
     gimbals = [cube.gimbal_dof for cube in cubes]
     friction = settings.tilt_friction_n_m is not None or settings.tilt_damping_n_m_s is not None
     tilts = [_hinge(axis, path) for axis in axes] if friction else []
@@ -99,6 +103,31 @@ def at_speed(model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: floa
         model.key_qvel[key, cube.flywheel_dof] = model.key_ctrl[key, cube.motor] = signed
         found.append(replace(cube, speed=signed))
     return tuple(found)
+
+
+def turn(model: mujoco.MjModel, key: int, rate: float, path: Path) -> None:
+    """Let the rig turn about the vertical from the start.
+
+    Args:
+        model: The model, whose keyframe is changed.
+        key: The keyframe.
+        rate: [rad/s].
+        path: The model's file, for messages.
+
+    Raises:
+        InputError: There is no drive that holds the rate, or it takes no such command.
+    """
+    said = f"plant.turn_rate_rad_s = {rate:g}: {path}"
+    joint, servo = (
+        int(mujoco.mj_name2id(model, kind, name))
+        for kind, name in ((mujoco.mjtObj.mjOBJ_JOINT, "yaw"), (mujoco.mjtObj.mjOBJ_ACTUATOR, YAW_SERVO))
+    )
+    if joint < 0 or servo < 0 or int(model.actuator_trnid[servo, 0]) != joint:
+        raise InputError(f"{said} has no actuator {YAW_SERVO!r} that drives a joint 'yaw', which alone holds a rate")
+    low, high = model.actuator_ctrlrange[servo]
+    if model.actuator_ctrllimited[servo] and not low <= rate <= high:
+        raise InputError(f"{said}: actuator {YAW_SERVO!r} takes only {low:g} to {high:g} rad/s (ctrlrange)")
+    model.key_qvel[key, model.jnt_dofadr[joint]] = model.key_ctrl[key, servo] = rate
 
 
 def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> RadialTilt:
