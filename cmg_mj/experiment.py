@@ -445,7 +445,7 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
     Raises:
         InputError: It does not.
     """
-    known = [*plant.axis_names, *getattr(plant.settings, "locked_axes", ())]
+    known = [*plant.axis_names, *plant.settings.locked_axes]
     for name in scenario.axes:
         if known == [""]:
             raise InputError(f"axes.{name}: the rig has one axis, without a name; what it has stands in [plant], ...")
