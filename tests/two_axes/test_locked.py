@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
+from cmg_mj.locking import take_out
 from cmg_mj.plant import load_plant
 from cmg_mj.plant_settings import PlantSettings
 from cmg_mj.resources import folder
@@ -89,6 +90,41 @@ def test_it_is_a_list_of_names() -> None:
     with pytest.raises(InputError, match=r"^plant.locked_axes = 'roll': must be a list of names in quotes$"):
         load_plant(model="two_axes.xml", locked_axes="roll")
     assert PlantSettings().locked_axes == ()
+
+
+def test_what_drives_reads_or_holds_a_hinge_goes_with_it() -> None:
+    """And its numbers in keyframes, between those of others."""
+    spec = mujoco.MjSpec.from_string("""
+    <mujoco>
+      <worldbody>
+        <body><freejoint name="base"/><geom size="0.1"/>
+          <body><joint name="a"/><geom size="0.1"/>
+            <body><joint name="b"/><geom size="0.1"/>
+              <body><joint name="c"/><geom size="0.1"/></body>
+            </body>
+          </body>
+        </body>
+      </worldbody>
+      <actuator>
+        <intvelocity name="a" joint="a" kp="1"/>
+        <velocity name="b1" joint="b" kv="1"/>
+        <intvelocity name="b2" joint="b" kp="1"/>
+        <intvelocity name="c" joint="c" kp="1"/>
+      </actuator>
+      <sensor><jointpos name="b" joint="b"/><jointpos name="c" joint="c"/></sensor>
+      <equality><joint joint1="a" joint2="b"/><joint joint1="a" joint2="c"/></equality>
+      <keyframe>
+        <key name="full" qpos="0 0 0 1 0 0 0 1 2 3" qvel="0 0 0 0 0 0 1 2 3" act="1 2 3" ctrl="1 2 2 3"/>
+        <key name="short" qpos="0 0 0 1 0 0 0 1 2 3"/>
+      </keyframe>
+    </mujoco>""")
+    take_out(spec, "b")
+    model = spec.compile()
+    assert (model.nu, model.nsensor, model.neq) == (2, 1, 1)
+    np.testing.assert_array_equal(model.key_qpos[:, 7:], [[1, 3], [1, 3]])
+    np.testing.assert_array_equal(model.key_qvel[0, 6:], [1, 3])
+    np.testing.assert_array_equal(model.key_act[0], [1, 3])
+    np.testing.assert_array_equal(model.key_ctrl[0], [1, 3])
 
 
 # --- turning ------------------------------------------------------------------------------------------------
