@@ -48,7 +48,7 @@ class Part(NamedTuple):
     """Coordinate and world axis (..., 3) of each joint on the way to it."""
 
 
-def _about(axis: str, angle: np.ndarray) -> np.ndarray:
+def _about(axis: str, angle: np.ndarray | float) -> np.ndarray:
     """Rotation matrices about x, y or z, (..., 3, 3); angles may be complex."""
     c, s, zero, one = np.cos(angle), np.sin(angle), 0.0 * angle, 1.0 + 0.0 * angle
     rows = {
@@ -83,7 +83,7 @@ class Chain:
         ]
         for i, (name, ((x, y), turned)) in enumerate(CUBES.items()):
             place = frame @ np.array([x, y, HEIGHT])
-            half = frame @ _about("z", np.float64(turned))
+            half = frame @ _about("z", turned)
             gimbal = half @ _about("x", q[..., 3 + 2 * i])
             wheel = gimbal @ _about("y", q[..., 4 + 2 * i])
             to_gimbal = [*three, (3 + 2 * i, half[..., :, 0])]
@@ -131,7 +131,7 @@ class Chain:
         return along - self._slopes(lambda at: self.kinetic(at, dq) - self.potential(at), q)
 
     @staticmethod
-    def _slopes(function, q: np.ndarray) -> np.ndarray:
+    def _slopes(function: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> np.ndarray:
         """The gradient by complex steps, which is exact to rounding."""
         steps = 1e-30j * np.eye(N)
         return np.stack([np.imag(function(q + step)) / 1e-30 for step in steps], axis=-1)
