@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -46,6 +47,15 @@ def test_the_tables_of_the_laws() -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.count("| `lqg`  ") == 1
     assert done.stdout.count("| (8), `kalman`") == 2
+
+
+def test_the_tables_of_two_axes() -> None:
+    command = [sys.executable, STUDIES / "two_axes.py", "--worlds", "1"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "c = [+0, +1], [-1, +0]" in done.stdout
+    assert re.search(r"w c sin.* \| +\+0.000 \| +\+0.000 \|\n", done.stdout)
+    assert re.search(r"wheel 10 % slow \| +0.0345 \|", done.stdout)
+    assert len(re.findall(r"\| (?:held|free)  \| 1/1 ", done.stdout)) == 4
 
 
 @pytest.mark.parametrize("study", sorted(path.name for path in STUDIES.glob("*.toml")))

@@ -1,150 +1,196 @@
-"""Two axes: what each does to the other, how fast the rig may turn, a gait's torque, a wheel that is slow.
+"""The two-axis rig in numbers: what it is, what couples its axes, and what wheels and gimbals that are not alike do.
 
-    python docs/studies/two_axes.py [--worlds 20]
+    python docs/studies/two_axes.py [--parts rig,turning,unlike,loop] [--worlds 8] [--observer homogeneous]
 
-Prints the tables of docs/two_axes.md.
+Torques are the full model's: what the joints are asked for at given rates, without accelerations, with the wheels
+turning less the same with the wheels at rest.
 """
 
 from __future__ import annotations
 
 import argparse
+import copy
 import math
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
 
+import mujoco
 import numpy as np
 
-from cmg_mj import markdown
-from cmg_mj.experiment import Experiment, prepare
-from cmg_mj.recoverable import ceiling
+from cmg_mj.experiment import prepare
+from cmg_mj.markdown import table
+from cmg_mj.plant import Plant, load_plant
+from cmg_mj.resources import folder
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 
-AXES = ("roll", "pitch")
-ERROR = "velocity_rms_error_rad_s"
-NO_BIAS = ("plant.equilibrium_bias_deg=0", "axes.pitch.plant.equilibrium_bias_deg=0")
-
-
-def two_axes(*settings: str) -> Experiment:
-    """The scenario with other settings."""
-    return prepare(load_scenario("two_axes", settings))
-
-
-def of_axis(result: Result, axis: str, key: str = ERROR) -> float:
-    """The mean over the worlds of an axis' figure."""
-    found = [summary.get("axes", {}).get(axis, summary)[key] for summary in result.summaries]
-    return float(np.mean(found))
+TILTS = ("yaw", "roll", "pitch")
+SLOW = {"0 0 0 0 314 0 -314": "0 0 0 0 282.6 0 -314", "0 0 314 0 -314": "0 0 282.6 0 -314"}
+"""In two_axes.xml: roll/cube1's wheel 10 % slow, in qvel and in ctrl."""
+FREE = {'<velocity name="yaw_servo" joint="yaw" kv="10"/>': "", 'ctrl="0 ': 'ctrl="'}
+"""Without the yaw servo."""
+NO_NOISE = (
+    "sensors.accelerometer.noise_density_ug_rthz=0",
+    "sensors.accelerometer.counts_per_g=0",
+    "sensors.encoder.counts_per_revolution=0",
+)
+AHEAD = math.radians(5.0)
 
 
-def each_on_the_other(worlds: int) -> str:
-    """Each axis' velocity error beside its own with the other locked."""
+def rig(changes: Mapping[str, str], place: str) -> str:
+    """A copy of the rig's files with other text: its path."""
+    for path in folder("models").glob("*.xml"):
+        text = path.read_text(encoding="utf-8")
+        for old, new in changes.items():
+            text = text.replace(old, new)
+        (Path(place) / path.name).write_text(text, encoding="utf-8")
+    return str(Path(place) / "two_axes.xml")
+
+
+def asked(
+    plant: Plant, rates: Mapping[str, float], x3: tuple[float, float], u: tuple[float, float], ahead: float = 0.0
+) -> np.ndarray:
+    """Torques on yaw, roll and pitch [N m]: roll/cube1's gimbal is ahead of its partner by an angle [rad]."""
+    torques = []
+    for share in (1.0, 0.0):
+        model = copy.copy(plant.model)
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, plant.key)
+        for axis, angle, rate in zip(plant.axes, x3, u, strict=True):
+            for cube in axis.cubes:
+                data.qpos[cube.gimbal] = cube.gimbal_zero + cube.direction * angle
+                data.qvel[cube.gimbal_dof] = cube.direction * rate
+                data.qvel[cube.flywheel_dof] *= share
+        first = plant.axis.cubes[0]
+        data.qpos[first.gimbal] += first.direction * ahead
+        for name, rate in rates.items():
+            data.joint(name).qvel[0] = rate
+        mujoco.mj_inverse(model, data)
+        torques.append([data.joint(name).qfrc_inverse[0] for name in TILTS])
+    return np.array(torques[0]) - torques[1]
+
+
+def the_rig() -> str:
+    """What it is, by axis."""
     rows = []
-    cases = [("homogeneous", ()), ("homogeneous, e = 0", NO_BIAS), ("adaptive", ()), ("gyro_free", ())]
-    for name, settings in cases:
-        kind = f"observer.kind={name.partition(',')[0]}"
-        for rate in (0.0, 1.0, 2.0, 3.0):
-            given = [*settings, kind, f"plant.turn_rate_rad_s={rate}"]
-            both = two_axes(*given).run_many(worlds, keep_trajectory=False)
-            row = [name, f"{rate:g}", f"{int(both.stood.sum())} of {worlds}"]
-            for axis, other in (AXES, AXES[::-1]):
-                alone = two_axes(*given, f'plant.locked_axes=["{other}"]').run_many(worlds, keep_trajectory=False)
-                with_it, without = of_axis(both, axis), of_axis(alone, axis)
-                row += [f"{with_it:.4f}", f"{without:.4f}", f"{with_it / without - 1.0:+.1%}"]
-            rows.append(row)
-    headings = ["observer", "turn [rad/s]", "stood"]
-    headings += [f"{axis}{what}" for axis in AXES for what in (" [rad/s]", ", other locked", "")]
-    return markdown.table(headings, rows)
+    for name in ("two_axes.xml", "two_axes_free_base.xml"):
+        plant = load_plant(model=name, equilibrium_bias_deg=0.0)
+        mass = float(plant.model.body("frame").subtreemass[0])
+        for axis in plant.axes:
+            own = axis.reduced
+            gravity, inertia = own.gimbals * own.gravity_torque, own.gimbals * own.J1
+            row = (mass, gravity / (mass * plant.gravity), inertia, own.J_d * own.omega_d / own.J1)
+            pole = math.sqrt(gravity / inertia)
+            cells = (f"{row[0]:.1f}", f"{row[1]:.4f}", f"{row[2]:.4f}", f"{row[3]:.3f}", f"{pole:.3f}")
+            rows.append([name, axis.name, *cells, f"{own.J2:.2g}"])
+    headings = ("model", "axis", "mass [kg]", "h [m]", "I [kg m^2]", "b [1/s]", "pole [1/s]", "J2 [kg m^2]")
+    return table(headings, rows, text_columns=2)
 
 
-def largest_tilt(worlds: int) -> str:
-    """The share of the ceiling tilt, on both axes at once, from which the rig recovers."""
-    rows = []
-    for model in ("two_axes", "two_axes_free_base"):
-        calm = ("push=[]", "plant.turn_rate_rad_s=0", *NO_BIAS, f"plant.model={model}", "duration_s=6")
-        first = two_axes(*calm)
-        limit = min(math.degrees(ceiling(own.design.rig.reduced, own.law.rate_limit).tilt) for own in first.axes)
-        row = [model, f"{limit:.2f}"]
-        for share in (0.8, 0.9, 0.95, 1.0):
-            result = two_axes(*calm, f"plant.initial_tilt_deg={share * limit}").run_many(worlds, keep_trajectory=False)
-            row.append(f"{int(result.stood.sum())} of {worlds}")
-        rows.append(row)
-    return markdown.table(["model", "ceiling [deg]", *(f"stood at {share}" for share in (0.8, 0.9, 0.95, 1.0))], rows)
-
-
-def fastest_turn(rates: Sequence[float] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)) -> str:
-    """At which turn rates one world stands."""
-    rows = []
-    for name, sign, against in (
-        ("as derived", 1.0, "true"),
-        ("none", 1.0, "false"),
-        ("of the wrong sign", -1.0, "true"),
-    ):
-        row = [name]
-        for rate in rates:
-            experiment = two_axes(f"plant.turn_rate_rad_s={rate}", f"controller.against_turning={against}")
-            experiment.plant.__dict__["coupling"] = sign * experiment.plant.coupling
-            outcome = experiment.run(keep_trajectory=False).outcomes[0]
-            row.append(f"fell at {outcome.time_s:.1f} s" if outcome.fell else "stands")
-        rows.append(row)
-    return markdown.table(["gimbals turned against it", *(f"{rate:g} rad/s" for rate in rates)], rows)
-
-
-def gait(worlds: int) -> str:
-    """A swinging torque on both axes, a quarter period apart."""
-    rows = []
-    for amplitude, frequency in ((0.5, 1.0), (0.5, 2.0), (1.0, 2.0), (1.5, 2.0)):
-        swings = ",".join(
-            f"{{frequency_hz={frequency}, amplitude_n_m={amplitude}, phase_deg={phase}.0, axis='{axis}'}}"
-            for axis, phase in zip(AXES, (0, 90), strict=True)
+def turning() -> str:
+    """What a turn at 1 rad/s asks of the tilts at x3 = 40 and 10 degrees, under several rates of the gimbals."""
+    plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)
+    c = plant.coupling
+    print("c =", ", ".join(f"[{', '.join(f'{value:+.0f}' for value in row + 0.0)}]" for row in np.round(c, 9)), "\n")
+    roll, pitch = x3 = math.radians(40.0), math.radians(10.0)
+    exact = c[0, 1] * math.sin(pitch) / math.cos(roll), c[1, 0] * math.sin(roll) / math.cos(pitch)
+    tangent = c[0, 1] * math.tan(pitch), c[1, 0] * math.tan(roll)
+    wrong = -exact[0], -exact[1]
+    rows = [
+        [name, *(f"{value:+.3f}" for value in (*u, *(asked(plant, {"yaw": 1.0}, x3, u)[1:] + 0.0).round(9)))]
+        for name, u in (
+            ("gimbals held", (0.0, 0.0)),
+            ("w c sin(x3 other)/cos(x3 own)", exact),
+            ("w c tan(x3 other)", tangent),
+            ("the wrong sign", wrong),
         )
-        for name, own in (
-            ("homogeneous", ()),
-            ("adaptive", ()),
-            ("adaptive", (f"observer.sinusoid_hz={frequency}",)),
-            ("gyro_free", ()),
-        ):
-            given = ("push=[]", "duration_s=30", f"swing=[{swings}]", f"observer.kind={name}", *own)
-            result = two_axes(*given).run_many(worlds, keep_trajectory=False)
-            told = ", told the frequency" if own else ""
-            figures = [f"{of_axis(result, axis, key):.3f}" for key in (ERROR, "tilt_rms_deg") for axis in AXES]
-            stood = int(result.stood.sum())
-            rows.append(
-                [f"{amplitude:g} N m, {frequency:g} Hz", name + told, f"{stood} of {worlds}"]
-                + (figures if stood == worlds else ["-"] * 4)
-            )
-    headings = [f"{what} {axis} [{unit}]" for what, unit in (("error", "rad/s"), ("tilt RMS", "deg")) for axis in AXES]
-    return markdown.table(["torque", "observer", "stood", *headings], rows)
+    ]
+    return table(("", "u roll [rad/s]", "u pitch [rad/s]", "on roll [N m]", "on pitch [N m]"), rows)
 
 
-def slow_wheel(worlds: int) -> str:
-    """A wheel of the roll pair slower than the others."""
+def unlike() -> str:
+    """What couples where a wheel is 10 % slow, or a gimbal 5 degrees ahead of its partner."""
     rows = []
-    for share in (1.0, 0.9, 0.8):
-        experiment = two_axes("plant.turn_rate_rad_s=0")
-        plant, cube = experiment.plant, experiment.plant.axes[0].cubes[0]
-        plant.model.key_qvel[plant.key, cube.flywheel_dof] *= share
-        plant.model.key_ctrl[plant.key, cube.motor] *= share
-        result = experiment.run_many(worlds)
-        assert result.trajectory is not None
-        yaw = np.degrees(np.abs(result.trajectory["angle/yaw_rad"]).max())
-        figures = [f"{of_axis(result, axis, key):.4f}" for axis in AXES for key in (ERROR, "gimbal_peak_deg")]
-        rows.append([f"{share:.0%}", f"{int(result.stood.sum())} of {worlds}", *figures, f"{yaw:.2f}"])
-    headings = [f"{axis} {what}" for axis in AXES for what in ("error [rad/s]", "gimbal peak [deg]")]
-    return markdown.table(["speed", "stood", *headings, "yaw, at most [deg]"], rows)
+    with tempfile.TemporaryDirectory() as place:
+        alike = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)
+        slow = load_plant(model=rig(SLOW, place), equilibrium_bias_deg=0.0)
+    still = (0.0, 0.0)
+    for name, plant, ahead in (
+        ("alike", alike, 0.0),
+        ("roll/cube1's wheel 10 % slow", slow, 0.0),
+        ("roll/cube1's gimbal 5 deg ahead", alike, AHEAD),
+    ):
+        own = plant.reduced
+        rows.append(
+            [
+                name,
+                *(
+                    f"{abs(value):.4f}"
+                    for value in (
+                        asked(plant, {"pitch": 1.0}, still, still, ahead)[1],
+                        asked(plant, {"yaw": 1.0}, still, still, ahead)[2],
+                        asked(plant, {"pitch": 1.0}, (0.5, 0.0), still, ahead)[0],
+                        asked(plant, {}, (0.5, 0.0), (1.0, 0.0), ahead)[0],
+                        own.J_d * own.omega_d / own.J1,
+                    )
+                ),
+            ]
+        )
+    headings = (
+        "wheels and gimbals",
+        "on roll, pitch at 1 rad/s [N m]",
+        "on pitch, yaw at 1 rad/s [N m]",
+        "on yaw, pitch at 1 rad/s, x3 0.5 [N m]",
+        "on yaw, u 1 rad/s, x3 0.5 [N m]",
+        "roll's b [1/s]",
+    )
+    return table(headings, rows)
+
+
+def loop(worlds: int, observer: str) -> str:
+    """The loop closed, roll pushed with 2 N m for 0.1 s: how far yaw goes, and pitch, which nobody pushes."""
+    rows = []
+    settings = [
+        *("controller.gains=carried_over", "plant.initial_tilt_deg=0", "plant.equilibrium_bias_deg=0", "duration_s=6"),
+        *("push.0.axis=roll", "push.0.start_s=2", "push.0.torque_n_m=2"),
+    ]
+    for wheels, slow in (("alike", {}), ("one 10 % slow", SLOW)):
+        for yaw, free in (("held", {}), ("free", FREE)):
+            angles = []
+            for more, count in ((NO_NOISE, 1), ((), worlds)):
+                with tempfile.TemporaryDirectory() as place:
+                    model = f"plant.model={rig({**slow, **free}, place)}"
+                    scenario = load_scenario("push_recovery", [model, *settings, *more]).with_observer(observer)
+                    experiment = prepare(scenario)
+                    found = experiment.run_many(count)
+                assert found.trajectory is not None
+                names = experiment.plant.joint_names
+                angles.append(np.degrees(found.trajectory.qpos()[..., [names.index(name) for name in TILTS]]))
+            (_, _, quiet), (yaw_peak, roll, pitch) = (np.abs(each).max(axis=0).mean(axis=0) for each in angles)
+            figures = (roll, quiet, pitch, yaw_peak, np.abs(angles[1][-1, :, 0]).mean())
+            rows.append([wheels, yaw, f"{int(found.stood.sum())}/{worlds}", *(f"{value:.3f}" for value in figures)])
+    headings = (
+        *("wheels", "yaw", "stood", "roll peak [deg]", "pitch peak without noise [deg]", "pitch peak [deg]"),
+        *("yaw peak [deg]", "yaw at the end [deg]"),
+    )
+    return table(headings, rows, text_columns=3)
 
 
 def main() -> None:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--worlds", type=int, default=20)
-    worlds = parser.parse_args().worlds
-    for title, table in (
-        ("Each axis beside its own with the other locked", each_on_the_other(worlds)),
-        ("The largest tilt, on both axes at once", largest_tilt(worlds)),
-        ("How fast the rig may turn", fastest_turn()),
-        ("A gait's torque on both axes", gait(worlds)),
-        ("A wheel of the roll pair that is slow", slow_wheel(worlds)),
-    ):
-        print(f"## {title}\n\n{table}\n", flush=True)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--parts", default="rig,turning,unlike,loop")
+    parser.add_argument("--worlds", type=int, default=8)
+    parser.add_argument("--observer", default="homogeneous")
+    of = parser.parse_args()
+    parts = {
+        "rig": the_rig,
+        "turning": turning,
+        "unlike": unlike,
+        "loop": lambda: loop(of.worlds, of.observer),
+    }
+    for part in of.parts.split(","):
+        print(parts[part](), end="\n\n")
 
 
 if __name__ == "__main__":
