@@ -54,7 +54,7 @@ def test_the_tables_of_two_axes() -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "c = [+0, +1], [-1, +0]" in done.stdout
     assert re.search(r"w c sin.* \| +\+0.000 \| +\+0.000 \|\n", done.stdout)
-    assert re.search(r"wheel 10 % slow \| +0.0345 \|", done.stdout)
+    assert re.search(r"wheel 10 % slow +\| +0.0345 \|", done.stdout)
     assert len(re.findall(r"\| (?:held|free)  \| 1/1 ", done.stdout)) == 4
 
 
