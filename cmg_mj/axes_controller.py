@@ -8,12 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmg_mj.controller import Controller
-from cmg_mj.elementwise import Scalar, clip, cos, sin, where
+from cmg_mj.elementwise import Scalar, clip, cos, dot, sin, where
 from cmg_mj.errors import InputError
 from cmg_mj.ideal import Ideals
 from cmg_mj.mems_gyro import MemsGyro
 from cmg_mj.observing import read_only
 from cmg_mj.sensors import normals
+from cmg_mj.turning import Turning
+
+Rows = Sequence[Sequence[float]]
 
 STREAM = 5
 """Of the noise of the gyro about the vertical: those before it are an axis' sensors'."""
@@ -22,22 +25,24 @@ STREAM = 5
 class AxesController:
     """Runs a controller an axis, tick after tick.
 
-    Where the rig turns about the vertical at w, the momentum that axis j's gimbals have turned out of the vertical is
-    swept round with it, and what torque that takes acts about axis i. Its gimbals cancel it at the rate
+    Where the rig turns about the vertical at w, the momenta of axis j, its wheels' and its tilt's, are swept round with
+    it, and what torque that takes acts about axis i. Its gimbals cancel it at the rate
 
-        u_i = w sum_j c_ij sin(x3_j) / cos(x3_i)
+        u_i = w sum_j (c_ij sin(x3_j) + d_ij x2_j) / cos(x3_i)
 
-    (`turning.py`), beside the law's own u. The observers are told the law's alone: the rest makes no torque.
+    (`Turning`) beside the law's own u, with the observers' x2_j. They are told the law's u alone: the rest makes no
+    torque. From the accelerometers' angular acceleration w k_ij x2_j is taken, with x2_j of the tick before. w is what
+    a cheap gyro about the frame's vertical shows.
 
     Args:
         parts: The controllers, one an axis, of one control period.
-        coupling: c_ij, (n_axes, n_axes); None for gimbals that are not turned against it.
+        turning: The coefficients; None for a rig whose turns are not minded.
 
     Raises:
         InputError: The control periods differ.
     """
 
-    def __init__(self, parts: Sequence[Controller], coupling: np.ndarray | None = None) -> None:
+    def __init__(self, parts: Sequence[Controller], turning: Turning | None = None) -> None:
         self.parts = tuple(parts)
         first = self.parts[0]
         if any(part.period != first.period for part in self.parts):
@@ -47,15 +52,16 @@ class AxesController:
         self.seed, self.worlds = first.seed, first.worlds
         self.beat = math.gcd(*(part.beat for part in self.parts))
         """Physics steps between the moments at which anything may be due."""
-        self._coupling = None if coupling is None else coupling.tolist()
+        self._turning = None if turning is None else [coefficients.tolist() for coefficients in turning]
         for part in self.parts:
-            part.turns_gimbals = coupling is None
+            part.turns_gimbals = turning is None
         self.reset()
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
         for part in self.parts:
             part.reset()
+            part.coriolis = None
         self.step: int | None = None
         """The physics step of the last update."""
         gyro: MemsGyro = self.sensors.mems_gyro
@@ -76,27 +82,24 @@ class AxesController:
         """
         self.step = step
         ticked = [part.update(step, ideal) for part, ideal in zip(self.parts, ideals.axes, strict=True)]
-        if ticked[0] and self._coupling is not None:
-            self._against_turning(ideals.turn_rate)
+        if ticked[0] and self._turning is not None:
+            self._against(ideals.turn_rate, *self._turning)
         return ticked[0]
 
-    def _against_turning(self, turn_rate: Scalar) -> None:
-        """Add to each axis' command what cancels the torque of the others' momentum that is swept round."""
-        shown = self._read(np.atleast_1d(turn_rate)[None, :])[0]
-        w = float(shown[0]) if type(turn_rate) is float else shown
-        ticks = [part.tick for part in self.parts]
-        swept = [sin(tick.y2) for tick in ticks if tick is not None]
-        for part, tick, row in zip(self.parts, ticks, self._coupling or (), strict=True):
-            assert tick is not None
-            added = 0.0 * w
-            for c, momentum in zip(row, swept, strict=True):
-                added = added + c * momentum
-            added = w * added / cos(tick.y2)
+    def _against(self, turn_rate: Scalar, wheels: Rows, body: Rows, shown: Rows) -> None:
+        """Add to each axis' command what cancels the torque of momenta that are swept round."""
+        read = self._read(np.atleast_1d(turn_rate)[None, :])[0]
+        w = float(read[0]) if type(turn_rate) is float else read
+        ticks = [part.tick for part in self.parts if part.tick is not None]
+        turned = [sin(tick.y2) for tick in ticks]
+        rates = [tick.estimates[0][1] for tick in ticks]
+        for part, tick, c, d, k in zip(self.parts, ticks, wheels, body, shown, strict=True):
+            added = w * (dot(c, turned) + dot(d, rates)) / cos(tick.y2)
             limit = part.law.rate_limit
-            u = clip(tick.u + added, -limit, limit)
-            kept = tick.u + added == u  # what is not limited stays to the last bit
-            own = where(kept, tick.u, u - added)
-            if type(own) is not float:
-                read_only(own)  # as in `Controller.decide`
-            part.tick = tick._replace(u=own)
-            part.turn(u)
+            total = clip(tick.u + added, -limit, limit)
+            u = where(tick.u + added == total, tick.u, total - added)  # the law's, as far as it was not limited
+            part.coriolis = none = w * dot(k, rates)
+            if type(u) is not float:
+                read_only(u, none)  # as in `Controller.decide`
+            part.tick = tick._replace(u=u)
+            part.turn(total)

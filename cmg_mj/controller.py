@@ -106,6 +106,8 @@ class Controller:
         self.seed = seed
         self.worlds = worlds
         self.axis = axis
+        self.coriolis: Scalar | None = None
+        """What in the accelerometers' angular acceleration is none, on a rig that turns [rad/s^2]."""
         self.turns_gimbals = True
         """Whether `update` does: with other axes, what a turn couples comes in between."""
         self.feedback: Feedback = feedback
@@ -236,6 +238,8 @@ class Controller:
             self.gimbal_angle(encoders),
             self.tilt.acceleration(forces[0], forces[2]),
         )
+        if self.coriolis is not None:
+            acceleration = acceleration - self.coriolis
         y = Measurement(y1, y2, acceleration)
         if not self._single:
             read_only(y1, y2, acceleration)  # observers and the law share them

@@ -105,7 +105,7 @@ class Experiment:
         if len(controllers) == 1:
             return controllers[0]
         against = self.scenario.controller.against_turning
-        return AxesController(controllers, self.plant.coupling if against else None)
+        return AxesController(controllers, self.plant.turning if against else None)
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
         """Run one world. Options are those of `simulate`."""

@@ -41,7 +41,7 @@ from cmg_mj.rig_parts import KEYFRAME, Cube, axes_in
 from cmg_mj.sensors import Sensors
 from cmg_mj.step_limit import largest_step
 from cmg_mj.tilt import RadialTilt
-from cmg_mj.turning import coupling
+from cmg_mj.turning import Turning, turning
 from cmg_mj.variations import at_speed, place_accelerometers, turn, vary
 
 JOINT_KINDS = {
@@ -103,7 +103,7 @@ class Plant:
             InputError: With these settings the physics fails.
         """
         other = copy.copy(self)
-        for made in ("drawn_model", "coupling"):
+        for made in ("drawn_model", "turning"):
             other.__dict__.pop(made, None)
         other._take(settings, period_s, of_axes)
         return other
@@ -201,9 +201,9 @@ class Plant:
         return [axis.name for axis in self.axes]
 
     @cached_property
-    def coupling(self) -> np.ndarray:
-        """What a turn about the vertical couples the axes by: see `turning.coupling`."""
-        return coupling(self._as_filed, self.key, self.axes)
+    def turning(self) -> Turning:
+        """What a turn about the vertical couples."""
+        return turning(self._as_filed, self.key, self.axes)
 
     def lean(self, qpos: Any) -> Scalar:
         """The tilt from the keyframe of the axis that is farthest from it [rad]."""
@@ -316,7 +316,7 @@ class Plant:
             alike = {"law": law, "sensors": sensors, "tilt": tilt, "backlash": backlash, **options}
             rigs = [self.along(name) for name in self.axis_names]
             return AxesController(
-                [rig.controller(observer, **alike, axis=i) for i, rig in enumerate(rigs)], self.coupling
+                [rig.controller(observer, **alike, axis=i) for i, rig in enumerate(rigs)], self.turning
             )
         law = law or StateFeedback(dt=0.005)
         sensors = sensors or Sensors()

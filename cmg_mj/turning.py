@@ -1,8 +1,9 @@
-"""What a turn about the vertical couples: the momentum that one axis' gimbals have turned down is swept round."""
+"""What a turn about the vertical couples: the momenta of one axis, its wheels' and its tilt's, are swept round."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -14,18 +15,36 @@ from cmg_mj.rig_parts import Cube
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def coupling(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> np.ndarray:
-    """By how much each axis' gimbals must turn against the other axes' momentum while the rig turns.
+class Turning(NamedTuple):
+    """By how much the axes of a rig that turns at w couple, (n_axes, n_axes) each, zero on the diagonals.
 
-    The wheels of axis j have, their gimbals at x3_j, the momentum s_j sin(x3_j) along the horizontal, where
-    s_j = sum over its cubes of direction (gimbal axis x momentum at x3 = 0); what is left of it along the vertical is
-    turned by nothing. In a frame that turns at w about the vertical z it changes by
+    In a frame that turns at w about the vertical z, with n_i along axis i, two momenta of axis j are swept round. That
+    of its wheels, its gimbals at x3_j, is s_j sin(x3_j), where s_j = sum over its cubes of direction (gimbal axis x
+    momentum at x3 = 0); it changes by
 
         s_j cos(x3_j) u_j + w (z x s_j) sin(x3_j),
 
-    and the frame gets the opposite torque. Of that about axis i, along n_i, nothing is left with
+    and the frame gets the opposite torque. That of all that tilts, whose inertia about the vertical is I_z and about
+    the axes I_i and I_j, tilting at x2_j, is a torque (I_i + I_j - I_z) w x2_j n_i . (n_j x z) about axis i (Euler's
+    equations in that frame). Of both nothing is left with
 
-        u_i = w sum_j c_ij sin(x3_j) / cos(x3_i),   c_ij = -n_i . (z x s_j) / (n_i . s_i).
+        u_i = w sum_j (c_ij sin(x3_j) + d_ij x2_j) / cos(x3_i),
+        c_ij = -n_i . (z x s_j)/(n_i . s_i),   d_ij = (I_i + I_j - I_z) n_i . (n_j x z)/(n_i . s_i).
+
+    And what accelerometers show as the angular acceleration about axis i has w k_ij x2_j in it that is none,
+    k_ij = 2 n_i . (z x n_j): Coriolis' acceleration, once of the frame and once of the point in it.
+    """
+
+    wheels: np.ndarray
+    """c [1]: for two axes at right angles whose pairs are alike +-1."""
+    body: np.ndarray
+    """d [s]."""
+    shown: np.ndarray
+    """k [1]."""
+
+
+def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> Turning:
+    """What a turn about the vertical couples.
 
     Args:
         model: The compiled model.
@@ -33,13 +52,20 @@ def coupling(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> np.ndarra
         axes: Its axes.
 
     Returns:
-        c, (n_axes, n_axes) [1]: for two axes at right angles whose pairs are alike +-1 beside a diagonal of zeros.
+        The coefficients, from the wheels' axes and speeds and the masses as the model has them.
     """
     data = at_keyframe(model, key)
     along = [data.xmat[axis.frame].reshape(3, 3) @ axis.direction for axis in axes]
     swept = [sum((_turned(model, data, cube) for cube in axis.cubes), np.zeros(3)) for axis in axes]
-    rows = [[-float(n @ np.cross(UP, s)) / float(n @ own) for s in swept] for n, own in zip(along, swept, strict=True)]
-    return np.array(rows)
+    pushes = [float(n @ own) for n, own in zip(along, swept, strict=True)]
+    rows = [(n, own, _inertia(model, data, axis)) for n, own, axis in zip(along, pushes, axes, strict=True)]
+    wheels = [[-float(n @ np.cross(UP, s)) / own for s in swept] for n, own, _ in rows]
+    body = [
+        [float((n @ about @ n + m @ about @ m - UP @ about @ UP) * (n @ np.cross(m, UP))) / own for m in along]
+        for n, own, about in rows
+    ]
+    shown = [[2.0 * float(n @ np.cross(UP, m)) for m in along] for n, _, _ in rows]
+    return Turning(np.array(wheels), np.array(body), np.array(shown))
 
 
 def _turned(model: mujoco.MjModel, data: mujoco.MjData, cube: Cube) -> np.ndarray:
@@ -49,3 +75,23 @@ def _turned(model: mujoco.MjModel, data: mujoco.MjData, cube: Cube) -> np.ndarra
     shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[wheel]  # of the principal inertias
     momentum = float(model.body_inertia[body] @ shares**2) * cube.speed * data.xaxis[wheel]
     return cube.direction * np.cross(data.xaxis[gimbal], momentum)
+
+
+def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarray:
+    """The inertia of all that tilts about a point of the line, in the world (3, 3) [kg m^2]."""
+    pivot = data.xpos[axis.frame] + data.xmat[axis.frame].reshape(3, 3) @ axis.point
+    found = np.zeros((3, 3))
+    for body in _tilting(model, int(model.jnt_bodyid[axis.line.joint])):
+        axes, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - pivot
+        found += axes @ np.diag(model.body_inertia[body]) @ axes.T
+        found += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return found
+
+
+def _tilting(model: mujoco.MjModel, root: int) -> list[int]:
+    """A body and all that hangs on it."""
+    found = {root}
+    for body in range(root + 1, model.nbody):  # children come after their parents
+        if int(model.body_parentid[body]) in found:
+            found.add(body)
+    return sorted(found)

@@ -1,6 +1,6 @@
-"""Two axes: what each does to the other, how fast the rig may turn, a gait's torque, a wheel that is slow.
+"""Two axes: what each does to the other, how fast the rig may turn, a gait's torque.
 
-    python docs/studies/two_axes.py [--worlds 20]
+    python docs/studies/two_axes_loop.py [--worlds 20]   (three minutes)
 
 Prints the tables of docs/two_axes.md.
 """
@@ -81,7 +81,8 @@ def fastest_turn(rates: Sequence[float] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.
         row = [name]
         for rate in rates:
             experiment = two_axes(f"plant.turn_rate_rad_s={rate}", f"controller.against_turning={against}")
-            experiment.plant.__dict__["coupling"] = sign * experiment.plant.coupling
+            derived = experiment.plant.turning
+            experiment.plant.__dict__["turning"] = derived._replace(wheels=sign * derived.wheels)
             outcome = experiment.run(keep_trajectory=False).outcomes[0]
             row.append(f"fell at {outcome.time_s:.1f} s" if outcome.fell else "stands")
         rows.append(row)
@@ -115,23 +116,6 @@ def gait(worlds: int) -> str:
     return markdown.table(["torque", "observer", "stood", *headings], rows)
 
 
-def slow_wheel(worlds: int) -> str:
-    """A wheel of the roll pair slower than the others."""
-    rows = []
-    for share in (1.0, 0.9, 0.8):
-        experiment = two_axes("plant.turn_rate_rad_s=0")
-        plant, cube = experiment.plant, experiment.plant.axes[0].cubes[0]
-        plant.model.key_qvel[plant.key, cube.flywheel_dof] *= share
-        plant.model.key_ctrl[plant.key, cube.motor] *= share
-        result = experiment.run_many(worlds)
-        assert result.trajectory is not None
-        yaw = np.degrees(np.abs(result.trajectory["angle/yaw_rad"]).max())
-        figures = [f"{of_axis(result, axis, key):.4f}" for axis in AXES for key in (ERROR, "gimbal_peak_deg")]
-        rows.append([f"{share:.0%}", f"{int(result.stood.sum())} of {worlds}", *figures, f"{yaw:.2f}"])
-    headings = [f"{axis} {what}" for axis in AXES for what in ("error [rad/s]", "gimbal peak [deg]")]
-    return markdown.table(["speed", "stood", *headings, "yaw, at most [deg]"], rows)
-
-
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -142,7 +126,6 @@ def main() -> None:
         ("The largest tilt, on both axes at once", largest_tilt(worlds)),
         ("How fast the rig may turn", fastest_turn()),
         ("A gait's torque on both axes", gait(worlds)),
-        ("A wheel of the roll pair that is slow", slow_wheel(worlds)),
     ):
         print(f"## {title}\n\n{table}\n", flush=True)
 

@@ -66,7 +66,9 @@ def asked_of(
 
 def against(plant: Plant, w: float, angles: list[float]) -> list[float]:
     """u_i = w sum_j c_ij sin(x3_j)/cos(x3_i)."""
-    return [w * float(row @ np.sin(angles)) / math.cos(own) for row, own in zip(plant.coupling, angles, strict=True)]
+    return [
+        w * float(row @ np.sin(angles)) / math.cos(own) for row, own in zip(plant.turning.wheels, angles, strict=True)
+    ]
 
 
 ANGLES = [[0.7, 0.2], [-0.4, 1.0], [0.0, -0.9], [0.5, 0.5]]
@@ -110,10 +112,10 @@ def test_the_wrong_sign_doubles_it(plant: Plant) -> None:
 def test_signs_and_sizes_follow_the_wheels() -> None:
     """c_ij from the wheels' axes and speeds: none of them is assumed."""
     plant = load_plant(model="two_axes.xml")
-    np.testing.assert_allclose(plant.coupling, [[0.0, 1.0], [-1.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(plant.turning.wheels, [[0.0, 1.0], [-1.0, 0.0]], atol=1e-12)
     half = load_plant(model="two_axes.xml", flywheel_speed_rad_s=157.0)
-    np.testing.assert_allclose(half.coupling, plant.coupling, atol=1e-12)
-    assert load_plant(model="two_axes.xml", locked_axes=["pitch"]).coupling.shape == (1, 1)
+    np.testing.assert_allclose(half.turning.wheels, plant.turning.wheels, atol=1e-12)
+    assert load_plant(model="two_axes.xml", locked_axes=["pitch"]).turning.wheels.shape == (1, 1)
 
 
 def rig_with(tmp_path: Path, *changes: tuple[str, str]) -> Plant:
@@ -190,3 +192,43 @@ def test_a_gimbal_that_is_off_pushes_yaw_and_is_made_up_for_on_the_mean() -> Non
     mean = against(plant, 1.0, [off / 2.0, 0.0])
     _, _, left = asked_of(plant, {"yaw": 1.0}, still, mean, off)
     assert abs(left) < 1e-3 * abs(pitch)
+
+
+def asked(plant: Plant, rates: dict[str, float]) -> np.ndarray:
+    """Torques on roll and pitch without accelerations, the wheels standing [N m]."""
+    data = mujoco.MjData(plant.model)
+    mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
+    data.qvel[:] = 0.0
+    for name, rate in rates.items():
+        data.joint(name).qvel[0] = rate
+    mujoco.mj_inverse(plant.model, data)
+    return np.array([data.joint(name).qfrc_inverse[0] for name in ("roll", "pitch")])
+
+
+def test_a_tilt_that_is_swept_round_tilts_the_other_axis(plant: Plant) -> None:
+    """By (I_roll + I_pitch - I_yaw) w x2; gimbals turned at w d x2 push as much the other way."""
+    w, rate = 1.5, 0.2
+    for i, j, moving in ((0, 1, "pitch"), (1, 0, "roll")):
+        both, alone, turn = ({"yaw": w, moving: rate}, {moving: rate}, {"yaw": w})
+        swept = (asked(plant, both) - asked(plant, alone) - asked(plant, turn))[i]
+        u = [0.0, 0.0]
+        u[i] = w * plant.turning.body[i, j] * rate
+        pushed = asked_of(plant, {}, [0.0, 0.0], u)[1 + i]
+        assert abs(swept) > 0.1
+        assert pushed == pytest.approx(-swept, rel=1e-3)
+
+
+def test_what_accelerometers_show_of_a_tilt_that_is_swept_round(plant: Plant) -> None:
+    w, rate = 1.5, 0.2
+    for i, j, moving in ((0, 1, "pitch"), (1, 0, "roll")):
+        data = plant.new_data()
+        mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
+        data.joint("yaw").qvel[0], data.joint(moving).qvel[0] = w, rate
+        mujoco.mj_forward(plant.model, data)
+        axis = plant.axes[i]
+        forces = axis.ideal(data.sensordata, data.qvel).accelerations
+        shown = axis.radial_tilt.acceleration(forces[0], forces[2])
+        true = axis.line.rate(data.qacc)
+        assert shown - true == pytest.approx(
+            w * plant.turning.shown[i, j] * rate, rel=1e-2
+        )  # the free base gives a little
