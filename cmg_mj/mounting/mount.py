@@ -29,6 +29,8 @@ from cmg_mj.trajectory import whole_file
 
 LARGEST_STEP_S = 0.005
 """A robot's file that asks for larger steps is given these: the gimbals' servos need them [s]."""
+ITERATIONS, TOLERANCE = 100, 1e-8
+"""Of the solver, MuJoCo's own: a file that is content with less lets held joints creep."""
 SMALLEST_HEIGHT_M = 1e-3
 """Less far above the line a robot's mass is not above it [m]."""
 SCALES = 0.05, 20.0
@@ -236,6 +238,10 @@ def _set_options(spec: mujoco.MjSpec) -> list[str]:
     if int(option.integrator) != int(mujoco.mjtIntegrator.mjINT_RK4):
         option.integrator = mujoco.mjtIntegrator.mjINT_RK4
         notes.append("its integrator is now RK4, which fast flywheels need")
+    if int(option.solver) != int(mujoco.mjtSolver.mjSOL_NEWTON):
+        option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        notes.append("its solver is now Newton: another does not hold joints stiffly")
+    option.iterations, option.tolerance = max(option.iterations, ITERATIONS), min(option.tolerance, TOLERANCE)
     if option.timestep > LARGEST_STEP_S:
         notes.append(f"its physics steps of {option.timestep * 1e3:g} ms are now {LARGEST_STEP_S * 1e3:g} ms")
         option.timestep = LARGEST_STEP_S

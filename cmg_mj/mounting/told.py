@@ -20,7 +20,9 @@ from cmg_mj.trajectory import whole_file
 START_DEG, SHARE_OF_CEILING = 1.0, 0.25
 """A run starts with one degree of tilt, or with a quarter of the ceiling if that is less."""
 SHARE_OF_BORNE = 0.6
-PUSHED_AT_S = 5.0
+PUSHED_AT_S, DURATION_S = 10.0, 20.0
+"""A run lets the gimbals come back from the first tilt before it pushes: E is borne by gimbals that stand upright.
+Those of a slow robot, whose pole is 3 1/s, need so long."""
 
 
 def write_scenario(model: Path, robot: Path, observer: str, can: Prospects | None = None) -> Experiment:
@@ -38,7 +40,7 @@ def write_scenario(model: Path, robot: Path, observer: str, can: Prospects | Non
     tilt = min(START_DEG, SHARE_OF_CEILING * math.degrees(can.ceiling.tilt)) if can else 0.0
     fields = {
         "title": f"{robot.stem}, balanced",
-        "duration_s": 15.0,
+        "duration_s": DURATION_S,
         "plant": {"model": model.name, "equilibrium_bias_deg": 0.0, "initial_tilt_deg": float(f"{tilt:.3g}")},
         "controller": {"gains": "carried_over"},
         "observer": {"kind": observer},

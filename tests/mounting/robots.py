@@ -28,10 +28,10 @@ ROBOTS = {
         gymnasium_asset("inverted_pendulum.xml"), {"body": "pole", "axis": "hinge", "free": ["slider"]}
     ),
     "inverted_double_pendulum, its joint held": Robot(
-        gymnasium_asset("inverted_double_pendulum.xml"), {"body": "pole"}
+        gymnasium_asset("inverted_double_pendulum.xml"), {"body": "pole", "scale": 1.1}
     ),
     "hopper, freed": Robot(
-        gymnasium_asset("hopper.xml"), {"body": "torso", "axis": "x", "base": "free", "scale": 1.5}, True
+        gymnasium_asset("hopper.xml"), {"body": "torso", "axis": "x", "base": "free", "scale": 2.0}, True
     ),
     "walker2d, freed": Robot(
         gymnasium_asset("walker2d_v5.xml"),
@@ -39,6 +39,6 @@ ROBOTS = {
         True,
     ),
     "humanoid": Robot(gymnasium_asset("humanoid.xml"), {"body": "torso", "axis": "y", "scale": 2.2}, True),
-    "torso": Robot(EXAMPLES / "torso.xml", {"body": "torso", "axis": "x"}, True),
+    "torso": Robot(EXAMPLES / "torso.xml", {"body": "torso", "axis": "x", "scale": 1.21}, True),
     "bicycle": Robot(EXAMPLES / "bicycle.xml", {"body": "frame", "axis": "x", "at": (0.0, 0.0, 0.3)}, True),
 }
