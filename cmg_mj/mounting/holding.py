@@ -14,8 +14,13 @@ from cmg_mj.errors import InputError, nearest
 Hold = Literal["constraints", "servos"]
 IMPEDANCE = 0.9999
 """Of a constraint that holds a joint, MuJoCo's largest. What it lacks of 1 is the share of every acceleration that the
-joint gives way by: with MuJoCo's default of 0.9 to 0.95 a trunk on its waist jerks with every change of the command, and
-its accelerometers show that as tilt."""
+joint gives way by: with MuJoCo's default of 0.9 to 0.95 a trunk on its waist jerks with every change of the command,
+and its accelerometers show that as tilt."""
+
+
+def held_name(joint: str) -> str:
+    """What the constraint that holds a joint is called."""
+    return f"{joint}_held"
 
 
 def hold_joints(
@@ -34,7 +39,7 @@ def hold_joints(
         model: The same, compiled.
         pose: Where the joints stand, (nq,).
         how: `constraints`: all joints; `servos`: those that no actuator of the robot's drives.
-        moving: Joints that tilt the robot, which are left alone.
+        moving: Joints that tilt the robot, and those of modules: they are left alone, or let go if they were held.
         loose: Joints that the user wants free.
         path: The file, for messages.
 
@@ -49,7 +54,11 @@ def hold_joints(
         if name not in names:
             raise InputError(f"--free {name}: {path} has no such joint; {nearest(name, names, 'its joints')}")
     own = [actuator.target for actuator in spec.actuators] if how == "servos" else []
-    held = [name for name in names if name not in {*moving, *loose, *own}]
+    already = [name for name in names if spec.equality(held_name(name))]
+    for name in already:
+        if name in {*moving, *loose}:
+            spec.delete(spec.equality(held_name(name)))
+    held = [name for name in names if name not in {*moving, *loose, *own, *already}]
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
@@ -69,7 +78,7 @@ def hold_joints(
             inverse = data.xquat[parent] * [1.0, -1.0, -1.0, -1.0]
             mujoco.mju_mulQuat(relative, inverse, data.xquat[body])
             tie = spec.add_equality(
-                name=f"{name}_held",
+                name=held_name(name),
                 type=mujoco.mjtEq.mjEQ_WELD,
                 objtype=mujoco.mjtObj.mjOBJ_BODY,
                 name1=model.body(parent).name,
@@ -79,7 +88,7 @@ def hold_joints(
             tie.data[:] = [0.0, 0.0, 0.0, *at, *relative, 1.0]
         else:
             tie = spec.add_equality(
-                name=f"{name}_held", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name
+                name=held_name(name), type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name
             )
             address = int(joint.qposadr[0])
             tie.data[:] = 0.0

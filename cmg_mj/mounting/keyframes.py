@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
 
 from cmg_mj.mounting.robot import joint_sizes
+from cmg_mj.rig_parts import KEYFRAME
 
 Poses = Mapping[str, np.ndarray]
 """Where each joint stands, by its name."""
@@ -66,11 +67,7 @@ def write_keyframe(
 def taken_out(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[tuple[str, dict[str, np.ndarray]]]:
     """Take a robot's own keyframes out, before it gets more joints: their names, and where the joints stand."""
     kept = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
+    kept = [(name, poses) for name, poses in kept if name != KEYFRAME]  # of an axis mounted earlier: written anew
     for key in list(spec.keys):
         spec.delete(key)
     return kept
-
-
-def only_moving(names: Sequence[str], speeds: Mapping[str, float]) -> dict[str, float]:
-    """Of speeds by name, those of some joints."""
-    return {name: speed for name, speed in speeds.items() if name in names}

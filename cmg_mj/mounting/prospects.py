@@ -10,8 +10,8 @@ from typing import Any
 from cmg_mj.bearable import PUSH_S, Bearable, bearable
 from cmg_mj.engine import control_callback, quiet
 from cmg_mj.experiment import Experiment
+from cmg_mj.mounting.asked import SCALES
 from cmg_mj.mounting.falling import falls_with
-from cmg_mj.mounting.mount import SCALES
 from cmg_mj.recoverable import Ceiling, ceiling
 from cmg_mj.reduced import ReducedModel
 

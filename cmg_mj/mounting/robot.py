@@ -11,7 +11,6 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.mjcf import compile_model, parse
-from cmg_mj.rig_parts import KEYFRAME
 
 BAD_CONNECTIONS = {
     int(mujoco.mjtEq.mjEQ_CONNECT): "connect",
@@ -99,8 +98,7 @@ def check_names(spec: mujoco.MjSpec, names: Sequence[str], path: Path) -> None:
         for kind in (spec.bodies, spec.joints, spec.sites, spec.sensors, spec.actuators)
         for element in kind
     }
-    taken |= {key.name for key in spec.keys}
-    for name in [*names, KEYFRAME]:
+    for name in names:
         if name in taken:
             raise InputError(f"{path}: has an element {name!r} already, which a mounted pair brings: rename it")
 

@@ -11,7 +11,7 @@ import tomli_w
 from cmg_mj.bearable import PUSH_S
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.line import HingeLine
-from cmg_mj.mounting.mount import Mounted
+from cmg_mj.mounting.mounted import Mounted
 from cmg_mj.mounting.prospects import LOW_CEILING_DEG, Prospects
 from cmg_mj.plant import Plant
 from cmg_mj.scenario import load_scenario
