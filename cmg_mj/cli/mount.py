@@ -97,16 +97,16 @@ def mount(
             raise InputError(f"-o {out}: {path} exists; give another name, or --overwrite")
     found = mounted_at(scale)
     target = found.save(target)
-    experiment = write_scenario(target, found.path, observer)
-    can = prospects(experiment)
-    experiment = write_scenario(target, found.path, observer, can)
+    can = prospects(write_scenario(target, found.path, observer, axis=name), name)
+    experiment = write_scenario(target, found.path, observer, can, name)
+    plant = experiment.plant.along(name)
     enough = None
     if math.degrees(can.ceiling.tilt) < LOW_CEILING_DEG:
 
         def ceiling_at(size: float) -> float:
             trial = mounted_at(size).save(target.with_name(f".{target.name}.trial.xml"))
             try:
-                return ceiling(load_plant(model=str(trial)).reduced, experiment.law.rate_limit).tilt
+                return ceiling(load_plant(model=str(trial)).along(name).reduced, experiment.law.rate_limit).tilt
             finally:
                 trial.unlink()
 
@@ -115,7 +115,7 @@ def mount(
         figures = can.figures() | {"model": str(target), "held": list(found.held), "scale_that_suffices": enough}
         click.echo(json.dumps(figures, indent=2))
         return
-    for line in told(found, experiment.plant, can, enough):
+    for line in told(found, plant, can, enough):
         click.echo(line)
     say_hints(can.hints)
     say(f"wrote {target} and {target.with_suffix('.toml')}; try: cmg-mj run {target.with_suffix('.toml')}")

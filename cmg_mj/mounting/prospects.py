@@ -69,15 +69,18 @@ class Prospects:
         }
 
 
-def prospects(experiment: Experiment) -> Prospects:
+def prospects(experiment: Experiment, axis: str = "") -> Prospects:
     """Find what a pair can do.
 
     Args:
         experiment: The robot, and the controller it is to have.
+        axis: Which axis of several, by its name.
 
     Returns:
         The prospects.
     """
+    of_axis = [own for own in experiment.axes if own.plant.axis.name == axis]
+    experiment = of_axis[0] if of_axis else experiment
     plant = experiment.plant
     top = ceiling(plant.reduced, experiment.law.rate_limit)
     with control_callback(None), quiet():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 
@@ -25,7 +26,7 @@ PUSHED_AT_S, DURATION_S = 10.0, 20.0
 Those of a slow robot, whose pole is 3 1/s, need so long."""
 
 
-def write_scenario(model: Path, robot: Path, observer: str, can: Prospects | None = None) -> Experiment:
+def write_scenario(model: Path, robot: Path, observer: str, can: Prospects | None = None, axis: str = "") -> Experiment:
     """Write a scenario beside a model that carries a pair.
 
     Args:
@@ -33,21 +34,27 @@ def write_scenario(model: Path, robot: Path, observer: str, can: Prospects | Non
         robot: What the model was made from, for the title.
         observer: In the loop.
         can: What the pair can do, which says how far the robot is tilted and pushed; without it, it is neither.
+        axis: Which axis the prospects are of, if it has a name.
 
     Returns:
         The scenario, made ready to run.
     """
     tilt = min(START_DEG, SHARE_OF_CEILING * math.degrees(can.ceiling.tilt)) if can else 0.0
-    fields = {
+    start = {"initial_tilt_deg": float(f"{tilt:.3g}")}
+    fields: dict[str, Any] = {
         "title": f"{robot.stem}, balanced",
         "duration_s": DURATION_S,
-        "plant": {"model": model.name, "equilibrium_bias_deg": 0.0, "initial_tilt_deg": float(f"{tilt:.3g}")},
+        "plant": {"model": model.name, "equilibrium_bias_deg": 0.0, **({} if axis else start)},
         "controller": {"gains": "carried_over"},
         "observer": {"kind": observer},
     }
+    if axis:
+        fields["plant"]["initial_tilt_deg"] = 0.0
+        fields["axes"] = {axis: {"plant": start}}
     if can and can.bears.impulse:
         torque = float(f"{SHARE_OF_BORNE * can.bears.impulse / PUSH_S:.3g}")
-        fields["push"] = [{"start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}]
+        of_axis = {"axis": axis} if axis else {}
+        fields["push"] = [{**of_axis, "start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}]
     path = model.with_suffix(".toml")
     with whole_file(path) as temporary:
         temporary.write_text(tomli_w.dumps(fields), encoding="utf-8")
@@ -59,7 +66,7 @@ def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -
 
     Args:
         mounted: The robot with its pair.
-        plant: The same as a rig.
+        plant: The same as a rig, with the axis of the pair alone.
         can: What the pair can do.
         enough: If the ceiling is low, the scale that suffices.
 
