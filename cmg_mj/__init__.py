@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cmg_mj.experiment import Experiment, prepare
     from cmg_mj.laws import LAWS, Fed, Law, StateFeedback, lqr_gains, make_law
     from cmg_mj.logs import Log, read_log
+    from cmg_mj.mounting import Mounted, mount
     from cmg_mj.observers import OBSERVERS, Estimate, Measurement, Observer, make_observer
     from cmg_mj.plant import Plant, load_plant
     from cmg_mj.plant_settings import PlantSettings
@@ -43,6 +44,7 @@ _HOMES = {
     "experiment": ("Experiment", "prepare"),
     "laws": ("LAWS", "Fed", "Law", "StateFeedback", "lqr_gains", "make_law"),
     "logs": ("Log", "read_log"),
+    "mounting": ("Mounted", "mount"),
     "scenario": ("load_scenario", "parse_scenario"),
     "schema": ("Scenario",),
     "sensors": ("Accelerometer", "Encoder", "Fog", "Sensors"),
@@ -67,6 +69,7 @@ __all__ = [
     "Law",
     "Log",
     "Measurement",
+    "Mounted",
     "Observer",
     "Outcome",
     "Plant",
@@ -89,6 +92,7 @@ __all__ = [
     "lqr_gains",
     "make_law",
     "make_observer",
+    "mount",
     "parse_scenario",
     "prepare",
     "read_log",

@@ -27,6 +27,7 @@ SAYS = {
     "own_law": "own_law:Leaning: 5 of 5 stood",
     "own_loop": "estimated tilt rate",
     "own_observer": "own_observer:HalfDifference: 0 of 5 fell",
+    "own_robot": "pushed with 0.6 of that: stood until 20 s",
     "python_control": "slowest pole -0.20",
     "replay_a_log": "super_twisting: velocity RMS error",
     "runner": "the callback's run is the same: True",

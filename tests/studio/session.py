@@ -45,15 +45,15 @@ class Recorded(Stepping):
 
 
 def recording(live: Live, rows: list[tuple[float, ...]]) -> Callable[[mujoco.MjData], bool]:
-    step, tilt = live.step, live.plant.tilt
+    step, line = live.step, live.plant.axis.line
 
     def recorded(data: mujoco.MjData) -> bool:
         time, q, v = data.time, data.qpos.tolist(), data.qvel.tolist()
         ticked = step(data)
         tick = live.controller.tick
         if ticked and tick is not None:
-            push = float(data.qfrc_applied[tilt])
-            rows.append((time, v[tilt], tick.y1, tick.y2, tick.fog, tick.u, tick.x_e, push, *q, *v))
+            push = sum(float(data.qfrc_applied[dof]) * share for dof, share in zip(*line.push, strict=True))
+            rows.append((time, float(line.rate(v)), tick.y1, tick.y2, tick.fog, tick.u, tick.x_e, push, *q, *v))
         return ticked
 
     return recorded
