@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from cmg_mj.cli.arguments import named
-from cmg_mj.cli.terminal import say, say_hints, users_code
+from cmg_mj.cli.terminal import own_stdout, say, say_hints, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -113,10 +113,9 @@ def mount(
         enough = scale_that_suffices(ceiling_at, scale)
     if as_json:
         figures = can.figures() | {"model": str(target), "held": list(found.held), "scale_that_suffices": enough}
-        click.echo(json.dumps(figures, indent=2))
+        click.echo(json.dumps(figures, indent=2), file=own_stdout())
         return
-    for line in told(found, plant, can, enough):
-        click.echo(line)
+    click.echo("\n".join(told(found, plant, can, enough)), file=own_stdout())
     say_hints(can.hints)
     say(f"wrote {target} and {target.with_suffix('.toml')}; try: cmg-mj run {target.with_suffix('.toml')}")
 

@@ -85,7 +85,7 @@ def hold_joints(
                 name2=model.body(body).name,
             )
             at = turn @ (data.xpos[body] - data.xpos[parent])
-            tie.data[:] = [0.0, 0.0, 0.0, *at, *relative, 1.0]
+            tie.data[:11] = [0.0, 0.0, 0.0, *at, *relative, 1.0]
         else:
             tie = spec.add_equality(
                 name=held_name(name), type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name

@@ -23,7 +23,8 @@ from cmg_mj.mounting.mounted import Mounted
 from cmg_mj.mounting.options import set_options
 from cmg_mj.mounting.parts import add_sensors, attach_cubes, cube_names, site_names
 from cmg_mj.mounting.robot import body_of, check_chains, check_names, free_base, pose_of, read_robot
-from cmg_mj.mounting.standing import axes_along, find_place, posed, stand_upright, under_and_height
+from cmg_mj.mounting.room import check_room
+from cmg_mj.mounting.standing import axes_along, check_unturned, find_place, posed, stand_upright, under_and_height
 from cmg_mj.resources import folder
 from cmg_mj.rig_parts import KEYFRAME
 
@@ -93,12 +94,13 @@ def _mounted(spec: mujoco.MjSpec, path: Path, asked: Asked) -> Mounted:
     notes = set_options(spec)
     gimbals = {f"{cube}/gimbal": np.array([math.pi / 2.0]) for cube in names}
     others = [line for line in earlier.lines if line != place.joint]
-    model, (qpos, point, direction) = stand_upright(
-        spec, poses_of(model, pose) | gimbals, place, mounts, others, asked, path
-    )
+    poses = poses_of(model, pose) | gimbals
+    model, (qpos, point, direction) = stand_upright(spec, poses, place, mounts, others, asked, path)
 
     # With sensors, and a keyframe to start from.
+    check_unturned(model, poses, qpos, [*others, place.joint] if others else [], path)
     data = posed(model, qpos)
+    check_room(model, data, names, float(point[2]) if place.free else None, path)
     under, height = under_and_height(model, data, model.joint(place.joint).id, point, direction)
     frame = model.body(asked.body).id
     turn, origin = data.xmat[frame].reshape(3, 3), data.xpos[frame]

@@ -16,6 +16,8 @@ BAD_CONNECTIONS = {
     int(mujoco.mjtEq.mjEQ_CONNECT): "connect",
     int(mujoco.mjtEq.mjEQ_WELD): "weld",
 }
+UNNAMED = "MuJoCo Model"
+"""What MuJoCo calls a model that has no name."""
 NEEDED = {
     "mjDSBL_CONSTRAINT": "constraint",
     "mjDSBL_EQUALITY": "equality",
@@ -44,7 +46,7 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
             raise InputError(f"{path}: no such file")
         spec = parse(path)
     else:
-        spec, path = robot.copy(), Path(robot.modelname or "robot")
+        spec, path = robot.copy(), Path("robot" if robot.modelname in ("", UNNAMED) else robot.modelname)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what is deprecated in the user's file
         compile_model(spec, path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from cmg_mj.mounting.axes import hinge_or_direction
 from cmg_mj.mounting.keyframes import as_qpos
 from cmg_mj.mounting.parts import place_cubes
 from cmg_mj.mounting.settling import UP, Support, stand
+from cmg_mj.rig_check import TRUE_DEG
 
 SMALLEST_HEIGHT_M = 1e-3
 """Less far above the line a robot's mass is not above it [m]."""
@@ -113,6 +114,24 @@ def _all_balanced(model: mujoco.MjModel, start: Support, hinge: str, others: Seq
         direction = start.direction if joint == line else posed(model, pose).xaxis[joint].copy()
         pose = _balanced(model, pose, joint, direction, path).pose  # which moves what another carries
     return _balanced(model, pose, line, start.direction, path)
+
+
+def check_unturned(
+    model: mujoco.MjModel, poses: Mapping[str, np.ndarray], qpos: np.ndarray, hinges: Sequence[str], path: Path
+) -> None:
+    """Where axes meet, the modules of one are square to its hinge as long as the others' hinges stay where they were.
+
+    Raises:
+        InputError: One has to turn for the robot to stand upright.
+    """
+    for name in hinges:
+        turned = math.degrees(float(qpos[int(model.joint(name).qposadr[0])] - poses[name][0]))
+        if abs(turned) > TRUE_DEG:
+            raise InputError(
+                f"{path}: to stand upright on all axes the hinge {name!r} has to turn by {turned:.3g} deg, and the "
+                "modules of another axis would stand crooked: place the modules above both hinges (--at), or mount "
+                "the first axis in a keyframe in which its mass is above both"
+            )
 
 
 def under_and_height(
