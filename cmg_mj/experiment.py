@@ -267,7 +267,7 @@ class Experiment:
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
         fields = resolved(self.scenario, self.design, self.plant.path, self.plant.timestep)
-        return with_axes(fields, {own.plant.axis.name: own.resolved() for own in self.axes})
+        return with_axes(fields, self.scenario, {own.plant.axis.name: own.resolved() for own in self.axes})
 
     @functools.cached_property
     def differences(self) -> dict[str, Any]:

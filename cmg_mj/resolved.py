@@ -62,11 +62,12 @@ OF_AN_AXIS = ("plant", "controller", "observer", "sensors")
 """Sections of which an axis may have something of its own."""
 
 
-def with_axes(fields: dict[str, Any], axes: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+def with_axes(fields: dict[str, Any], scenario: Scenario, axes: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     """The resolved scenario of a rig with what each axis has, written out.
 
     Args:
         fields: Of the rig.
+        scenario: The same as it was given.
         axes: The resolved scenario of each axis, by its name.
 
     Returns:
@@ -78,7 +79,8 @@ def with_axes(fields: dict[str, Any], axes: Mapping[str, dict[str, Any]]) -> dic
     for own in found.values():
         own["plant"] = {name: value for name, value in own["plant"].items() if name in AxisPlant.model_fields}
         own["controller"] = {name: value for name, value in own["controller"].items() if name != "rate_hz"}
-    return {**fields, "axes": found}
+    given = TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
+    return {**fields, "controller": given["controller"], "observer": given["observer"], "axes": found}
 
 
 def _parameters(given: dict[str, Any], made: Any, by_bench: Collection[str]) -> dict[str, Any]:
