@@ -34,6 +34,7 @@ CHEAPER = {
     "sweep": "--sample 2 --worlds 2 --set duration_s=2.5 --set push.0.start_s=1.0",
     "replay": "--observers linear",
     "export": "",
+    "mount": "",
 }
 """Command -> what is appended here, so that it takes a second or two."""
 
@@ -81,6 +82,11 @@ def test_a_command_runs(line: str) -> None:
     command, *arguments = shlex.split(line)[1:]
     if command == "replay":
         shutil.copytree(ROOT / "examples" / "data", Path("examples", "data"))
+    if command == "mount" or "balanced.toml" in arguments:
+        shutil.copytree(ROOT / "examples" / "robots", Path("examples", "robots"))
+    if arguments[:1] == ["balanced.toml"]:  # what the line before has written
+        (mounting,) = [line for line in COMMANDS if line.startswith("cmg-mj mount ")]
+        assert cmg_mj(*shlex.split(mounting)[1:]).status == 0
     if command == "sweep":
         shutil.copytree(ROOT / "docs" / "studies", Path("docs", "studies"))
     if command == "export" or "board" in arguments:
