@@ -93,7 +93,7 @@ def test_plant(given: str, fragments: list[str]) -> None:
 
 
 @table(
-    ("typo", "rate = 200", "controller.rate: no such field; did you mean 'rate_hz'? allowed: angles, feedback, gains"),
+    ("typo", "rate = 200", "controller.rate: no such field; did you mean 'rate_hz'? allowed: against_turning, angles"),
     ("no rate", "rate_hz = 0", f"controller.rate_hz = 0: {RATE}"),
     ("a negative rate", "rate_hz = -200", f"controller.rate_hz = -200: {RATE}"),
     ("nan", "rate_hz = nan", "controller.rate_hz = nan: must be a finite number greater than or equal to 0.1"),
