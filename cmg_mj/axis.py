@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import itemgetter
 from typing import Any
 
 import mujoco
@@ -72,6 +74,15 @@ class Axis:
         return [cube.direction for cube in self.cubes]
 
     @cached_property
+    def _forces_of(self) -> Callable[[Any], Any]:
+        return itemgetter(*self.forces)
+
+    @cached_property
+    def _encoders_of(self) -> Callable[[Any], Any]:
+        (only, *others) = self.encoders
+        return itemgetter(*self.encoders) if others else lambda sensordata: (sensordata[only],)
+
+    @cached_property
     def _gimbals(self) -> list[tuple[int, float, float]]:
         """Of each gimbal its address, its share of x3 and where it is zero."""
         n = len(self.cubes)
@@ -88,12 +99,10 @@ class Axis:
         Returns:
             The ideal readings, of the elements' own type (float, or array (n_worlds,)).
         """
-        if type(sensordata) is list:
-            i, j, k, m = self.forces
-            forces: Any = (sensordata[i], sensordata[j], sensordata[k], sensordata[m])
+        if type(sensordata) is list:  # of one world, at every tick
+            forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
         else:
-            forces = sensordata[self.forces]
-        encoders = [sensordata[address] for address in self.encoders]
+            forces, encoders = sensordata[self.forces], [sensordata[address] for address in self.encoders]
         return Ideal(forces, encoders, sensordata[self.gyro], self.line.rate(qvel))
 
     def gimbal_angle(self, qpos: Any) -> Scalar:

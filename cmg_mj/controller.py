@@ -208,7 +208,7 @@ class Controller:
         accelerometers, encoders, fog = self._sampled
         u = self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), ideal.rate).u
         if self.turns_gimbals:
-            self.turn(u)
+            self.turning = u if self._gap is None else self._gap(u)
         return True
 
     def turn(self, u: Scalar) -> None:
@@ -252,15 +252,16 @@ class Controller:
         estimate = estimates[0]
         if step < self.trimmed_until:
             self._commanding.trim(self.trim_gain * estimate[self.trim_part])
-        x1, x2, x3 = estimate[:3]
-        if self.angles == "measured":
-            x1, x3 = y1, y2
+        x1, x2, x3 = (y1, estimate[1], y2) if self.angles == "measured" else estimate[:3]
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else rate
         if not self._single:
             x2 = x2.copy()
             read_only(x2, *estimate)
-        u, x_e = self._commanding.decide(y, fed(x1, x2, x3, estimate[3:]), held, step)
+        x = fed(x1, x2, x3)
+        if len(estimate) > 3:
+            x.extra = estimate[3:]
+        u, x_e = self._commanding.decide(y, x, held, step)
         if not self._single:
             read_only(u)  # observers get it at the next tick, the trajectory later
         self.tick = Tick(y1, y2, acceleration, fog, u, x_e, estimates)

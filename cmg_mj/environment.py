@@ -21,7 +21,7 @@ from cmg_mj.references import MEMS_GYRO, References
 from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.sensors import at_work
-from cmg_mj.simulate import moments
+from cmg_mj.simulate import moments, swinging
 from cmg_mj.timing import whole_steps
 from cmg_mj.worlds import OneWorld
 
@@ -157,9 +157,8 @@ class ScissoredPair(gymnasium.Env):
         self._period = whole_steps(dt, plant.timestep, "controller.rate_hz", f"{1.0 / dt:g} Hz")
         self._beat = math.gcd(self._period, *(sensor.beat for sensor in self._sensors))
         self._steps = whole_steps(scenario.duration_s, plant.timestep, "duration_s", f"{scenario.duration_s:g} s")
-        self._moments = moments(
-            self._steps, self._beat, scenario.push, plant.timestep, plant.axis_names, scenario.swing
-        )
+        looks = moments(self._steps, self._beat, scenario.push, plant.timestep, plant.axis_names)
+        self._moments = swinging(looks, scenario.swing, plant.timestep, plant.axis_names) if scenario.swing else looks
         self._torque: Any = 0.0
         self._step = -1
         self._running = True

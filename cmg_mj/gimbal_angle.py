@@ -26,12 +26,12 @@ class GimbalAngle:
         return [direction / len(self.directions) for direction in self.directions]
 
     @cached_property
-    def _at_zero(self) -> float:
-        return dot(self._shares, self.zeros)
+    def _less_zero(self) -> float:
+        return -dot(self._shares, self.zeros)
 
     def __call__(self, encoders: Sequence[Scalar]) -> Scalar:
         """y2 [rad] from the gimbals' angles, one a gimbal [rad]."""
-        y2 = -self._at_zero
+        y2 = self._less_zero
         for share, angle in zip(self._shares, encoders, strict=True):
             y2 = y2 + share * angle
         return y2

@@ -8,6 +8,7 @@ or a bandwidth switches that effect off.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -137,9 +138,6 @@ def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) 
         One sample: `channels` floats, or an array (channels, n_worlds).
     """
     block = 256  # drawing one by one costs more than the rest of a sensor
-    if channels == 0:
-        while True:
-            yield ()
     single = isinstance(worlds, int)
     different, places = np.unique([worlds] if single else worlds, return_inverse=True)
     alone = np.array_equal(places, range(len(places)))  # every world once, in order
@@ -284,7 +282,7 @@ def at_work(
     """
 
     def noise(stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
-        return normals(seed, worlds, stream + AN_AXIS * axis, channels)
+        return normals(seed, worlds, stream + AN_AXIS * axis, channels) if channels else itertools.repeat(())
 
     pair = sensors.accelerometer
     drift = _drift(pair, noise(FLICKER, len(CORNERS_HZ) * pair.channels)) if pair.bias_instability_ug else None

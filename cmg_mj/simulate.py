@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import statistics
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
@@ -173,16 +173,11 @@ def moments(
     pushes: Sequence[Push],
     timestep: float,
     axes: Sequence[str] = ("",),
-    swings: Sequence[Swing] = (),
 ) -> Iterator[tuple[int, int, list[Scalar]]]:
     """The moments at which the loop must look: (step, steps until the next, each axis' torque, one or a world's each).
 
     A push about an axis that the rig does not have, since it is locked, moves nothing.
     """
-
-    def at(step: int, count: int) -> list[Scalar]:
-        return swung(held, swings, axes, (step + 0.5 * count) * timestep)
-
     changes: dict[int, list[Scalar]] = {0: [0.0] * len(axes), steps: [0.0] * len(axes)}
     for push in pushes:
         for time, torque in ((push.start_s, push.torque_n_m), (push.end_s, -push.torque_n_m)):
@@ -193,18 +188,25 @@ def moments(
                 change[axes.index(about)] += torque
     edges = sorted(step for step in changes if step <= steps)
     torques: list[Scalar] = [0.0] * len(axes)
-    held = torques
     for start, end in itertools.pairwise(edges):
         torques = [torque + change for torque, change in zip(torques, changes[start], strict=True)]
         held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in torques]
         first = min(-(-start // beat) * beat, end)  # the first beat not before the push's edge
         if first > start:
-            yield start, first - start, at(start, first - start)
+            yield start, first - start, held
         last = max(end // beat * beat, first)
         for step in range(first, last, beat):
-            yield step, beat, at(step, beat)
+            yield step, beat, held
         if last < end:
-            yield last, end - last, at(last, end - last)
+            yield last, end - last, held
+
+
+def swinging(
+    looks: Iterable[tuple[int, int, list[Scalar]]], swings: Sequence[Swing], timestep: float, axes: Sequence[str]
+) -> Iterator[tuple[int, int, list[Scalar]]]:
+    """The moments with the swings' torques in their middle."""
+    for step, count, held in looks:
+        yield step, count, swung(held, swings, axes, (step + 0.5 * count) * timestep)
 
 
 @quiet()
@@ -272,17 +274,23 @@ def simulate(
     pushed: Sequence[Scalar] = ()
     step = 0
 
+    looks = moments(steps, controller.beat, pushes, timestep, names)
+    if swings:
+        looks = swinging(looks, swings, timestep, names)
+    # Of the only axis without a detour: they are asked for at every moment.
+    lean_of, ideal_of = (rig.lean, rig.ideal) if len(names) > 1 else (rig.axis.line.lean, rig.axis.ideal)
+    at_work = list(zip(range(len(names)), controller.parts, rows, strict=True))
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
     try:
         with drive:
-            for step, count, held in moments(steps, controller.beat, pushes, timestep, names, swings):
+            for step, count, held in looks:
                 if held is not torques:
                     torques = held
                     for axis, torque in enumerate(torques):
                         worlds.push(torque, axis)
                     pushed = torques if single else [np.broadcast_to(torque, len(plants)) for torque in torques]
                 q, v = worlds.state()
-                lean = rig.lean(q)
+                lean = lean_of(q)
                 if single:
                     if not abs(lean) <= fall:
                         ends[0] = _fallen(lean, step * timestep)
@@ -297,9 +305,9 @@ def simulate(
                         break
                 if native:
                     due = step % controller.beat == 0
-                    ticked = due and controller.update(step, rig.ideal(worlds.sense(), v))
+                    ticked = due and controller.update(step, ideal_of(worlds.sense(), v))
                     if ticked:
-                        for axis, part in enumerate(controller.parts):
+                        for axis, part, _ in at_work:
                             if not single:
                                 assert part.tick is not None
                                 _stop_blind(worlds, part.tick, ends, step * timestep)
@@ -310,9 +318,9 @@ def simulate(
                     worlds.advance(count)
                 if ticked:
                     running = None if single else worlds.running.copy()
-                    for own, part, torque in zip(rows, controller.parts, pushed, strict=True):
+                    for axis, part, own in at_work:
                         assert part.tick is not None
-                        own.add(q, v, part.tick, torque, running)
+                        own.add(q, v, part.tick, pushed[axis], running)
                     if on_progress:
                         on_progress((step + count) * timestep)
     except RunStopped as error:

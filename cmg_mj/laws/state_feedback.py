@@ -11,7 +11,7 @@ import numpy as np
 
 from cmg_mj.elementwise import Scalar, clip, where
 from cmg_mj.errors import InputError
-from cmg_mj.laws.protocol import Fed
+from cmg_mj.laws.protocol import Fed, fed
 from cmg_mj.observers.protocol import Measurement
 from cmg_mj.reduced import ReducedModel
 from cmg_mj.stability import is_hurwitz
@@ -94,8 +94,13 @@ class StateFeedback:
         """Decide on one sample."""
         x1, x2, x3 = x
         (x_e,) = state
-        u, x_e = self(x1, x2, x3, x_e)
-        return _new(Integrated, (x_e,)), u
+        k1, k2, k3, k4 = self.gains
+        limit = self.rate_limit
+        demanded = -(k1 * x1 + k2 * x2 + k3 * x3 + k4 * x_e)
+        u = clip(demanded, -limit, limit)
+        # The integrator moves the demand at the rate k4 x3.
+        winding = (u != demanded) & (k4 * x3 * demanded > 0.0)
+        return _new(Integrated, (where(winding, x_e, x_e - self.dt * x3),)), u
 
     def __call__(self, x1: Scalar, x2: Scalar, x3: Scalar, x_e: Scalar) -> tuple[Scalar, Scalar]:
         """Command and the next integrator state.
@@ -109,10 +114,5 @@ class StateFeedback:
         Returns:
             The gimbal rate u [rad/s] to hold for a period, and x_e at the next tick.
         """
-        k1, k2, k3, k4 = self.gains
-        limit = self.rate_limit
-        demanded = -(k1 * x1 + k2 * x2 + k3 * x3 + k4 * x_e)
-        u = clip(demanded, -limit, limit)
-        # The integrator moves the demand at the rate k4 x3.
-        winding = (u != demanded) & (k4 * x3 * demanded > 0.0)
-        return u, where(winding, x_e, x_e - self.dt * x3)
+        state, u = self.step(Integrated(x_e), Measurement(x1, x3), fed(x1, x2, x3), 0.0)
+        return u, state.x_e
