@@ -1,6 +1,6 @@
 """What pairs do on robots: the table of docs/mount.md.
 
-python docs/studies/mounted_robots.py [ROBOT ...] (about five minutes on a quiet core)
+python docs/studies/mounted_robots.py [ROBOT ...] (about six minutes on a quiet core)
 
 The robots are those of tests/mounting/robots.py; ROBOT is a part of a name. Ten worlds each, the sensors of the
 datasheets, `homogeneous`; from the smaller of a degree and a quarter of the ceiling, 30 s, alone and with a push of
