@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 
 import mujoco
@@ -188,6 +187,7 @@ def test_keyframes_of_its_own_are_kept() -> None:
     assert home.qpos[0] == pytest.approx(0.1)
     assert home.qpos[5] == stands.qpos[5] == pytest.approx(0.05)
     assert stands.ctrl.tolist() == home.ctrl.tolist()
+    assert model.equality("gripper_held").data[0] == pytest.approx(0.05)
 
 
 def test_the_command_prints_what_the_pair_can_do() -> None:
@@ -215,4 +215,7 @@ def test_what_it_changes_it_says() -> None:
         "Newton: another does not hold joints stiffly",
         "5 ms",
     ]
-    assert math.isclose(made.spec.option.timestep, 0.005)
+    option = made.spec.compile().opt
+    assert (option.timestep, option.gravity.tolist()) == (0.005, [0.0, 0.0, pytest.approx(-9.8)])
+    assert int(option.solver) == int(mujoco.mjtSolver.mjSOL_NEWTON)
+    assert int(option.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4)
