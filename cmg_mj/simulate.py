@@ -278,7 +278,9 @@ def simulate(
     if swings:
         looks = swinging(looks, swings, timestep, names)
     # Of the only axis without a detour: they are asked for at every moment.
-    lean_of, ideal_of = (rig.lean, rig.ideal) if len(names) > 1 else (rig.axis.line.lean, rig.axis.ideal)
+    one = len(names) == 1
+    lean_of = rig.axis.line.lean if one else rig.lean
+    ideal_of: Any = rig.axis.ideal if one else rig.ideal
     at_work = list(zip(range(len(names)), controller.parts, rows, strict=True))
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
     try:

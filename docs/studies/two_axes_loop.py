@@ -92,7 +92,7 @@ def fastest_turn(rates: Sequence[float] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.
 def gait(worlds: int) -> str:
     """A swinging torque on both axes, a quarter period apart."""
     rows = []
-    for amplitude, frequency in ((0.5, 1.0), (0.5, 2.0), (1.0, 2.0), (1.5, 2.0)):
+    for amplitude, frequency in ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.5, 2.0)):
         swings = ",".join(
             f"{{frequency_hz={frequency}, amplitude_n_m={amplitude}, phase_deg={phase}.0, axis='{axis}'}}"
             for axis, phase in zip(AXES, (0, 90), strict=True)
