@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -155,7 +156,8 @@ def test_the_loop_meets_the_older_instant(
         free = ["duration_s=0.3", "push.0.start_s=0.1", "controller.gains=[0.0,0.0,0.0,0.0]", "plant.timestep_s=0.0025"]
         sensor = [f"sensors.accelerometer.{name}" for name in (*off, *settings)]
         experiment = prepare(load_scenario("push_recovery", [*free, *sensor, f"controller.rate_hz={rate_hz}"]))
-        monkeypatch.setattr(experiment.plant, "radial_tilt", Kept(TILT.r_inner, TILT.r_outer))
+        axis = replace(experiment.plant.axis, radial_tilt=Kept(TILT.r_inner, TILT.r_outer))
+        monkeypatch.setattr(experiment.plant, "axes", (axis,))
         experiment.run(driver=driver)
         return np.array(read[1:])  # the first was to know what tilt the offsets make at rest
 

@@ -40,7 +40,7 @@ SUMMARY = [
 ]
 """Names that users' scripts rely on."""
 
-COMMANDS = ["bench", "check", "compare", "export", "list", "replay", "reproduce", "run", "tune"]
+COMMANDS = sorted(cli.commands)
 
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 GRAPHICS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_software")
 
 
-@click.command(short_help="Open a scenario in MuJoCo Studio, its controller running: push it, switch observers.")
+@click.command(short_help="Open a scenario in MuJoCo Studio, its controller running.")
 @click.argument("scenario")
 @click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
 @click.option(

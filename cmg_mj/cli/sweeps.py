@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cmg_mj.sweeps.study import Study
 
 
-@click.command(short_help="Many worlds: fields of a scenario varied, every observer, with intervals.")
+@click.command(short_help="Vary fields over many worlds: every observer, with intervals.")
 @of_a_run
 @click.option(
     "--vary",

@@ -40,7 +40,7 @@ def law_settings(scenario: Scenario) -> dict[str, Any]:
 def laws_of(base: Experiment) -> dict[str, dict[str, Any]]:
     """The laws that can be chosen: name -> the settings that make them."""
     own = law_settings(base.scenario)
-    common = {name: own[name] for name in ("rate_hz", "rate_limit_rad_s", "angles", "trim_s")}
+    common = {name: own[name] for name in ("rate_hz", "rate_limit_rad_s", "angles", "against_turning", "trim_s")}
     laws: dict[str, dict[str, Any]] = {
         "Table 2": {**common, "kind": "state_feedback"},
         "LQR": {**common, "kind": "state_feedback", "lqr": own.get("lqr", WEIGHTS)},

@@ -226,7 +226,7 @@ def test_a_law_that_cannot_work(given: type, fragments: list[str], command: str)
         ["kind=lqg", "torque_wlk=1.0"],
         "controller.torque_wlk: no such field; did you mean 'torque_wal",
     ),
-    ("another's field", ["torque_walk=1.0"], "controller.torque_walk: no such field; allowed: angles, feedback, gains"),
+    ("another's field", ["torque_walk=1.0"], "controller.torque_walk: no such field; allowed: against_turning, angles"),
     (
         "of the wrong type",
         ["kind=lqg", "torque_walk='1'"],
