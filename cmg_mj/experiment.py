@@ -149,11 +149,11 @@ class Experiment:
             return run_together(self.varied(vary), numbers, **options)
         rigs = [self.plant] * len(numbers) if plants is None else list(plants)
         _require_alike([self.plant, *rigs], len(rigs), len(numbers))
-        controllers = [own.controller(numbers, **_of_the_rigs(rigs, i)) for i, own in enumerate(self._parts)]
+        controllers = [own.controller(numbers, **_of_the_rigs(rigs, i)) for i, own in enumerate(self.parts)]
         return self.simulate(rigs, self._of_axes(controllers), **options)
 
     @property
-    def _parts(self) -> tuple[Experiment, ...]:
+    def parts(self) -> tuple[Experiment, ...]:
         """One an axis."""
         return self.axes or (self,)
 
@@ -229,7 +229,7 @@ class Experiment:
             plant,
             controller,
             scenario.duration_s,
-            observers={name: own.observer_names for name, own in zip(self.plant.axis_names, self._parts, strict=True)},
+            observers={name: own.observer_names for name, own in zip(self.plant.axis_names, self.parts, strict=True)},
             pushes=scenario.push if pushes is None else pushes,
             swings=scenario.swing,
             settings=scenario.metrics,
@@ -261,7 +261,7 @@ class Experiment:
 
     def rehearse(self, worlds: int | None = None) -> None:
         """Try every observer once, on floats or on arrays of so many worlds: see `Design.rehearse`."""
-        for own in self._parts:
+        for own in self.parts:
             own.design.rehearse(worlds)
 
     def resolved(self) -> dict[str, Any]:
@@ -349,8 +349,8 @@ def of_one_batch(
     rigs = [each.plant for each in experiments]
     first = experiments[0]
     controllers, pushes = [], ()
-    for i, own in enumerate(first._parts):
-        parts = [each._parts[i] for each in experiments]
+    for i, own in enumerate(first.parts):
+        parts = [each.parts[i] for each in experiments]
         law, sensors, pushes = pooled(
             [(each.design.fresh_law(), each.scenario.sensors, tuple(each.scenario.push)) for each in parts]
         )

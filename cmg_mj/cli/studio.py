@@ -72,7 +72,6 @@ def studio(
         return prepare(chosen.scenario(observer)).with_values({"plant.model": model})
 
     first = opened("")
-    first.only_axis("cmg-mj studio")
     say_hints(first.hints)
     if importlib.util.find_spec("mujoco.studio") is None:
         raise InputError("this MuJoCo comes without Studio: install the wheel from PyPI, python -m pip install mujoco")

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
+from cmg_mj.axes_controller import AxesController
 from cmg_mj.callback import control
 from cmg_mj.controller import Controller
 from cmg_mj.engine import control_callback
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.experiment import Experiment
-from cmg_mj.studio.choices import LAW, OBSERVER
+from cmg_mj.studio.choices import fields_of
 from cmg_mj.studio.memory import Memory, adopt
 from cmg_mj.studio.pushes import Pushes
 from cmg_mj.studio.seen import seen, take_numbers
@@ -25,7 +26,7 @@ KEPT_TICKS = 2400
 
 
 class Shown(NamedTuple):
-    """A control tick as it is plotted: x1, its true and its estimated rate, u."""
+    """A control tick as it is plotted, of one axis: x1, its true and its estimated rate, u."""
 
     time_s: float
     tilt_deg: float
@@ -49,7 +50,7 @@ class Live:
         stopped: Why the controller no longer controls; empty while it does. The gimbals then stand.
         diverged: Whether that is because the physics has no numbers any more.
         note: What the last change or jump came to, if it is worth a line.
-        ticks: The last ones, to be plotted.
+        ticks: The last ones, to be plotted: of each axis.
     """
 
     def __init__(self, experiment: Experiment) -> None:
@@ -57,8 +58,9 @@ class Live:
         self.plant = seen(experiment.plant)
         self.note = ""
         self.timestep = self.plant.timestep
-        self.pushes = Pushes(experiment.scenario.push, self.timestep)
-        self.ticks: deque[Shown] = deque(maxlen=KEPT_TICKS)
+        scenario = experiment.scenario
+        self.pushes = Pushes(scenario.push, scenario.swing, self.plant.axis_names, self.timestep)
+        self.ticks: deque[tuple[Shown, ...]] = deque(maxlen=KEPT_TICKS)
         self._begin(0)
 
     @property
@@ -92,7 +94,7 @@ class Live:
         self._begin(step)
 
     def _begin(self, step: int) -> None:
-        self.controller: Controller = self.now.controller()
+        self.controller: Controller | AxesController = self.now.controller()
         self.memory = Memory(self.now, step)
         self.stopped = ""
         self.diverged = False
@@ -115,10 +117,9 @@ class Live:
             Whether there was a control tick.
         """
         step = self.attend(data)
-        torque = self.pushes.at(step)
-        for dof, share in zip(*self.plant.axis.line.push, strict=True):
-            data.qfrc_applied[dof] = share * torque  # Studio's mouse writes xfrc_applied: MuJoCo adds them up
-        ticked = not self.stopped and self._control(data, step, torque)
+        torques = self.pushes.at(step, self.controller.beat)
+        self._push(data, torques)
+        ticked = not self.stopped and self._control(data, step, torques)
         mujoco.mj_step(self.model, data)
         self._next = step + 1
         if not np.isfinite(data.qpos).all():
@@ -126,9 +127,17 @@ class Live:
             self._stop(data, step, f"the physics diverged at t = {data.time:g} s; reset")
         return ticked
 
-    def _control(self, data: mujoco.MjData, step: int, torque: float) -> bool:
-        axis = self.plant.axis
-        lean = float(axis.line.lean(data.qpos))
+    def _push(self, data: mujoco.MjData, torques: Sequence[float]) -> None:
+        """Set the torques about the axes. Studio's mouse writes xfrc_applied: MuJoCo adds them up."""
+        lines = [axis.line.push for axis in self.plant.axes]
+        for dofs, _ in lines:
+            data.qfrc_applied[dofs] = 0.0
+        for (dofs, shares), torque in zip(lines, torques, strict=True):
+            for dof, share in zip(dofs, shares, strict=True):
+                data.qfrc_applied[dof] += share * torque
+
+    def _control(self, data: mujoco.MjData, step: int, torques: Sequence[float]) -> bool:
+        lean = self.plant.lean(data.qpos)
         if not abs(lean) <= math.radians(self.now.scenario.metrics.fall_angle_deg):
             self._stop(data, step, f"the rig fell at t = {data.time:g} s; reset, or go back in time")
             return False
@@ -139,12 +148,17 @@ class Live:
             return False
         if step % self.controller.beat == 0:
             self.memory.show(step, data)
-        tick = self.controller.tick
-        if ticked and tick is not None:
-            rate = float(axis.line.rate(data.qvel))
-            x1 = math.degrees(lean + self.now.plant.bias)
-            self.ticks.append(Shown(data.time, x1, rate, tick.estimates[0][1], tick.u, torque))
+        if ticked:
+            axes = range(len(torques))
+            self.ticks.append(tuple(self._shown(data, axis, torques[axis]) for axis in axes))
         return ticked
+
+    def _shown(self, data: mujoco.MjData, axis: int, torque: float) -> Shown:
+        """The last tick of an axis."""
+        line, tick = self.plant.axes[axis].line, self.controller.parts[axis].tick
+        assert tick is not None
+        x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
+        return Shown(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u, torque)
 
     def _stop(self, data: mujoco.MjData, step: int, why: str) -> None:
         self.stopped, self._stopped_at = why, step
@@ -160,7 +174,7 @@ class Live:
         if step == self._next:
             return step
         self._next = step
-        self.ticks = deque((tick for tick in self.ticks if tick.time_s < data.time - 1e-9), KEPT_TICKS)
+        self.ticks = deque((tick for tick in self.ticks if tick[0].time_s < data.time - 1e-9), KEPT_TICKS)
         if self.stopped and step > self._stopped_at:
             return step  # it does not control at that moment either
         self.pushes.forget(step)
@@ -188,7 +202,7 @@ class Live:
     # --- what a user changes -------------------------------------------------------------------------------
 
     def choose(self, data: mujoco.MjData, values: Mapping[str, Any]) -> None:
-        """Change settings of the scenario while it runs; `note` says what was refused.
+        """Change settings of the scenario while it runs, on all axes; `note` says what was refused.
 
         A new observer starts from the next sample. A controller that was stopped starts afresh.
 
@@ -199,7 +213,10 @@ class Live:
         """
         step = self.attend(data)
         try:
-            new = self.now.with_values(self._fields(values))
+            fields = fields_of(self.base, self.now, values)
+            if self.now.scenario.plant.timestep_s is None:
+                fields["plant.timestep_s"] = self.timestep  # the one it runs with
+            new = self.now.with_values(fields)
             if not self.stopped:
                 adopt(self.controller, self.now, new)
         except InputError as error:
@@ -214,22 +231,11 @@ class Live:
             self.memory.tell(new, afresh=False)
         assert step == self._next
 
-    def _fields(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """With the physics step that it runs with, and of an observer the parameters that the scenario has for it."""
-        fields = dict(values)
-        if self.now.scenario.plant.timestep_s is None:
-            fields["plant.timestep_s"] = self.timestep
-        if LAW in fields:
-            fields[LAW] = {**fields[LAW], "feedback": self.now.scenario.controller.feedback}
-        kind = fields.pop(OBSERVER, None)
-        if kind is not None:
-            own = self.base.scenario.observer
-            fields["observer"] = {"kind": kind, **(own.parameters if kind == own.kind else {})}
-        return fields
-
     def _take(self, experiment: Experiment) -> None:
         """Go on as this experiment's; the rig changes in place, so that whoever holds its model goes on too."""
-        if experiment.scenario.plant != self.now.scenario.plant:
+        if any(
+            own.scenario.plant != of.scenario.plant for own, of in zip(experiment.parts, self.now.parts, strict=True)
+        ):
             take_numbers(self.model, experiment.plant.model)
         self.now = experiment
 
@@ -243,6 +249,6 @@ class Live:
         else:
             self.memory = Memory(self.now, step)
 
-    def push(self, data: mujoco.MjData, torque: float, duration_s: float) -> None:
-        """Push from now on: torque [N m] about the tilt axis, for so long [s]."""
-        self.pushes.add(self.attend(data), torque, duration_s)
+    def push(self, data: mujoco.MjData, torque: float, duration_s: float, axis: int = 0) -> None:
+        """Push from now on: torque [N m] about a tilt axis, given by its place, for so long [s]."""
+        self.pushes.add(self.attend(data), torque, duration_s, axis)

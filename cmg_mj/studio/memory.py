@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from cmg_mj.axes_controller import AxesController
 from cmg_mj.controller import Controller
 from cmg_mj.experiment import Experiment
 from cmg_mj.studio.choices import law_settings
@@ -82,7 +83,7 @@ class Memory:
         """How many samples it was shown before a physics step."""
         return int(np.searchsorted(np.asarray(self._steps), step))
 
-    def back_to(self, step: int) -> tuple[Controller, Experiment]:
+    def back_to(self, step: int) -> tuple[Controller | AxesController, Experiment]:
         """The controller as it was before its update at a physics step. What was later is forgotten.
 
         Args:
@@ -113,8 +114,10 @@ class Memory:
         return controller, experiment
 
 
-def adopt(controller: Controller, was: Experiment, now: Experiment) -> None:
+def adopt(controller: Controller | AxesController, was: Experiment, now: Experiment) -> None:
     """Have a controller of one experiment be that of another, which differs from it in what may change while it runs.
+
+    Of a rig of several axes each axis' controller changes in what differs about that axis.
 
     Args:
         controller: The controller.
@@ -124,10 +127,11 @@ def adopt(controller: Controller, was: Experiment, now: Experiment) -> None:
     Raises:
         InputError: They differ in more.
     """
-    before, after = was.scenario, now.scenario
-    controller.exchange(
-        observer=now.design.observer() if after.observer != before.observer else None,
-        law=now.design.fresh_law() if law_settings(after) != law_settings(before) else None,
-        sensors=after.sensors if after.sensors != before.sensors else None,
-        feedback=after.controller.feedback,
-    )
+    for part, of, own in zip(controller.parts, was.parts, now.parts, strict=True):
+        before, after = of.scenario, own.scenario
+        part.exchange(
+            observer=own.design.observer() if after.observer != before.observer else None,
+            law=own.design.fresh_law() if law_settings(after) != law_settings(before) else None,
+            sensors=after.sensors if after.sensors != before.sensors else None,
+            feedback=after.controller.feedback,
+        )

@@ -11,7 +11,7 @@ from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
 from cmg_mj.studio.choices import BIAS, FEEDBACK, NOISE, OBSERVER
-from cmg_mj.studio.said import Choose, PushNow, Standing, StartAgain
+from cmg_mj.studio.said import Choose, PushNow, ShowAxis, Standing, StartAgain
 
 TITLE = "Gyroscopic balance"
 PLOTTED_S = 6.0
@@ -85,7 +85,12 @@ class Panel(plugin.ViewerPlugin):
         if now.note:
             imgui.TextWrapped(now.note)
         if now.settings:
-            imgui.SeparatorText("Controller")
+            several = len(now.axes) > 1
+            if several:
+                axis = _chosen("axis shown and pushed", now.axis, {name: name for name in now.axes})
+                if axis is not None:
+                    self._send(ShowAxis(axis))
+            imgui.SeparatorText("Controller, on all axes" if several else "Controller")
             self._build_choices(now)
             imgui.SeparatorText("Disturbances")
             self._build_disturbances(now)
@@ -113,8 +118,9 @@ class Panel(plugin.ViewerPlugin):
                 self._send(PushNow(sign * self._torque, self._duration))
             imgui.SameLine()
         imgui.NewLine()
-        self._build_number("e [deg]", BIAS, now.settings[BIAS], 0.1)
-        self._build_number("noise [ug/rtHz]", NOISE, now.settings[NOISE], 100.0)
+        on_all = ", all axes" if len(now.axes) > 1 else ""
+        self._build_number(f"e{on_all} [deg]", BIAS, now.settings[BIAS], 0.1)
+        self._build_number(f"noise{on_all} [ug/rtHz]", NOISE, now.settings[NOISE], 100.0)
 
     def _build_number(self, label: str, field: str, value: float, step: float) -> None:
         """A number that counts once it has been typed to the end."""

@@ -18,10 +18,17 @@ class Choose(messages.Event):
 
 @dataclass(frozen=True)
 class PushNow(messages.Event):
-    """The user pushes: a torque about the tilt axis [N m], for so long [s]."""
+    """The user pushes: a torque about the tilt axis that is shown [N m], for so long [s]."""
 
     torque_n_m: float
     duration_s: float
+
+
+@dataclass(frozen=True)
+class ShowAxis(messages.Event):
+    """The user chooses which axis of several is shown and pushed, by its name."""
+
+    axis: str
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,8 @@ class Standing(messages.Snapshot):
     Attributes:
         title: The scenario.
         time_s: Of the simulation [s].
+        axes: Names of the rig's axes.
+        axis: That which is shown: settings, gains and ticks are its.
         settings: What can be changed, by field named as with `--set`, as it is; None is the scenario file's default.
         observers: Those that can be chosen.
         gains: Of the law, on x1, x2, x3, x_e, if it is of that kind.
@@ -48,6 +57,8 @@ class Standing(messages.Snapshot):
 
     title: str = ""
     time_s: float = 0.0
+    axes: tuple[str, ...] = ()
+    axis: str = ""
     settings: dict[str, Any] = field(default_factory=dict)
     observers: tuple[str, ...] = ()
     gains: tuple[float, ...] = ()

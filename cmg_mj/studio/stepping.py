@@ -18,7 +18,7 @@ from cmg_mj.experiment import Experiment
 from cmg_mj.studio.choices import law_of, laws_of, observers_of, settings_of
 from cmg_mj.studio.live import Live
 from cmg_mj.studio.pace import Pace
-from cmg_mj.studio.said import Choose, PushNow, Standing, StartAgain
+from cmg_mj.studio.said import Choose, PushNow, ShowAxis, Standing, StartAgain
 
 AFTER_STUDIO = 0
 """Priority of a handler that Studio's own comes before."""
@@ -55,6 +55,7 @@ class Stepping(plugin.SimPlugin):
         self._single_steps = 0
         self._said = -1.0
         self._complaint = ""
+        self._axis = ""
         self.live: Live | None = None
 
     # --- model and time ------------------------------------------------------------------------------------
@@ -160,7 +161,17 @@ class Stepping(plugin.SimPlugin):
     def on_push(self, event: PushNow) -> None:
         """Push."""
         if self.live is not None and self.handle.data is not None:
-            self.live.push(self.handle.data, event.torque_n_m, event.duration_s)
+            self.live.push(self.handle.data, event.torque_n_m, event.duration_s, self._shown(self.live))
+
+    @messages.handler
+    def on_show_axis(self, event: ShowAxis) -> None:
+        """Show another axis, and push about it from now on."""
+        self._axis = event.axis
+
+    def _shown(self, live: Live) -> int:
+        """The place of the axis that is shown: of the one that was chosen, if the rig has it, or else the first."""
+        names = live.plant.axis_names
+        return names.index(self._axis) if self._axis in names else 0
 
     @messages.handler
     def on_start_again(self, _: StartAgain) -> None:
@@ -178,13 +189,17 @@ class Stepping(plugin.SimPlugin):
         if live is None or data is None:
             return Standing(note=self._complaint)
         now, stopped = live.as_of(data)
-        ticks = np.array([tick for tick in live.ticks if tick.time_s < data.time - 1e-9]).reshape(-1, 6)
+        axis = self._shown(live)
+        own = now.parts[axis]
+        ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 6)
         return Standing(
             title=now.scenario.title,
             time_s=data.time,
-            settings=settings_of(now.scenario),
+            axes=tuple(live.plant.axis_names),
+            axis=live.plant.axis_names[axis],
+            settings=settings_of(own.scenario),
             observers=observers_of(live.base),
-            gains=tuple(getattr(now.law, "gains", ())),
+            gains=tuple(getattr(own.law, "gains", ())),
             laws=laws_of(live.base),
             law=law_of(live.base, now),
             stopped=stopped,

@@ -29,7 +29,7 @@ Said = TypeVar("Said", bound=messages.Message)
 
 
 class Recorded(Stepping):
-    """Keeps every tick: time, the true state, what the controller made of it."""
+    """Keeps every tick: time, what the controller made of it on each axis, the joints."""
 
     def __init__(self, opened: Callable[[str], Experiment], **others: Any) -> None:
         super().__init__(opened, **others)
@@ -45,15 +45,19 @@ class Recorded(Stepping):
 
 
 def recording(live: Live, rows: list[tuple[float, ...]]) -> Callable[[mujoco.MjData], bool]:
-    step, line = live.step, live.plant.axis.line
+    step, lines = live.step, [axis.line for axis in live.plant.axes]
 
     def recorded(data: mujoco.MjData) -> bool:
         time, q, v = data.time, data.qpos.tolist(), data.qvel.tolist()
         ticked = step(data)
-        tick = live.controller.tick
-        if ticked and tick is not None:
-            push = sum(float(data.qfrc_applied[dof]) * share for dof, share in zip(*line.push, strict=True))
-            rows.append((time, float(line.rate(v)), tick.y1, tick.y2, tick.fog, tick.u, tick.x_e, push, *q, *v))
+        if ticked:
+            row = [time]
+            for line, part in zip(lines, live.controller.parts, strict=True):
+                tick = part.tick
+                assert tick is not None
+                push = sum(float(data.qfrc_applied[dof]) * share for dof, share in zip(*line.push, strict=True))
+                row += [float(line.rate(v)), tick.y1, tick.y2, tick.fog, tick.u, tick.x_e, push]
+            rows.append((*row, *q, *v))
         return ticked
 
     return recorded
@@ -130,5 +134,6 @@ def session(*settings: str, scenario: str = "push_recovery", **others: Any) -> I
 def as_rows(trajectory: Trajectory) -> np.ndarray:
     """A runner's trajectory as the rows of a session."""
     rates = [trajectory[name] for name in trajectory.layout.rates()]
-    names = ("time_s", *SIGNALS)
+    axes = [f"{axis}/" for axis in trajectory.axes] or [""]
+    names = ("time_s", *(axis + signal for axis in axes for signal in SIGNALS))
     return np.column_stack([*(trajectory[name] for name in names), trajectory.qpos(), *rates])
