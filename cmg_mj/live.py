@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from cmg_mj.experiment import Experiment
-from cmg_mj.rows import Rows
+from cmg_mj.rows import Rows, RowsOfAxes
 from cmg_mj.runs import recording_title, to_record
 from cmg_mj.simulate import Driver, Result
 
@@ -58,18 +58,23 @@ class Pace:
 
 def shown_before(experiment: Experiment, driver: Driver = "native", world: int = 0) -> Shown:
     """What a viewer is told of a run before its first tick."""
-    from cmg_mj.recording.growing import Shown
+    from cmg_mj.recording.growing import Named, Shown
 
-    scenario, plant = experiment.scenario, experiment.plant
+    scenario = experiment.scenario
+    several = len(experiment.parts) > 1
+    branches = []
+    for own in experiment.parts:
+        bias = math.degrees(own.plant.apparent_bias(own.scenario.sensors.accelerometer))
+        axis = own.plant.axis.name if several else None
+        branches.append(Named(axis or scenario.observer.kind, bias, axis))
     return Shown(
-        scenario.observer.kind,
-        plant,
+        branches,
+        experiment.plant,
         experiment.law.dt,
         recording_title(experiment, driver),
         scenario.push,
         scenario.metrics,
         experiment.law.rate_limit,
-        math.degrees(plant.apparent_bias(scenario.sensors.accelerometer)),
         experiment.as_toml(driver, world),
     )
 
@@ -96,7 +101,7 @@ class LiveRun:
         self._pace = pace
         self._ticks = 0
         self._shown_at = -math.inf
-        self._rows: Rows | None = None
+        self._rows: Rows | RowsOfAxes | None = None
         self._view = Live(url, shown_before(experiment, driver, world))
 
     @property
@@ -134,15 +139,14 @@ class LiveRun:
 
         return {"on_start": self._begin, "on_progress": tick}
 
-    def _begin(self, rows: Rows) -> None:
+    def _begin(self, rows: Rows | RowsOfAxes) -> None:
         self._rows = rows
         self._view.begin(rows.since(0))
         self._pace.start()
 
     def ended(self, result: Result) -> None:
         """Show the end."""
-        (run,) = to_record(self._experiment, result)
-        self._view.end(run)
+        self._view.end(to_record(self._experiment, result))
 
     def _show(self) -> None:
         assert self._rows is not None

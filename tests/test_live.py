@@ -20,7 +20,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from cmg_mj.cli.live import factor_of
-from cmg_mj.experiment import prepare
+from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.live import LiveRun, Pace, shown_before
 from cmg_mj.push import Push
 from cmg_mj.recording import viewer
@@ -38,6 +38,7 @@ from tests.run_folders import assert_whole
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 SHORT = ("duration_s=3.0", "push.0.start_s=0.4", "push.0.duration_s=0.1")
+TWO_AXES = (*SHORT, "push.1.start_s=0.8", 'companions=["adaptive"]', "axes.pitch.observer.kind=linear")
 TWO_ENDS = ("tilt/settle_band", "command/limit", "bias/true")
 """Straight lines, of which a recording has the ends and a stream the ends of every piece."""
 NOT_ALIKE = "/__properties"
@@ -94,19 +95,25 @@ def assert_alike(streamed: Path, saved: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "settings",
+    ("scenario", "settings"),
     [
-        SHORT,
-        (*SHORT, 'companions=["adaptive", "linear"]', "plant.equilibrium_bias_deg=0.5"),
-        (*SHORT, "push.0.torque_n_m=40.0"),  # falls
-        (*SHORT, "push.0.start_s=0.401", "push.0.duration_s=0.001", "plant.initial_tilt_deg=0.0"),
-        ("duration_s=0.005", "push=[]"),
+        ("push_recovery", SHORT),
+        ("push_recovery", (*SHORT, 'companions=["adaptive", "linear"]', "plant.equilibrium_bias_deg=0.5")),
+        ("push_recovery", (*SHORT, "push.0.torque_n_m=40.0")),  # falls
+        (
+            "push_recovery",
+            (*SHORT, "push.0.start_s=0.401", "push.0.duration_s=0.001", "plant.initial_tilt_deg=0.0"),
+        ),
+        ("push_recovery", ("duration_s=0.005", "push=[]")),
+        ("two_axes", TWO_AXES),
+        ("two_axes", (*TWO_AXES, "push.1.torque_n_m=20.0", "plant.model=two_axes_free_base")),  # falls
+        ("two_axes", (*SHORT, 'plant.locked_axes=["pitch"]', "push.1.start_s=1.0")),
     ],
-    ids=["push", "companions", "fall", "between ticks", "one tick"],
+    ids=["push", "companions", "fall", "between ticks", "one tick", "two axes", "fall about pitch", "one is locked"],
 )
-def test_the_stream_is_the_recording(receiver: Viewer, settings: tuple[str, ...]) -> None:
+def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: tuple[str, ...]) -> None:
     """Every entity, every component, every value at its time."""
-    experiment = prepare(load_scenario("push_recovery", settings))
+    experiment = prepare(load_scenario(scenario, settings))
     view = LiveRun(experiment, receiver.url, Pace(5.0))
     with view:
         result = experiment.run(**view.options())
@@ -119,12 +126,24 @@ def test_the_stream_is_the_recording(receiver: Viewer, settings: tuple[str, ...]
 
 @pytest.mark.parametrize("ticks", [1, 2, 3, 64])
 @pytest.mark.parametrize("push", [(0.05, 0.05), (0.051, 0.001), (0.052, 0.07)], ids=str)
-def test_wherever_it_is_cut_into_pieces(ticks: int, push: tuple[float, float], tmp_path: Path) -> None:
+def test_wherever_it_is_cut_into_pieces(ticks: int, push: tuple[float, float]) -> None:
     """With pushes that begin and end at ticks and between them; a second one comes before the rig has settled."""
     pushes = [Push(torque_n_m=2.0, start_s=push[0], duration_s=push[1])]
     pushes.append(Push(torque_n_m=-1.0, start_s=0.2, duration_s=0.015))
     scenario = load_scenario("push_recovery", ["duration_s=0.6", "plant.timestep_s=0.001"])
-    experiment = prepare(scenario.model_copy(update={"push": pushes}))
+    assert_alike_in_pieces(prepare(scenario.model_copy(update={"push": pushes})), ticks)
+
+
+@pytest.mark.parametrize("ticks", [1, 3])
+def test_wherever_several_axes_are_cut(ticks: int) -> None:
+    """A push about one axis is none about the other, whose arrow and phases go their own way."""
+    pushes = ("push.0.start_s=0.051", "push.0.duration_s=0.02", "push.1.start_s=0.2", "push.1.torque_n_m=-2.5")
+    assert_alike_in_pieces(
+        prepare(load_scenario("two_axes", ["duration_s=0.6", "plant.timestep_s=0.001", *pushes])), ticks
+    )
+
+
+def assert_alike_in_pieces(experiment: Experiment, ticks: int) -> None:
     result = experiment.run()
     assert result.trajectory is not None
     growing = Growing(shown_before(experiment), rows(result.trajectory, 0, 0))
@@ -134,7 +153,7 @@ def test_wherever_it_is_cut_into_pieces(ticks: int, push: tuple[float, float], t
         growing.begin(rec)
         for first in range(0, len(result.trajectory) - ticks, ticks):
             growing.add(rec, rows(result.trajectory, first, first + ticks))
-        growing.end(rec, *to_record(experiment, result))
+        growing.end(rec, to_record(experiment, result))
         Path("streamed.rrd").write_bytes(memory.drain_as_bytes())
     save_run(RunFolder(Path("it"), []), experiment, result)
     assert_alike(Path("streamed.rrd"), Path("it/recording.rrd"))

@@ -72,7 +72,6 @@ def live_run(
         return None
     if live and connect is not None:
         raise InputError("--live starts a viewer, --connect takes one that runs already: give one of them")
-    experiment.only_axis("--live")
     factor = factor_of(pace)
     # Rerun reads it when it is imported. What it would say of a viewer that has gone, the command says at the end.
     os.environ.setdefault("RUST_LOG", "off")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from queue import SimpleQueue
 from types import TracebackType
 
@@ -81,15 +81,17 @@ class Live:
         """Show the next ticks."""
         self._jobs.put(lambda: self._growing.add(self._rec, piece))
 
-    def end(self, run: Run) -> None:
-        """Show the last ticks, and what is known only of a run that has ended."""
-        self._jobs.put(lambda: self._layout(self._growing.end(self._rec, run), active=False))
+    def end(self, runs: Sequence[Run]) -> None:
+        """Show the last ticks, and what is known only of a run that has ended; of several axes a run an axis."""
+        self._jobs.put(lambda: self._layout(self._growing.end(self._rec, runs), active=False))
 
     def _begin(self) -> None:
-        branch = self._growing.branch
-        self._rec = rr.RecordingStream(f"{application_of([self._shown.name], [branch])} live")
+        branches = self._growing.branches
+        names = [branch.run.name for branch in branches]
+        self._rec = rr.RecordingStream(f"{application_of(names, branches)} live")
         self._rec.connect_grpc(url_of(str(self._relay.port)))
-        set_up(self._rec, f"{self._shown.title or 'Run'}: {branch.label}, live")
+        labels = ", ".join(branch.label for branch in branches)
+        set_up(self._rec, f"{self._shown.title or 'Run'}: {labels}, live")
         self._layout(self._growing.blueprint(), active=True)
         self._growing.begin(self._rec)
 

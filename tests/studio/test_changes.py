@@ -102,7 +102,7 @@ def test_the_scenarios_observer_has_its_parameters_again() -> None:
             studio.run(0.3)
             studio.send(Choose({OBSERVER: kind}))
         assert studio.live.now.scenario.observer.parameters == {"k1": 40.0}
-        assert vars(studio.live.controller.observer)["k1"] == 40.0
+        assert vars(studio.live.controller.parts[0].observer)["k1"] == 40.0
 
 
 def test_gains_and_feedback() -> None:
