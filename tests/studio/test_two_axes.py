@@ -112,10 +112,13 @@ def test_what_is_chosen_is_chosen_on_all_axes_and_history_brings_it_back() -> No
         assert studio.standing().law == "LQR"
         studio.run(1.0, every_s=0.004)
         assert len(studio.rows) > rows
-        studio.send(Choose({FEEDBACK: "fog"}), Choose({BIAS: 1.0}), Choose({NOISE: 0.0}))
+        studio.send(Choose({FEEDBACK: "fog"}), Choose({BIAS: 0.5}), Choose({NOISE: 0.0}))
         for part in live.now.parts:
             settings = part.scenario
-            assert (settings.controller.feedback, settings.plant.equilibrium_bias_deg) == ("fog", 1.0)
+            assert (settings.controller.feedback, settings.plant.equilibrium_bias_deg) == (
+                "fog",
+                0.5,
+            )  # which was roll's
             assert settings.sensors.accelerometer.noise_density_ug_rthz == 0.0
         assert [part.feedback for part in live.controller.parts] == ["fog", "fog"]
         assert [part.sensors.accelerometer.noise_density_ug_rthz for part in live.controller.parts] == [0.0, 0.0]
@@ -172,7 +175,10 @@ def test_a_fall_about_the_second_axis_is_a_fall() -> None:
     with session(scenario="two_axes") as studio:
         studio.send(ShowAxis("pitch"), PushNow(30.0, 0.5))
         studio.run(1.5)
-        assert studio.standing().stopped.startswith("the rig fell at t = 0.")
+        pushed = 'push=[{start_s=0.0, duration_s=0.5, torque_n_m=30.0, axis="pitch"}]'
+        outcome = prepare(load_scenario("two_axes", [pushed])).run().outcomes[0]
+        assert outcome.kind == "fell"
+        assert studio.standing().stopped.startswith(f"the rig fell at t = {outcome.time_s:g} s")
         for axis in studio.live.plant.axes:
             assert np.all(studio.data.ctrl[axis.servos] == 0.0)
         studio.send(messages.ResetEvent(key=-1))
