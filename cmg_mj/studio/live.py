@@ -233,9 +233,8 @@ class Live:
 
     def _take(self, experiment: Experiment) -> None:
         """Go on as this experiment's; the rig changes in place, so that whoever holds its model goes on too."""
-        if any(
-            own.scenario.plant != of.scenario.plant for own, of in zip(experiment.parts, self.now.parts, strict=True)
-        ):
+        before, after = ([own.scenario.plant for own in each.parts] for each in (self.now, experiment))
+        if after != before:
             take_numbers(self.model, experiment.plant.model)
         self.now = experiment
 
