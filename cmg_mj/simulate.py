@@ -288,8 +288,7 @@ def simulate(
             for step, count, held in looks:
                 if held is not torques:
                     torques = held
-                    for axis, torque in enumerate(torques):
-                        worlds.push(torque, axis)
+                    worlds.push(*torques)
                     pushed = torques if single else [np.broadcast_to(torque, len(plants)) for torque in torques]
                 q, v = worlds.state()
                 lean = lean_of(q)

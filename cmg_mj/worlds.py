@@ -42,10 +42,15 @@ class OneWorld:
         for servo, direction in self._servos[axis]:
             ctrl[servo] = direction * u
 
-    def push(self, torque: float, axis: int = 0) -> None:
-        """Set the torque about an axis."""
-        for dof, share in self._pushes[axis]:
-            self._applied[dof] = share * torque
+    def push(self, *torques: float) -> None:
+        """Set the torques about the axes; lines of one free body share its joint."""
+        applied = self._applied
+        for pushed in self._pushes:
+            for dof, _ in pushed:
+                applied[dof] = 0.0
+        for pushed, torque in zip(self._pushes, torques, strict=True):
+            for dof, share in pushed:
+                applied[dof] += share * torque
 
     def advance(self, steps: int) -> None:
         """Take physics steps."""
@@ -101,10 +106,12 @@ class ManyWorlds:
         """Set the gimbal rates of an axis, each cube in its direction."""
         self._ctrl[:, self._servos[axis]] = np.multiply.outer(u, self._directions[axis])
 
-    def push(self, torque: Scalar, axis: int = 0) -> None:
-        """Set the torques about an axis, one for all or (n_worlds,)."""
-        dofs, shares = self._pushes[axis]
-        self._applied[:, dofs] = np.multiply.outer(torque, shares)
+    def push(self, *torques: Scalar) -> None:
+        """Set the torques about the axes, one for all or (n_worlds,) each; lines of one free body share its joint."""
+        for dofs, _ in self._pushes:
+            self._applied[:, dofs] = 0.0
+        for (dofs, shares), torque in zip(self._pushes, torques, strict=True):
+            self._applied[:, dofs] += np.multiply.outer(torque, shares)
 
     def stop(self, worlds: np.ndarray) -> None:
         """Step these worlds no more."""
