@@ -13,7 +13,7 @@ from mujoco.studio.implot import implot
 from cmg_mj.studio import panel as module
 from cmg_mj.studio.choices import BIAS, FEEDBACK, LAW, OBSERVER
 from cmg_mj.studio.panel import Panel
-from cmg_mj.studio.said import Choose, PushNow, Standing, StartAgain
+from cmg_mj.studio.said import Choose, PushNow, ShowAxis, Standing, StartAgain
 from tests.studio.session import session
 
 LQG = {"rate_hz": 200.0, "rate_limit_rad_s": 4.7, "angles": "measured", "trim_s": 0.0, "kind": "lqg"}
@@ -102,6 +102,29 @@ def test_what_is_pressed_is_sent(
     monkeypatch.setattr(module.imgui, widget, does)
     screen.frame()
     assert screen.sent == [sends]
+
+
+def test_of_several_axes_one_is_chosen(screen: Screen, standing: Standing, monkeypatch: pytest.MonkeyPatch) -> None:
+    lists: list[str] = []
+    combo = module.imgui.Combo
+
+    def listed(label: str, place: int, options: list[str]) -> tuple[bool, int]:
+        lists.append(label)
+        return combo(label, place, options)
+
+    monkeypatch.setattr(module.imgui, "Combo", listed)
+    screen.panel.on_standing(standing)
+    screen.frame()
+    assert lists == ["observer", "law", "rate fed back"]
+    with session(scenario="two_axes") as studio:
+        studio.run(0.5)
+        screen.panel.on_standing(studio.standing())
+    screen.frame()
+    assert lists[3:] == ["axis shown and pushed", *lists[:3]]
+    monkeypatch.setattr(module.imgui, "Combo", picked("axis shown and pushed", "pitch"))
+    screen.frame()
+    assert screen.sent == [ShowAxis("pitch")]
+    assert not screen.panel._broken
 
 
 def test_a_number_counts_once_it_is_typed_to_the_end(
