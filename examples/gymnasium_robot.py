@@ -1,0 +1,26 @@
+"""A pair on a robot of Gymnasium's: the inverted pendulum, balanced by gyroscopes while its cart rolls as it likes.
+
+python -m pip install "cmg_mj[gymnasium]" brings the robot; any file of your own goes the same way.
+"""
+
+import tempfile
+from pathlib import Path
+
+import gymnasium
+
+import cmg_mj
+from cmg_mj.mounting.prospects import prospects
+from cmg_mj.mounting.told import write_scenario
+
+ROBOT = Path(gymnasium.__path__[0]) / "envs" / "mujoco" / "assets" / "inverted_pendulum.xml"
+
+mounted = cmg_mj.mount(ROBOT, body="pole", axis="hinge", free=["slider"])
+with tempfile.TemporaryDirectory() as folder:
+    model = mounted.save(Path(folder) / "balanced.xml")
+    can = prospects(write_scenario(model, ROBOT, "homogeneous"))
+    experiment = write_scenario(model, ROBOT, "homogeneous", can)
+print(f"falls with {can.ceiling.pole:.2f} 1/s; any controller recovers at most {can.ceiling.tilt:.3f} rad")
+for share in (0.6, 1.8):
+    push = {"push.0.torque_n_m": share * can.bears.impulse / 0.1}
+    stood = experiment.with_values(push).run_many(5, keep_trajectory=False).stood.sum()
+    print(f"pushed with {share} of what it bears: {stood} of 5 stood")
