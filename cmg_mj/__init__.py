@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from cmg_mj.push import Push
     from cmg_mj.reduced import ReducedModel
     from cmg_mj.replay.replayed import Replayed, replay_log
+    from cmg_mj.result import Outcome, Result
     from cmg_mj.scenario import load_scenario, parse_scenario
     from cmg_mj.schema import Scenario
     from cmg_mj.sensors import Accelerometer, Encoder, Fog, Sensors
-    from cmg_mj.simulate import Outcome, Result
     from cmg_mj.sweeps.swept import Swept, sweep
     from cmg_mj.tilt import RadialTilt
     from cmg_mj.trajectory import Trajectory
@@ -48,7 +48,7 @@ _HOMES = {
     "scenario": ("load_scenario", "parse_scenario"),
     "schema": ("Scenario",),
     "sensors": ("Accelerometer", "Encoder", "Fog", "Sensors"),
-    "simulate": ("Outcome", "Result"),
+    "result": ("Outcome", "Result"),
     "sweeps.swept": ("Swept", "sweep"),
     "tilt": ("RadialTilt",),
     "trajectory": ("Trajectory",),

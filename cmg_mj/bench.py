@@ -16,9 +16,9 @@ from rich.table import Table
 
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import Measurement, Observer
+from cmg_mj.result import Result
 from cmg_mj.scenario import parse_scenario
 from cmg_mj.schema import Scenario
-from cmg_mj.simulate import Result
 
 CONTROL_RATES_HZ = (200.0, 1000.0)
 REPEATS = 7

@@ -11,8 +11,8 @@ import numpy as np
 from cmg_mj.experiment import Experiment, load_rig, prepare
 from cmg_mj.observers.protocol import BIAS, extra_signals
 from cmg_mj.plant import Plant
+from cmg_mj.result import Outcome, Result
 from cmg_mj.schema import CompareSettings, Scenario
-from cmg_mj.simulate import Outcome, Result
 from cmg_mj.summary_keys import NESTED, finite
 
 

@@ -17,11 +17,11 @@ from cmg_mj.engine import quiet
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.gimbal_angle import GimbalAngle
+from cmg_mj.moments import moments, swinging
 from cmg_mj.references import MEMS_GYRO, References
 from cmg_mj.scenario import load_scenario
 from cmg_mj.schema import Scenario
 from cmg_mj.sensors import at_work
-from cmg_mj.simulate import moments, swinging
 from cmg_mj.timing import whole_steps
 from cmg_mj.worlds import OneWorld
 

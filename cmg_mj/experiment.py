@@ -27,9 +27,10 @@ from cmg_mj.processor import Processor
 from cmg_mj.push import Push
 from cmg_mj.resolved import resolved, with_axes
 from cmg_mj.resources import folder
+from cmg_mj.result import Driver, Result
 from cmg_mj.scenario import as_fields, base_of, located, of_axis, parse_scenario
 from cmg_mj.schema import Scenario
-from cmg_mj.simulate import Driver, Result, simulate
+from cmg_mj.simulate import simulate
 from cmg_mj.stacked import stacked
 from cmg_mj.trajectory import whole_file
 

@@ -9,9 +9,9 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from cmg_mj.experiment import Experiment
+from cmg_mj.result import Driver, Result
 from cmg_mj.rows import Rows, RowsOfAxes
 from cmg_mj.runs import recording_title, to_record
-from cmg_mj.simulate import Driver, Result
 
 if TYPE_CHECKING:
     from cmg_mj.recording.growing import Shown

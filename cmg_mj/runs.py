@@ -15,8 +15,8 @@ from cmg_mj.engine import quiet
 from cmg_mj.experiment import Experiment
 from cmg_mj.plots import plot_run
 from cmg_mj.report import run_title
+from cmg_mj.result import Driver, Result
 from cmg_mj.run_folder import RunFolder, claimed, write_text
-from cmg_mj.simulate import Driver, Result
 from cmg_mj.standings import standings, worlds_table
 from cmg_mj.summary_keys import AXES, RODE_ALONG, finite
 from cmg_mj.trajectory import Trajectory

@@ -14,7 +14,7 @@ from cmg_mj.experiment import Experiment, of_one_batch, run_together
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.pool import structure
-from cmg_mj.simulate import Result
+from cmg_mj.result import Result
 from cmg_mj.trajectory import Trajectory
 
 MOST_WORLDS = 1024

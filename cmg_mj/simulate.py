@@ -2,211 +2,36 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import statistics
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 import numpy as np
 
 from cmg_mj.axes_controller import AxesController
 from cmg_mj.callback import installed
 from cmg_mj.controller import Controller, Tick
-from cmg_mj.elementwise import Scalar, where
+from cmg_mj.elementwise import Scalar
 from cmg_mj.engine import quiet
-from cmg_mj.errors import InputError, RunStopped, nearest
+from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.floors import Floors
 from cmg_mj.metrics import Metrics, MetricsSettings
+from cmg_mj.moments import moments, swinging
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant import Plant
 from cmg_mj.push import Push
 from cmg_mj.references import RATES, References
+from cmg_mj.result import Driver, Outcome, Result
 from cmg_mj.rows import Rows, RowsOfAxes
 from cmg_mj.stacked import of_worlds
-from cmg_mj.swing import Swing, swung
+from cmg_mj.swing import Swing
 from cmg_mj.timing import whole_steps
-from cmg_mj.trajectory import Trajectory
 from cmg_mj.whole_rig import of_the_rig
 from cmg_mj.worlds import ManyWorlds, OneWorld
-from cmg_mj.worlds_table import as_table, riding_along, world_rows
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 A_TURN = 2.0 * math.pi
 """No rig that stood at the last look lies a whole turn farther at the next one: its numbers have gone [rad]."""
-
-Driver = Literal["native", "callback", "board"]
-"""Who calls the controller, or is it. `simulate` knows the first two: a board is the controller's processor."""
-
-
-@dataclass
-class Outcome:
-    """How one world ended.
-
-    Attributes:
-        kind: `done`, `fell`, `stopped` (observer or plant failed) or `interrupted`.
-        time_s: When [s].
-        reason: In words, for `stopped`.
-        with_others: Whether what stopped it stopped all worlds of its batch that still ran: it may be another's fault.
-    """
-
-    kind: Literal["done", "fell", "stopped", "interrupted"]
-    time_s: float
-    reason: str = ""
-    with_others: bool = False
-
-    @property
-    def fell(self) -> bool:
-        """Whether the rig fell."""
-        return self.kind == "fell"
-
-
-@dataclass
-class Result:
-    """What `simulate` returns.
-
-    Attributes:
-        outcomes: How each world ended, (n_worlds,).
-        summaries: Each world's numbers, (n_worlds,).
-        trajectory: All ticks, if they were kept.
-        seconds: Simulated time of the longest world [s].
-        observers: The observer in the loop, then the companions.
-        seed: Seed of the sensors' noise.
-        worlds: The worlds' numbers, (n_worlds,).
-        driver: Who called the controller, or was it.
-    """
-
-    outcomes: list[Outcome]
-    summaries: list[dict[str, Any]]
-    trajectory: Trajectory | None = None
-    seconds: float = 0.0
-    observers: Sequence[str] = ("",)
-    seed: int = 0
-    worlds: Sequence[int] = ()
-    driver: Driver = "native"
-
-    @property
-    def stood(self) -> np.ndarray:
-        """Which worlds stood to the end, (n_worlds,)."""
-        return np.array([outcome.kind == "done" for outcome in self.outcomes])
-
-    @property
-    def fell(self) -> np.ndarray:
-        """Which worlds fell, (n_worlds,)."""
-        return np.array([outcome.fell for outcome in self.outcomes])
-
-    def values(self, key: str, companion: str | None = None) -> np.ndarray:
-        """One number of every world's summary.
-
-        Args:
-            key: The summary's key, such as `velocity_rms_error_rad_s`.
-            companion: Whose, of what rode along: a companion, `zero` or `mems_gyro`; None for the observer in the loop.
-
-        Returns:
-            (n_worlds,); NaN for a world that did not stand to the end, or has no such number.
-
-        Raises:
-            InputError: There is no such key or companion.
-        """
-        of = self.summaries
-        if companion is not None:
-            riding = riding_along(self.summaries[0])
-            if companion not in riding:
-                raise InputError(f"companion {companion!r}: did not ride along; {nearest(companion, riding)}")
-            of = [riding_along(summary)[companion] for summary in of]
-        if key not in of[0]:
-            raise InputError(f"{key!r}: not in the summary; {nearest(key, of[0])}")
-        numbers = np.array([math.nan if s[key] is None else s[key] for s in of], dtype=float)
-        return np.where(self.stood, numbers, math.nan)
-
-    def mean(self, key: str, companion: str | None = None) -> float | None:
-        """Mean of `values` over the worlds that have one; None if no world has."""
-        values = self.values(key, companion)
-        known = values[np.isfinite(values)]
-        return statistics.fmean(known) if len(known) else None
-
-    def rows(self, who: str | None = None) -> list[dict[str, Any]]:
-        """One observer's rows of `table`: that in the loop, or something that rode along."""
-        loop = self.observers[0]
-        worlds = self.worlds or range(len(self.outcomes))
-        return world_rows(loop, who or loop, self.seed, worlds, self.outcomes, self.summaries)
-
-    def table(self) -> pa.Table:
-        """Every world kept: a row per observer and world, those that rode along after the one in the loop.
-
-        Returns:
-            Columns `observer`, `rides_along_in`, `world`, `seed`, `outcome`, `stood`, `end_time_s`, `reason`, then
-            every figure of the summary, null where there is none. Where `stood` is false they are those until the end.
-        """
-        names = [self.observers[0], *riding_along(self.summaries[0])]
-        return as_table(row for name in names for row in self.rows(name))
-
-    def groups(self, count: int) -> list[Result]:
-        """The worlds in so many groups of equal size, in their order, as `run_many` was given them."""
-        worlds = len(self.outcomes)
-        if count < 1 or worlds % count:
-            raise InputError(f"groups({count}): {worlds} worlds cannot be parted so")
-        if count == 1:
-            return [self]
-        size = worlds // count
-        return [self.part(slice(i * size, (i + 1) * size)) for i in range(count)]
-
-    def part(self, worlds: slice) -> Result:
-        """Some of the worlds, that stand beside each other."""
-        return replace(
-            self,
-            outcomes=self.outcomes[worlds],
-            summaries=self.summaries[worlds],
-            trajectory=None if self.trajectory is None else self.trajectory.of_worlds(worlds),
-            seconds=max(outcome.time_s for outcome in self.outcomes[worlds]),
-            worlds=self.worlds[worlds],
-        )
-
-
-def moments(
-    steps: int,
-    beat: int,
-    pushes: Sequence[Push],
-    timestep: float,
-    axes: Sequence[str] = ("",),
-) -> Iterator[tuple[int, int, list[Scalar]]]:
-    """The moments at which the loop must look: (step, steps until the next, each axis' torque, one or a world's each).
-
-    A push about an axis that the rig does not have, since it is locked, moves nothing.
-    """
-    changes: dict[int, list[Scalar]] = {0: [0.0] * len(axes), steps: [0.0] * len(axes)}
-    for push in pushes:
-        for time, torque in ((push.start_s, push.torque_n_m), (push.end_s, -push.torque_n_m)):
-            step = whole_steps(time, timestep, "push", f"{time:g} s")
-            change = changes.setdefault(step, [0.0] * len(axes))
-            about = push.axis or axes[0]
-            if about in axes:
-                change[axes.index(about)] += torque
-    edges = sorted(step for step in changes if step <= steps)
-    torques: list[Scalar] = [0.0] * len(axes)
-    for start, end in itertools.pairwise(edges):
-        torques = [torque + change for torque, change in zip(torques, changes[start], strict=True)]
-        held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in torques]
-        first = min(-(-start // beat) * beat, end)  # the first beat not before the push's edge
-        if first > start:
-            yield start, first - start, held
-        last = max(end // beat * beat, first)
-        for step in range(first, last, beat):
-            yield step, beat, held
-        if last < end:
-            yield last, end - last, held
-
-
-def swinging(
-    looks: Iterable[tuple[int, int, list[Scalar]]], swings: Sequence[Swing], timestep: float, axes: Sequence[str]
-) -> Iterator[tuple[int, int, list[Scalar]]]:
-    """The moments with the swings' torques in their middle."""
-    for step, count, held in looks:
-        yield step, count, swung(held, swings, axes, (step + 0.5 * count) * timestep)
 
 
 @quiet()

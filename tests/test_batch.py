@@ -15,8 +15,8 @@ from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement
 from cmg_mj.plant import Plant, load_plant
 from cmg_mj.reduced import ReducedModel
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 
 SHORT = ("duration_s=0.8", "push.0.start_s=0.2", "push.0.duration_s=0.1")
 

@@ -28,8 +28,8 @@ from cmg_mj.recording.summary import ROW_TABLES
 from cmg_mj.recording.timeline import column as time_column
 from cmg_mj.recording.timeline import instant
 from cmg_mj.references import REFERENCES
+from cmg_mj.result import Outcome
 from cmg_mj.scenario import Scenario, load_scenario
-from cmg_mj.simulate import Outcome
 from cmg_mj.summary_keys import KEYS, heading, written
 from cmg_mj.trajectory import Trajectory
 

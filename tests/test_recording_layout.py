@@ -24,9 +24,9 @@ from cmg_mj.recording.run import best_observers, best_runs
 from cmg_mj.recording.signals import numbered
 from cmg_mj.recording.summary import ROW_TABLES, page
 from cmg_mj.recording.views import EYE
+from cmg_mj.result import Outcome
 from cmg_mj.runs import summary_of
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Outcome
 
 SHORT = ("duration_s=0.6", "push.0.start_s=0.2")
 FIELD_OF_VIEW = math.radians(55.0)

@@ -17,8 +17,8 @@ from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.plant import load_plant
 from cmg_mj.references import REFERENCES
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 
 ROWS = 2 + len(REFERENCES)  # of a world: two observers, and what they are judged beside

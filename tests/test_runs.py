@@ -20,7 +20,7 @@ from cmg_mj import Estimate, Measurement, comparison, load_scenario, parse_scena
 from cmg_mj.errors import InputError
 from cmg_mj.references import REFERENCES
 from cmg_mj.resources import folder
-from cmg_mj.simulate import Outcome
+from cmg_mj.result import Outcome
 from cmg_mj.trajectory import Trajectory
 from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, environment
 from tests.run_folders import assert_whole, names, write

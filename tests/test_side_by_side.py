@@ -8,9 +8,9 @@ import pytest
 from cmg_mj import side_by_side
 from cmg_mj.experiment import Experiment, prepare, run_together
 from cmg_mj.observers import OBSERVERS
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
 from cmg_mj.side_by_side import Run, run_of, run_side_by_side
-from cmg_mj.simulate import Result
 
 
 def experiment(observer: str, *more: str) -> Experiment:

@@ -18,8 +18,8 @@ from cmg_mj.comparison import Compared, compare, prepare_comparison
 from cmg_mj.distribution_plot import _Panel
 from cmg_mj.references import REFERENCES
 from cmg_mj.report import comparison_markdown
+from cmg_mj.result import Outcome, Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Outcome, Result
 from cmg_mj.standings import best, rows_of, standings, worlds_table
 
 ERROR, PUSH_ERROR, FIT = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "velocity_fit"

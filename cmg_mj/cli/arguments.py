@@ -16,9 +16,9 @@ from cmg_mj.errors import InputError, nearest
 
 if TYPE_CHECKING:
     from cmg_mj.experiment import Experiment
+    from cmg_mj.result import Driver
     from cmg_mj.run_folder import RunFolder
     from cmg_mj.schema import Scenario
-    from cmg_mj.simulate import Driver
 
 
 MOST_WORLDS = 10_000

@@ -15,7 +15,7 @@ from cmg_mj.errors import InputError
 if TYPE_CHECKING:
     from cmg_mj.experiment import Experiment
     from cmg_mj.live import LiveRun
-    from cmg_mj.simulate import Driver
+    from cmg_mj.result import Driver
 
 HERE = "127.0.0.1:9876"
 """Where rerun listens if it is not told otherwise."""

@@ -27,7 +27,7 @@ from cmg_mj.cli.terminal import (
 from cmg_mj.errors import InputError, RunStopped
 
 if TYPE_CHECKING:
-    from cmg_mj.simulate import Driver
+    from cmg_mj.result import Driver
 
 LAST_WORLD = 2**63 - 1
 """Tables hold its number in 64 bits."""

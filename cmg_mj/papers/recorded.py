@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.simulate import Result
+from cmg_mj.result import Result
 from cmg_mj.trajectory import Trajectory
 
 

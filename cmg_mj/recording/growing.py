@@ -31,7 +31,7 @@ from cmg_mj.recording.signals import (
     series,
 )
 from cmg_mj.recording.stream import log_page
-from cmg_mj.simulate import Outcome
+from cmg_mj.result import Outcome
 from cmg_mj.trajectory import Trajectory
 
 NOW = 1e-6

@@ -12,7 +12,7 @@ import numpy as np
 from cmg_mj.legible import best, by_observer
 from cmg_mj.metrics import MetricsSettings
 from cmg_mj.push import Push
-from cmg_mj.simulate import Outcome
+from cmg_mj.result import Outcome
 from cmg_mj.trajectory import Trajectory
 
 BALANCING, PUSH, RECOVERING, SETTLED = "balancing", "push", "recovering", "settled"

@@ -14,7 +14,7 @@ from cmg_mj.sweeps.study import Chunk, Study
 from cmg_mj.worlds_table import FIRST
 
 if TYPE_CHECKING:
-    from cmg_mj.simulate import Result
+    from cmg_mj.result import Result
 
 REFUSED = "refused"
 """How a trial ends whose values do not fit each other: it never begins."""

@@ -17,9 +17,9 @@ from cmg_mj.laws.protocol import needs
 from cmg_mj.observers import Observer
 from cmg_mj.push import Window, inside, push_windows
 from cmg_mj.replay import replay
+from cmg_mj.result import Result
 from cmg_mj.schema import ObserverSettings, Scenario
 from cmg_mj.side_by_side import Run, run_side_by_side
-from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 
 WARM_UP_S = 2.0

@@ -18,8 +18,8 @@ from cmg_mj.errors import InputError
 from cmg_mj.intervals import mean_interval
 from cmg_mj.observers import OBSERVERS, needs, observer_class
 from cmg_mj.references import REFERENCES
+from cmg_mj.result import Result
 from cmg_mj.side_by_side import run_of, run_side_by_side
-from cmg_mj.simulate import Result
 
 ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
 WORDS = {"model": "model", "gimbals": "y2, u", "acceleration": "acceleration"}

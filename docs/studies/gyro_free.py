@@ -34,8 +34,8 @@ from cmg_mj.markdown import table
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers.beyond.floor import velocity_floor
 from cmg_mj.push import inside, push_windows
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 
 SEED, TUNING_SEED, TUNING_WORLDS = 70_000, 71_000, 10
 NEW = ("gyro_free", "kalman")

@@ -15,7 +15,7 @@ from bias_limits import LARGEST_DEG, PARTS, SEED, WORLDS, Case, cell, limits
 
 from cmg_mj import load_scenario, markdown, prepare
 from cmg_mj.intervals import known_interval
-from cmg_mj.simulate import Result
+from cmg_mj.result import Result
 
 LQG = "`lqg`"
 LOOPS = {

@@ -17,8 +17,8 @@ import numpy as np
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.markdown import table
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 from cmg_mj.summary_keys import NESTED
 
 INTEGRATORS = ("RK4", "implicit", "implicitfast", "Euler", "discrete")

@@ -16,8 +16,8 @@ import numpy as np
 from cmg_mj import markdown
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.recoverable import ceiling
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 
 AXES = ("roll", "pitch")
 ERROR = "velocity_rms_error_rad_s"

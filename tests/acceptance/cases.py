@@ -7,8 +7,8 @@ from functools import cache
 
 from cmg_mj.experiment import prepare
 from cmg_mj.observers import OBSERVERS
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 
 STANDING = {
     # observer -> settings in which it stands: the headline push at 0.5 degrees of bias, unless it cannot

@@ -39,7 +39,7 @@ from cmg_mj.papers.andrieu2009.simulation import (
 from cmg_mj.papers.andrieu2009.study import Study, rms_by_kind, study
 from cmg_mj.papers.claim import Claim
 from cmg_mj.picture import Picture
-from cmg_mj.simulate import Outcome, Result
+from cmg_mj.result import Outcome, Result
 
 SEEDS, FIRST = 6, 500
 """Other seeds than the report's."""

@@ -14,7 +14,7 @@ from cmg_mj.papers.aranovskiy2020.comparison import Angles, Measured, order_of
 from cmg_mj.papers.aranovskiy2020.figures_5_to_7 import ANGLES, figure, in_the_loop
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.second_place import ELEVEN, ELEVEN_BY_EULER, TEN, TEN_BY_EULER, TEN_EXACT_GAIN
-from cmg_mj.simulate import Outcome, Result
+from cmg_mj.result import Outcome, Result
 
 SEED = 910_000
 

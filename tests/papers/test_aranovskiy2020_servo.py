@@ -12,7 +12,7 @@ from cmg_mj.papers.aranovskiy2020 import servo, two_axes
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1, printed_model
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.plant import load_plant
-from cmg_mj.simulate import Result
+from cmg_mj.result import Result
 
 SEED = 910_000
 

@@ -10,8 +10,8 @@ import pytest
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.replay import replay
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 
 SETTINGS = ["duration_s=0.8", "push.0.start_s=0.3", 'companions="all"', 'controller.feedback="fog"']

@@ -13,8 +13,8 @@ import pytest
 from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment, prepare, run_together
 from cmg_mj.observers import Estimate, Measurement
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 from cmg_mj.sweeps import study as study_module
 from cmg_mj.sweeps import work
 from cmg_mj.sweeps.axes import parse_axis

@@ -7,8 +7,8 @@ import pytest
 
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.recoverable import ceiling
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 
 WORLDS = 20
 RATES = (0.0, 1.0, 3.0)

@@ -14,9 +14,9 @@ from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
 from cmg_mj.side_by_side import run_of, run_side_by_side
-from cmg_mj.simulate import Result
 from cmg_mj.summary_keys import written
 
 WORLDS, SEED = 20, 82_000

@@ -12,7 +12,7 @@ from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import listed_and
 from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.simulate import Result
+from cmg_mj.result import Result
 from cmg_mj.summary_keys import KEYS, written
 
 Numbers = Mapping[str, np.ndarray]

@@ -16,8 +16,8 @@ from cmg_mj.papers.recorded import pushed, trajectory_of
 from cmg_mj.papers.scales import on_common_scales
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.result import Result
 from cmg_mj.side_by_side import run_of, run_side_by_side
-from cmg_mj.simulate import Result
 from cmg_mj.trajectory import Trajectory
 
 FIGURES = {"linear": "Fig. 5", "ltv": "Fig. 6", "homogeneous": "Fig. 7"}

@@ -14,7 +14,7 @@ from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.plant import Plant, load_plant
-from cmg_mj.simulate import Result
+from cmg_mj.result import Result
 
 SEED = 78_000
 WORLDS = 4

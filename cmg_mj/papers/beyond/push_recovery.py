@@ -8,8 +8,8 @@ import numpy as np
 
 from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.intervals import Interval, known_interval
+from cmg_mj.result import Result
 from cmg_mj.scenario import load_scenario
-from cmg_mj.simulate import Result
 
 ERROR = "velocity_rms_error_rad_s"
 """What is compared."""

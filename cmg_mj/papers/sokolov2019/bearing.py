@@ -22,7 +22,7 @@ from cmg_mj.papers.sokolov2019.vertical_torque import Locked, locked_run, vertic
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.plant import load_plant
-from cmg_mj.simulate import Result
+from cmg_mj.result import Result
 
 SEED, WORLDS = 84_000, 20
 BALANCED = "plant.equilibrium_bias_deg=0.0"

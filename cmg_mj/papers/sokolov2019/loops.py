@@ -14,8 +14,8 @@ from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment
 from cmg_mj.papers.words import plus_minus
+from cmg_mj.result import Result
 from cmg_mj.side_by_side import Run, run_side_by_side
-from cmg_mj.simulate import Result
 
 SEED, WORLDS = 83_000, 20
 DURATION_S = 15.0
