@@ -17,7 +17,7 @@ from cmg_mj.schema import ControllerSettings, Scenario
 from cmg_mj.swing import Swing
 
 
-def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) -> str:
+def description(name: str, scenario: Scenario, design: Design, rig: RigFacts, axis: str = "") -> str:
     """What `cmg-mj check` prints: what a scenario amounts to.
 
     Args:
@@ -25,6 +25,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         scenario: The scenario.
         design: The law and the observers.
         rig: What they were made for.
+        axis: The name of the axis, if it has one.
 
     Returns:
         Lines of text.
@@ -60,7 +61,10 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts) ->
         *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
-    return lines(f"{name}: valid", [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))])
+    return lines(
+        f"{name}{f', axis {axis}' if axis else ''}: valid",
+        [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))],
+    )
 
 
 def _about(torque: Push | Swing) -> str:
@@ -90,7 +94,7 @@ def _law_rows(
         yield "", "your own code, which was imported and tried on two samples"
 
 
-def rig_description(name: str, scenario: Scenario, design: Design, rig: RigFacts) -> str:
+def rig_description(name: str, scenario: Scenario, design: Design, rig: RigFacts, axis: str = "") -> str:
     """What `cmg-mj check` prints of a model file by itself.
 
     Args:
@@ -98,10 +102,12 @@ def rig_description(name: str, scenario: Scenario, design: Design, rig: RigFacts
         scenario: One with this model and all defaults.
         design: What the defaults amount to.
         rig: What the model amounts to.
+        axis: The name of the axis, if it has one.
 
     Returns:
         Lines of text.
     """
+    about = f" --set push.0.axis={axis}" if axis else ""
     reduced = rig.reduced
     share = f", for one of {reduced.gimbals} gimbals" if reduced.gimbals > 1 else ""
     rows = [
@@ -111,9 +117,9 @@ def rig_description(name: str, scenario: Scenario, design: Design, rig: RigFacts
         ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
         ("law", f"Table 2's gains, K_e = {number(TABLE_2_GAINS)}"),
         *(("hint", hint) for hint in hints(scenario, design, rig)),
-        ("run it", f"cmg-mj run push_recovery --set plant.model={name}"),
+        ("run it", f"cmg-mj run push_recovery --set plant.model={name}{about}"),
     ]
-    return lines(f"{name}: a rig", rows)
+    return lines(f"{name}: a rig{f', axis {axis}' if axis else ''}", rows)
 
 
 def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:

@@ -61,6 +61,14 @@ class Experiment:
         return self.design.law
 
     @property
+    def observer_title(self) -> str:
+        """The observer in the loop; of several axes with observers of their own, each with its axis."""
+        kinds = [own.scenario.observer.kind for own in self.parts]
+        if len(set(kinds)) == 1:
+            return kinds[0]
+        return ", ".join(f"{own.plant.axis.name} {kind}" for own, kind in zip(self.parts, kinds, strict=True))
+
+    @property
     def observer_names(self) -> list[str]:
         """The observer in the loop, then the companions; of several axes the first one's."""
         if self.axes:
@@ -106,7 +114,7 @@ class Experiment:
         if len(controllers) == 1:
             return controllers[0]
         against = self.scenario.controller.against_turning
-        return AxesController(controllers, self.plant.turning if against else None)
+        return AxesController(controllers, self.plant.turning if against else None, self.scenario.sensors.mems_gyro)
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
         """Run one world. Options are those of `simulate`."""

@@ -8,12 +8,15 @@ from fractions import Fraction
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant_settings import PlantSettings
+from cmg_mj.scenario import of_axis
 from cmg_mj.schema import Scenario
 from cmg_mj.timing import whole_steps
 
 SENSORS = ("accelerometer", "encoder", "fog")
 FINEST_S = 1e-4
 """A scenario whose rates and times leave only a smaller step than this must name the step itself [s]."""
+SWING_SHARE = 10.0
+"""A swinging torque has at least so many samples a period."""
 MOST_TICKS = 2_000_000
 """Of a run; one takes about 1.5 kB of memory until the recording is written."""
 MOST_STEPS = 1_000_000_000
@@ -46,6 +49,12 @@ def check_times(scenario: Scenario) -> None:
             _check_grid(time, timestep, field, f"{time:g} s", lambda steps: f"{steps * timestep:g} s")
     torques = [(f"push.{i}", push.start_s) for i, push in enumerate(scenario.push)]
     torques += [(f"swing.{i}", swing.start_s) for i, swing in enumerate(scenario.swing)]
+    for i, swing in enumerate(scenario.swing):
+        if swing.frequency_hz > control / SWING_SHARE:
+            raise InputError(
+                f"swing.{i}.frequency_hz = {swing.frequency_hz:g}: the torque is held from sample to sample; at most "
+                f"{control / SWING_SHARE:g} Hz at controller.rate_hz = {control:g}"
+            )
     for name, start in torques:
         if start >= scenario.duration_s:
             raise InputError(
@@ -74,9 +83,11 @@ def common_period(scenario: Scenario) -> float:
     Raises:
         InputError: It is shorter than `FINEST_S`; the first field that makes it so is named.
     """
-    periods = [(field, 1 / _fraction(rate), f"{rate:g} Hz") for field, rate in _rates(scenario)]
-    periods += [(field, _fraction(period), shown) for field, period, shown in _inside(scenario)]
-    times = [(field, _fraction(time), f"{time:g} s") for field, time in _times(scenario)]
+    periods, times = [], []
+    for prefix, own in [("", scenario), *((f"axes.{name}.", of_axis(scenario, name)) for name in scenario.axes)]:
+        periods += [(prefix + field, 1 / _fraction(rate), f"{rate:g} Hz") for field, rate in _rates(own)]
+        periods += [(prefix + field, _fraction(period), shown) for field, period, shown in _inside(own)]
+        times += [(prefix + field, _fraction(time), f"{time:g} s") for field, time in _times(own)]
     common = Fraction(0)
     for field, time, shown in periods + times:
         common = _common_divisor(common, time)

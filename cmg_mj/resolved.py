@@ -78,9 +78,11 @@ def with_axes(fields: dict[str, Any], scenario: Scenario, axes: Mapping[str, dic
     found = {name: {section: own[section] for section in OF_AN_AXIS} for name, own in axes.items()}
     for own in found.values():
         own["plant"] = {name: value for name, value in own["plant"].items() if name in AxisPlant.model_fields}
-        own["controller"] = {name: value for name, value in own["controller"].items() if name != "rate_hz"}
+        whole = ("rate_hz", "against_turning")
+        own["controller"] = {name: value for name, value in own["controller"].items() if name not in whole}
     given = TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
-    return {**fields, "controller": given["controller"], "observer": given["observer"], "axes": found}
+    as_given = {name: given[name] for name in ("controller", "observer", "companions")}
+    return {**fields, **as_given, "axes": found}
 
 
 def _parameters(given: dict[str, Any], made: Any, by_bench: Collection[str]) -> dict[str, Any]:

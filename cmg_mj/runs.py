@@ -32,7 +32,7 @@ def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[s
     scenario = experiment.scenario
     summary = {
         "scenario": scenario.title,
-        "observer": scenario.observer.kind,
+        "observer": experiment.observer_title,
         "seed": scenario.seed,
         **_which(result, world),
         "outcome": outcome.kind,

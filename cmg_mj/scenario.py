@@ -19,7 +19,7 @@ from cmg_mj.overrides import override
 from cmg_mj.own_class import as_json
 from cmg_mj.plausible import out_of_size, unreadable
 from cmg_mj.resources import bundled, find, folder
-from cmg_mj.schema import AxisSettings, ControllerSettings, ObserverSettings, Scenario
+from cmg_mj.schema import ANY_LAWS, AxisSettings, ControllerSettings, ObserverSettings, Scenario
 
 LARGEST_FILE = 1_000_000
 """Bytes of a scenario file; the longest that a run writes has three thousand."""
@@ -51,17 +51,45 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
     changes = []
     if observer is not None:
         changes.append(f"--observer {observer}")
-        section = fields.get("observer")
-        if not (isinstance(section, dict) and section.get("kind", ObserverSettings().kind) == observer):
-            fields["observer"] = {"kind": observer}
+        _take_observer(fields, observer)
+    law = _kind_of(fields, "controller")
     for setting in overrides:
         changes.append(f"--set {setting}")
         override(fields, setting)
+    if _kind_of(fields, "controller") != law:
+        _drop_gains(fields, overrides)
     where = " ".join([name, *(["with"] if changes else []), *changes])
     scenario = parse_scenario(fields, where)
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in overrides):
         scenario = find_model(scenario, path.parent)
     return scenario
+
+
+def _take_observer(fields: dict[str, Any], observer: str) -> None:
+    """Another observer instead of the file's, on all axes; parameters that are another's go."""
+    common = _kind_of(fields, "observer")
+    axes = fields.get("axes")
+    for own in axes.values() if isinstance(axes, dict) else ():
+        section = own.get("observer") if isinstance(own, dict) else None
+        if isinstance(section, dict) and section.get("kind", common) != observer:
+            own.pop("observer")
+    if common != observer or not isinstance(fields.get("observer", {}), dict):
+        fields["observer"] = {"kind": observer}
+
+
+def _drop_gains(fields: dict[str, Any], overrides: Iterable[str]) -> None:
+    """The file's gains are its law's: another law, which --set names, does without unless --set gives it some."""
+    given = [setting.partition("=")[0].strip() for setting in overrides]
+    for name in ("gains", "lqr"):
+        if not any(f"{field}.".startswith(f"controller.{name}.") for field in given):
+            fields["controller"].pop(name, None)
+
+
+def _kind_of(fields: Mapping[str, Any], section: str) -> Any:
+    """The kind of observer or law that a file names, or the default."""
+    usual = {"observer": ObserverSettings().kind, "controller": ControllerSettings().kind}[section]
+    given = fields.get(section)
+    return given.get("kind", usual) if isinstance(given, Mapping) else usual
 
 
 def _read(path: Path, name: str) -> dict[str, Any]:
@@ -155,12 +183,13 @@ def of_axis(scenario: Scenario, axis: str) -> Scenario:
         return scenario.model_copy(update={"axes": {}})
     fields = as_fields(scenario.model_copy(update={"axes": {}}))
     where = f"{scenario._where}, [axes.{axis}]".removeprefix(", ")
-    if "rate_hz" in own.controller:
-        raise InputError(located(where, "controller.rate_hz: is the same on all axes; set it in [controller]"))
+    for whole in ("rate_hz", "against_turning"):
+        if whole in own.controller:
+            raise InputError(located(where, f"controller.{whole}: is the same on all axes; set it in [controller]"))
     for name, section in as_fields_of(own).items():
         common = fields.setdefault(name, {})
         if section.get("kind", common.get("kind")) != common.get("kind"):
-            kept = ControllerSettings.model_fields.keys() - {"gains", "lqr"} if name == "controller" else ()
+            kept = ANY_LAWS if name == "controller" else ()
             common = {field: common[field] for field in kept if field in common}
         if name == "controller" and {"gains", "lqr"} & section.keys():
             common = {field: value for field, value in common.items() if field not in ("gains", "lqr")}

@@ -77,6 +77,10 @@ class ControllerSettings(BaseModel):
         return make_law(self.kind, 1.0 / self.rate_hz, self.rate_limit_rad_s, model, noise, **parameters)
 
 
+ANY_LAWS = tuple(name for name in ControllerSettings.model_fields if name not in ("kind", "gains", "lqr"))
+"""Fields of [controller] that every law has."""
+
+
 class ObserverSettings(BaseModel):
     """An observer by name or dotted path, and its parameters, which the observer itself checks."""
 
@@ -165,21 +169,29 @@ class Scenario(BaseModel):
     def with_observer(self, kind: str) -> Scenario:
         """The same experiment with another observer in the loop; its own keeps the parameters given for it.
 
-        On a rig of several axes it is that of all.
+        On a rig of several axes it is that of all: what an axis has of another's own goes.
         """
-        if kind == self.observer.kind:
-            return self
-        axes = {name: own.model_copy(update={"observer": {}}) for name, own in self.axes.items()}
-        return self.model_copy(update={"observer": ObserverSettings(kind=kind), "axes": axes})
+        common = self.observer.kind
+        axes = {
+            name: own if own.observer.get("kind", common) == kind else own.model_copy(update={"observer": {}})
+            for name, own in self.axes.items()
+        }
+        observer = self.observer if kind == common else ObserverSettings(kind=kind)
+        return self.model_copy(update={"observer": observer, "axes": axes})
 
     def with_law(self, kind: str) -> Scenario:
-        """The same experiment with another control law, with its default parameters."""
-        if kind == self.controller.kind:
-            return self
-        fields: dict[str, Any] = {name: getattr(self.controller, name) for name in ControllerSettings.model_fields}
-        own = ControllerSettings(**fields | {"kind": kind, "gains": None, "lqr": None})
-        axes = {name: own_axis.model_copy(update={"controller": {}}) for name, own_axis in self.axes.items()}
-        return self.model_copy(update={"controller": own, "axes": axes})
+        """The same experiment with another control law, with its default parameters, on all axes."""
+        common = self.controller.kind
+        axes = {
+            name: own
+            if own.controller.get("kind", common) == kind
+            else own.model_copy(update={"controller": {n: v for n, v in own.controller.items() if n in ANY_LAWS}})
+            for name, own in self.axes.items()
+        }
+        if kind == common:
+            return self.model_copy(update={"axes": axes})
+        fields: dict[str, Any] = {name: getattr(self.controller, name) for name in ANY_LAWS}
+        return self.model_copy(update={"controller": ControllerSettings(**fields, kind=kind), "axes": axes})
 
     def companion_names(self) -> list[str]:
         """The companions, spelled out, without the observer itself."""

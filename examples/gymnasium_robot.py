@@ -1,6 +1,6 @@
 """A pair on a robot of Gymnasium's: the inverted pendulum, balanced by gyroscopes while its cart rolls as it likes.
 
-python -m pip install "cmg_mj[gymnasium]" brings the robot; any file of your own goes the same way.
+python -m pip install ".[gymnasium]" brings the robot; any file of your own goes the same way.
 """
 
 import tempfile

@@ -225,6 +225,7 @@ def check(file: str) -> None:
         from cmg_mj.experiment import prepare  # MuJoCo, which a bundled rig does without
 
         experiment = prepare(scenario)
-        parts = [(f"{file}, axis {own.plant.axis.name}", own) for own in experiment.axes] or [(file, experiment)]
-        words = [describe(name, own.scenario, own.design, own.plant.facts) for name, own in parts]
+        words = [
+            describe(file, own.scenario, own.design, own.plant.facts, own.plant.axis.name) for own in experiment.parts
+        ]
     click.echo("\n".join(words), file=own_stdout())

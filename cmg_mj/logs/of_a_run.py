@@ -24,6 +24,11 @@ def of_trajectory(path: Path) -> Log:
         if "not a trajectory written by" in str(error):
             raise InputError(f"{path}: {SAY_COLUMNS}") from error
         raise
+    if trajectory.axes:
+        raise InputError(
+            f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; save one of them "
+            f"from Python: Trajectory.load(path).along({trajectory.axes[0]!r}).save(...)"
+        )
     scenario = trajectory.metadata.get("scenario")
     if scenario is None:  # signals.parquet of a replay
         raise InputError(f"{path}: {SAY_COLUMNS}")

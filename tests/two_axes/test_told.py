@@ -63,6 +63,70 @@ def test_what_a_run_writes_reruns_and_has_every_axis(tmp_path: Path) -> None:
     assert {"plot-roll.png", "plot-pitch.png", "recording.rrd"} <= {path.name for path in place.iterdir()}
 
 
+def test_with_companions_it_reruns_with_the_same_columns(tmp_path: Path) -> None:
+    """An axis' own observer is no companion of its own; of the other axis it may be."""
+    experiment = two_axes("axes.roll.observer.kind=linear", "companions=['homogeneous', 'kalman']")
+    experiment.save(tmp_path / "scenario.toml")
+    first, again = (
+        run.run().trajectory for run in (experiment, prepare(load_scenario(str(tmp_path / "scenario.toml"))))
+    )
+    assert first is not None
+    assert again is not None
+    assert list(again.columns) == list(first.columns)
+    assert "roll/estimate/homogeneous/x2_rad_s" in first.columns
+
+
+def test_the_observer_that_is_named_is_that_of_all_axes() -> None:
+    mixed = load_scenario("two_axes", ["axes.roll.observer.kind=linear"])
+    assert prepare(mixed).observer_title == "roll linear, pitch homogeneous"
+    for kind in ("homogeneous", "linear", "kalman"):
+        assert prepare(mixed.with_observer(kind)).observer_title == kind
+    tuned = load_scenario("two_axes", ["axes.roll.observer.k1=25"])
+    assert of_axis(tuned.with_observer("homogeneous"), "roll").observer.parameters == {"k1": 25}
+
+
+def test_an_observer_on_the_command_line_is_that_of_all_axes(tmp_path: Path) -> None:
+    file = tmp_path / "mixed.toml"
+    file.write_text('[plant]\nmodel = "two_axes"\n[axes.roll.observer]\nkind = "linear"\n', encoding="utf-8")
+    assert of_axis(load_scenario(str(file), observer="kalman"), "roll").observer.kind == "kalman"
+    assert of_axis(load_scenario(str(file), observer="linear"), "pitch").observer.kind == "linear"
+    assert of_axis(load_scenario(str(file)), "roll").observer.kind == "linear"
+
+
+def test_another_law_does_without_the_files_gains() -> None:
+    assert load_scenario("two_axes", ["controller.kind=lqg"]).controller.gains is None
+    assert two_axes("controller.kind=lqg").run().outcomes[0].kind == "done"
+    with pytest.raises(InputError, match="lqg takes no gains"):
+        two_axes("controller.kind=lqg", "controller.gains=[1, 2, 3, 4]")
+    limited = load_scenario(
+        "two_axes", ["axes.roll.controller.rate_limit_rad_s=3", "axes.roll.controller.gains=[1, 2, 3, 4]"]
+    )
+    roll = of_axis(limited.with_law("lqg"), "roll").controller
+    assert (roll.kind, roll.gains, roll.rate_limit_rad_s) == ("lqg", None, 3.0)
+
+
+def test_sensors_of_an_axis_have_rates_of_their_own() -> None:
+    experiment = two_axes("axes.roll.sensors.accelerometer.rate_hz=1000")
+    assert experiment.plant.timestep == 0.001
+    assert experiment.run().outcomes[0].kind == "done"
+
+
+def test_the_true_rate_is_used_throughout_where_it_is_fed_back() -> None:
+    """What the observer says then changes nothing, the gimbals' turn against the other axis included."""
+    runs = [two_axes("controller.feedback=truth", f"observer.kind={kind}").run() for kind in ("homogeneous", "linear")]
+    first, second = (run.trajectory for run in runs)
+    assert first is not None
+    assert second is not None
+    for name in ("roll/u_rad_s", "pitch/u_rad_s", "angle/roll/cube1/gimbal_rad"):
+        np.testing.assert_array_equal(first[name], second[name], err_msg=name)
+
+
+def test_replay_of_several_axes_is_refused_for_what_it_is(tmp_path: Path) -> None:
+    experiment = two_axes()
+    place = save_run(tmp_path / "run", experiment, experiment.run())
+    assert "about several axes (roll, pitch)" in cmg_mj("replay", str(place)).complaint
+
+
 def test_the_rigs_figures_are_the_worst_of_its_axes() -> None:
     summary = two_axes().run().summaries[0]
     axes = list(summary[AXES].values())
@@ -120,6 +184,11 @@ def test_the_command_prints_each_axis(tmp_path: Path, monkeypatch: pytest.Monkey
         (["axes.roll=3"], "axes.roll = 3: must be a section"),
         (["axes=3"], "axes = 3: must be a section"),
         (["axes.roll.controller.rate_hz=100"], "[axes.roll]: controller.rate_hz: is the same on all axes"),
+        (["axes.roll.controller.against_turning=false"], "controller.against_turning: is the same on all axes"),
+        (
+            ["swing=[{frequency_hz=15.0, axis='roll'}]", "controller.rate_hz=100"],
+            "at most 10 Hz at controller.rate_hz = 100",
+        ),
         (["axes.roll.controller.gain=[1,2,3,4]"], "[axes.roll]: controller.gain: no such field; did you mean 'gains'"),
         (["axes.roll.observer.k9=1"], "[axes.roll]: observer.k9: homogeneous has no such parameter"),
         (["axes.pitch.observer.kind=lineer"], "[axes.pitch]: observer.kind = 'lineer'"),
