@@ -48,7 +48,7 @@ def bearable(scenario: Scenario, made: Design) -> Bearable:
     Returns:
         What they bear.
     """
-    low, high = 0.0, 1.5 * ceiling(made.rig.reduced, made.law.rate_limit).impulse
+    low, high = 0.0, 1.5 * ceiling(made.rig.reduced, made.law.rate_limit).push(PUSH_S)
     borne = _borne(scenario, made, np.linspace(low, high, LEVELS))
     if borne is None:
         return Bearable(0.0, 0.0)

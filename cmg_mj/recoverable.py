@@ -20,14 +20,35 @@ class Ceiling(NamedTuple):
 
         z < (H/J) S,   S = 1/lambda integral of e^(-lambda t) u cos(u t) dt from 0 to T = theta/u
                          = u/(lambda^2 + u^2) [1 + e^(-lambda T) ((u/lambda) sin theta - cos theta)]
+
+    A push tau(t) that begins at t = 0 adds tau/(J lambda) to z', and an upright rig, whose gimbals turn from that
+    moment on, recovers if
+
+        integral of e^(-lambda t) tau(t)/(J lambda) dt < (H/J) S
     """
 
     tilt: float
-    """The largest tilt from which a rig at rest recovers [rad]."""
-    impulse: float
-    """The largest impulse about the line that an upright rig recovers from [N m s]."""
+    """The largest tilt from which a rig at rest recovers, (H/J) S [rad]."""
+    blow: float
+    """The largest impulse about the line that an upright rig recovers from if it comes all at once, J lambda times the
+    tilt [N m s]. Of a push that is held gimbals take off a part while it lasts: see `push`."""
     pole: float
     """lambda [1/s]."""
+
+    def push(self, duration_s: float) -> float:
+        """The largest impulse about the line that an upright rig recovers from if a constant torque brings it.
+
+        With x = lambda D, a torque tau for D adds tau/(J lambda^2) (1 - e^-x) to what is to be recovered from, so that
+        tau D = blow x/(1 - e^-x).
+
+        Args:
+            duration_s: D, how long the push is held [s].
+
+        Returns:
+            The impulse [N m s].
+        """
+        x = self.pole * duration_s
+        return self.blow * (x / -math.expm1(-x) if x > 0.0 else 1.0)
 
 
 def ceiling(model: ReducedModel, rate_limit: float, travel: float = TRAVEL) -> Ceiling:

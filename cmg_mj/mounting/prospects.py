@@ -38,6 +38,16 @@ class Prospects:
     pole: float
 
     @property
+    def ceiling_push(self) -> float:
+        """The impulse of the largest push of 0.1 s that any controller recovers from [N m s]: E cannot exceed it."""
+        return self.ceiling.push(PUSH_S)
+
+    @property
+    def share(self) -> float:
+        """E in shares of that."""
+        return self.bears.impulse / self.ceiling_push
+
+    @property
     def hints(self) -> list[str]:
         """What is no mistake and yet likely to make the robot fall, in clauses."""
         off = self.pole / self.ceiling.pole - 1.0
@@ -62,7 +72,9 @@ class Prospects:
             "pole_1_s": self.ceiling.pole,
             "pole_simulated_1_s": self.pole,
             "ceiling_tilt_deg": math.degrees(self.ceiling.tilt),
-            "ceiling_impulse_n_m_s": self.ceiling.impulse,
+            "ceiling_impulse_n_m_s": self.ceiling_push,
+            "ceiling_push_n_m": self.ceiling_push / PUSH_S,
+            "ceiling_blow_n_m_s": self.ceiling.blow,
             "borne_impulse_n_m_s": self.bears.impulse,
             "borne_impulse_least_n_m_s": self.bears.least,
             "borne_push_n_m": self.bears.impulse / PUSH_S,

@@ -89,11 +89,11 @@ def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -
     )
     yield (
         f"  any controller: recovers at most {figures['ceiling_tilt_deg']:.3g} deg, or a push of "
-        f"{figures['ceiling_impulse_n_m_s'] / PUSH_S:.3g} N m for {PUSH_S:g} s"
+        f"{figures['ceiling_push_n_m']:.3g} N m for {PUSH_S:g} s"
     )
     yield (
         f"  this one: bears a push of {figures['borne_push_n_m']:.3g} N m for {PUSH_S:g} s (E = "
-        f"{figures['borne_impulse_n_m_s']:.3g} N m s, {can.bears.impulse / can.ceiling.impulse:.0%} of that)"
+        f"{figures['borne_impulse_n_m_s']:.3g} N m s, {can.share:.0%} of that)"
     )
     if enough is not None:
         yield f"  a pair of this size recovers less than {LOW_CEILING_DEG:g} deg: --scale {enough:g} suffices"

@@ -57,8 +57,8 @@ def row(name: str, robot: Robot, folder: Path) -> list[str]:
         f"{figures['inertia_kg_m2']:.3g}",
         f"{can.ceiling.pole:.2f}, {can.pole:.2f}",
         f"{figures['ceiling_tilt_deg']:.1f}",
-        f"{can.ceiling.impulse:.2f}",
-        f"{can.bears.impulse:.2f} ({can.bears.impulse / can.ceiling.impulse:.0%})",
+        f"{can.ceiling_push:.2f}",
+        f"{can.bears.impulse:.2f} ({can.share:.0%})",
         f"{simulated(pushed, torque):.2f} E",
         f"{stood(pushed, push__0__torque_n_m=0.0)}, {stood(pushed, push__0__torque_n_m=0.6 * torque)}",
     ]

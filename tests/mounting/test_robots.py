@@ -65,7 +65,7 @@ def test_it_bears_what_the_reduced_model_says(mounted: tuple[Experiment, Prospec
     """E is within 35 % of the simulation's: most stand 0.65 E and fall with E/0.65; all fall with 1.8 E."""
     experiment, can, _ = mounted
     torque = can.bears.impulse / PUSH_S
-    assert 0.0 < can.bears.impulse < can.ceiling.impulse
+    assert 0.0 < can.bears.impulse < can.ceiling_push
     assert pushed(experiment, 0.65 * torque, 8.0).sum() > WORLDS / 2
     assert pushed(experiment, torque / 0.65, 8.0).sum() < WORLDS / 2
     assert not pushed(experiment, 1.8 * torque, 8.0).any()
