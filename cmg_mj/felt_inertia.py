@@ -57,7 +57,7 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
     loose = [dof for dof in loose if not motion[dof]]
     if loose:
         gives, inertia = row[loose], dense[np.ix_(loose, loose)]
-        held = _contacts(model, data)[:, loose]
+        held = np.concatenate([_contacts(model, data), _ties(model, data)])[:, loose]
         if held.size:
             ways = _null_space(held)
             gives, inertia = gives @ ways, ways.T @ inertia @ ways
@@ -70,11 +70,25 @@ def _loose(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
     held = set()
     for constraint in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (data.eq_active == 1)):
         held.add(int(model.jnt_dofadr[model.eq_obj1id[constraint]]))
+    on_a_joint = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
     for actuator in range(model.nu):
         holds = model.actuator_biasprm[actuator, 1:3].any()  # a servo of position or rate
-        if holds and int(model.actuator_trntype[actuator]) == int(mujoco.mjtTrn.mjTRN_JOINT):
+        if holds and int(model.actuator_trntype[actuator]) in on_a_joint:
             held.add(int(model.jnt_dofadr[model.actuator_trnid[actuator, 0]]))
     return [dof for dof in range(model.nv) if dof not in held]
+
+
+def _ties(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """How fast what welds and connects tie together parts for the joints' rates, (n, nv): a ball is held by a weld."""
+    kinds = int(mujoco.mjtEq.mjEQ_WELD), int(mujoco.mjtEq.mjEQ_CONNECT)
+    rows = np.zeros((data.nefc, model.nv))
+    if data.nefc and mujoco.mj_isSparse(model):
+        mujoco.mju_sparse2dense(rows, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+    elif data.nefc:
+        rows[:] = np.asarray(data.efc_J).reshape(data.nefc, model.nv)
+    of_equality = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+    wanted = [bool(of_equality[i]) and int(model.eq_type[data.efc_id[i]]) in kinds for i in range(data.nefc)]
+    return rows[wanted] if data.nefc else rows
 
 
 def _contacts(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:

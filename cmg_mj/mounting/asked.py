@@ -39,7 +39,7 @@ class Asked:
             raise InputError(f"--scale {self.scale}: must be from {SCALES[0]:g} to {SCALES[1]:g}")
         if not (isinstance(self.name, str) and (not self.name or self.name.isidentifier())):
             raise InputError(f"--name {self.name}: must be a word, such as roll")
-        if self.at is not None and not (len(self.at) == 3 and np.isfinite(np.array(self.at, dtype=float)).all()):
+        if self.at is not None and not _is_point(self.at):
             raise InputError(f"--at {self.at}: must be three numbers, a point in the body's frame [m]")
         if self.hold not in HOLDS:
             raise InputError(f"--hold {self.hold}: {nearest(str(self.hold), HOLDS, 'must be one of')}")
@@ -50,3 +50,11 @@ class Asked:
     def prefix(self) -> str:
         """What the names of the axis' elements begin with."""
         return f"{self.name}/" if self.name else ""
+
+
+def _is_point(at: object) -> bool:
+    try:
+        point = np.array(at, dtype=float)
+    except (TypeError, ValueError):
+        return False
+    return point.shape == (3,) and bool(np.isfinite(point).all())

@@ -10,6 +10,8 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.mounting.naming import free_name
+from cmg_mj.mounting.servos import holds
 
 Hold = Literal["constraints", "servos"]
 IMPEDANCE = 0.9999
@@ -21,6 +23,23 @@ and its accelerometers show that as tilt."""
 def held_name(joint: str) -> str:
     """What the constraint that holds a joint is called."""
     return f"{joint}_held"
+
+
+def joint_held(spec: mujoco.MjSpec, tie: mujoco.MjsEquality) -> str:
+    """The joint that an equality constraint holds where it stands, as an earlier mount's does; "" for any other.
+
+    Whatever it is called: it is on, and of one joint alone, or of a ball's body with the one that this hangs on.
+    """
+    if not tie.active:
+        return ""
+    if int(tie.type) == int(mujoco.mjtEq.mjEQ_JOINT):
+        return "" if tie.name2 else tie.name1
+    body = spec.body(tie.name2) if tie.name2 else None
+    if int(tie.type) != int(mujoco.mjtEq.mjEQ_WELD) or body is None or body.parent is None:
+        return ""
+    balls = [joint.name for joint in body.joints if int(joint.type) == int(mujoco.mjtJoint.mjJNT_BALL)]
+    of_bodies = int(tie.objtype) == int(mujoco.mjtObj.mjOBJ_BODY) and tie.name1 == body.parent.name
+    return balls[0] if of_bodies and len(balls) == len(body.joints) == 1 else ""
 
 
 def hold_joints(
@@ -53,11 +72,13 @@ def hold_joints(
     for name in loose:
         if name not in names:
             raise InputError(f"--free {name}: {path} has no such joint; {nearest(name, names, 'its joints')}")
-    own = [actuator.target for actuator in spec.actuators] if how == "servos" else []
-    already = [name for name in names if spec.equality(held_name(name))]
-    for name in already:
-        if name in {*moving, *loose}:
-            spec.delete(spec.equality(held_name(name)))
+    own = [actuator.target for actuator in spec.actuators if holds(actuator)] if how == "servos" else []
+    ties = {joint: tie for tie in spec.equalities if (joint := joint_held(spec, tie))}
+    already = set(ties)
+    for name in already & {*moving, *loose}:
+        if ties[name].name.startswith(held_name(name)):  # the user's own is the user's
+            spec.delete(ties[name])
+    taken = {tie.name for tie in spec.equalities}
     held = [name for name in names if name not in {*moving, *loose, *own, *already}]
     data = mujoco.MjData(model)
     data.qpos[:] = pose
@@ -78,8 +99,9 @@ def hold_joints(
             inverse = data.xquat[parent] * [1.0, -1.0, -1.0, -1.0]
             mujoco.mju_mulQuat(relative, inverse, data.xquat[body])
             tie = spec.add_equality(
-                name=held_name(name),
+                name=free_name(held_name(name), taken),
                 type=mujoco.mjtEq.mjEQ_WELD,
+                active=True,
                 objtype=mujoco.mjtObj.mjOBJ_BODY,
                 name1=model.body(parent).name,
                 name2=model.body(body).name,
@@ -88,7 +110,11 @@ def hold_joints(
             tie.data[:11] = [0.0, 0.0, 0.0, *at, *relative, 1.0]
         else:
             tie = spec.add_equality(
-                name=held_name(name), type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name
+                name=free_name(held_name(name), taken),
+                type=mujoco.mjtEq.mjEQ_JOINT,
+                active=True,
+                objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                name1=name,
             )
             address = int(joint.qposadr[0])
             tie.data[:] = 0.0

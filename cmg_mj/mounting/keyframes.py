@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.mounting.robot import joint_sizes
+from cmg_mj.mounting.servos import at_rest
 from cmg_mj.rig_parts import KEYFRAME
 
 Poses = Mapping[str, np.ndarray]
@@ -50,16 +51,13 @@ def write_keyframe(
         speeds: Of the joints that turn, by name [rad/s].
         ctrl: Of the actuators that are driven, by name. Position servos hold where their joints stand.
     """
-    qvel, act, controls = np.zeros(model.nv), np.zeros(model.na), np.zeros(model.nu)
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    qvel, (act, controls) = np.zeros(model.nv), at_rest(model, data)
     for joint, speed in speeds.items():
         qvel[int(model.joint(joint).dofadr[0])] = speed
     for i in range(model.nu):
-        if int(model.actuator_trntype[i]) == int(mujoco.mjtTrn.mjTRN_JOINT):
-            here = qpos[model.jnt_qposadr[model.actuator_trnid[i, 0]]]
-            if model.actuator_actadr[i] >= 0 and model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_INTEGRATOR:
-                act[model.actuator_actadr[i]] = here
-            elif model.actuator_biasprm[i, 1]:
-                controls[i] = here
         controls[i] = ctrl.get(model.actuator(i).name, controls[i])
     spec.add_key(name=name, qpos=qpos, qvel=qvel, act=act, ctrl=controls)
 

@@ -80,12 +80,18 @@ def _mounted(spec: mujoco.MjSpec, path: Path, asked: Asked) -> Mounted:
     names = cube_names(asked.prefix, asked.cubes)
     model = compile_model(spec, path)
     earlier = earlier_axes(spec, model, asked.name, path)
-    check_names(spec, [*site_names(asked.prefix).values(), *(f"{cube}/half" for cube in names)], path)
+    check_names(
+        spec,
+        [*site_names(asked.prefix).values(), *(f"{cube}/half" for cube in names), *(f"{cube}_mount" for cube in names)],
+        path,
+    )
 
     # The robot as it is to stand.
     keyframe = asked.keyframe or (KEYFRAME if earlier.drives else None)
     pose = pose_of(model, keyframe, path)
     place = find_place(model, pose, asked, path)
+    if place.joint in earlier.lines:
+        raise InputError(f"{path}: the hinge {place.joint!r} has an axis already: another one needs another hinge")
     own = taken_out(spec, model)
     held = hold_joints(spec, model, pose, asked.hold, {place.joint, *earlier.lines, *earlier.drives}, asked.free, path)
 

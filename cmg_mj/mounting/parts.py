@@ -89,7 +89,8 @@ def add_sensors(
     for name, share in places.items():
         size = 0.01 * height
         spot = {"size": [size, size, size], "rgba": [0.8, 0.1, 0.5, 1.0] if "acc" in name else [0.1, 0.6, 0.6, 1.0]}
-        body.add_site(name=names[name], pos=point + axes[:, 2] * share * height, quat=quaternion, **spot)
+        site = body.add_site(name=names[name], pos=point + axes[:, 2] * share * height, quat=quaternion, **spot)
+        site.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # a default of the robot's may turn sites otherwise
     for name, kind in SENSORS.items():
         spec.add_sensor(
             name=names[name],

@@ -11,6 +11,8 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.mjcf import compile_model, parse
+from cmg_mj.mounting.holding import joint_held
+from cmg_mj.mounting.naming import free_name, name_all
 
 BAD_CONNECTIONS = {
     int(mujoco.mjtEq.mjEQ_CONNECT): "connect",
@@ -50,29 +52,39 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what is deprecated in the user's file
         compile_model(spec, path)
+    # Neither may take the modules' frames away, nor fuse them with what they hang on.
+    spec.compiler.discardvisual = spec.compiler.fusestatic = False
+    compile_model(spec, path)
     off = [flag for name, flag in NEEDED.items() if spec.option.disableflags & int(getattr(mujoco.mjtDisableBit, name))]
     if off:
         raise InputError(
             f'{path}: <flag {off[0]}="disable"/> switches off what a mounted pair needs; take it out of the file'
         )
-    _bake_total_mass(spec, path)
-    for body in spec.bodies:
-        for i, joint in enumerate(body.joints):
-            joint.name = joint.name or f"{body.name or f'body{body.id}'}_joint{i or ''}"
+    if not spec.option.gravity[2] < 0.0:
+        said = " ".join(f"{part:g}" for part in spec.option.gravity)
+        raise InputError(f'{path}: <option gravity="{said}"/> does not pull down: there is nothing to balance')
+    _bake_masses(spec, path)
+    name_all(spec)
     return spec, path
 
 
-def _bake_total_mass(spec: mujoco.MjSpec, path: Path) -> None:
-    """Write masses out that the compiler would scale to a total: the modules are not to be scaled with them."""
-    if not spec.compiler.settotalmass > 0.0:
+def _bake_masses(spec: mujoco.MjSpec, path: Path) -> None:
+    """Write masses and inertias out that the compiler would change: it is not to change the modules' with them.
+
+    It scales to a total (settotalmass), or raises to a bound (boundmass, boundinertia).
+    """
+    compiler = spec.compiler
+    if not (compiler.settotalmass > 0.0 or compiler.boundmass > 0.0 or compiler.boundinertia > 0.0):
         return
     model = compile_model(spec, path)
-    spec.compiler.settotalmass = -1.0
+    compiler.settotalmass, compiler.boundmass, compiler.boundinertia = -1.0, 0.0, 0.0
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
     for body in spec.bodies:
         if body.name != "world":
             body.mass, body.inertia = float(model.body_mass[body.id]), model.body_inertia[body.id]
             body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
+            body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+            body.fullinertia = np.full(6, np.nan)
             body.explicitinertial = True
 
 
@@ -97,7 +109,7 @@ def check_names(spec: mujoco.MjSpec, names: Sequence[str], path: Path) -> None:
     """
     taken = {
         element.name
-        for kind in (spec.bodies, spec.joints, spec.sites, spec.sensors, spec.actuators)
+        for kind in (spec.bodies, spec.frames, spec.joints, spec.sites, spec.sensors, spec.actuators)
         for element in kind
     }
     for name in names:
@@ -113,7 +125,7 @@ def check_chains(spec: mujoco.MjSpec, path: Path) -> None:
     """
     for equality in spec.equalities:
         kind = BAD_CONNECTIONS.get(int(equality.type))
-        if kind:
+        if kind and not joint_held(spec, equality):
             raise InputError(
                 f"{path}: <{kind}> ties {equality.name1!r} and {equality.name2 or 'the world'!r} together: a closed "
                 "chain, whose joints cannot be held one by one"
@@ -158,12 +170,23 @@ def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> str:
     at = data.xpos[model.body(root.name).id].copy(), data.xquat[model.body(root.name).id].copy()
     for joint in joints:
         spec.delete(joint)
-    name = f"{root.name}_free"
+    name = free_name(f"{root.name}_free", {joint.name for joint in spec.joints})
     root.add_freejoint(name=name)
-    root.pos, root.quat = at
+    _place(spec, root, *at, path)
+    return name
+
+
+def _place(spec: mujoco.MjSpec, root: mujoco.MjsBody, pos: np.ndarray, quat: np.ndarray, path: Path) -> None:
+    """Put a body of the world's where it is to be, in the world: a <frame> that it is in is taken off first."""
     for key in list(spec.keys):  # they have the joints that are gone
         spec.delete(key)
-    return name
+    root.pos, root.quat, root.alt.type = np.zeros(3), [1.0, 0.0, 0.0, 0.0], mujoco.mjtOrientation.mjORIENTATION_QUAT
+    model = compile_model(spec, path)
+    frame = model.body(root.name)
+    back_pos, back_quat, inner_pos, inner_quat = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
+    mujoco.mju_negPose(back_pos, back_quat, frame.pos, frame.quat)
+    mujoco.mju_mulPose(inner_pos, inner_quat, back_pos, back_quat, pos, quat)
+    root.pos, root.quat = inner_pos, inner_quat
 
 
 def joint_sizes(kind: int) -> tuple[int, int]:

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError
+from cmg_mj.mounting.servos import at_rest
 
 LONGEST_S = 10.0
 """So long a robot may take to come to rest [s]."""
@@ -81,14 +82,8 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
 
 def _keep_servos(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Position servos keep the joints where they are; nothing else is driven."""
-    for actuator in range(model.nu):
-        if int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_JOINT):
-            continue
-        here = data.qpos[model.jnt_qposadr[model.actuator_trnid[actuator, 0]]]
-        if model.actuator_actadr[actuator] >= 0:
-            data.act[model.actuator_actadr[actuator]] = here
-        elif model.actuator_biasprm[actuator, 1]:
-            data.ctrl[actuator] = here
+    mujoco.mj_forward(model, data)
+    data.act[:], data.ctrl[:] = at_rest(model, data)
 
 
 def _of_tree(model: mujoco.MjModel, joint: int) -> np.ndarray:
