@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import named
+from cmg_mj.cli.arguments import check_observer
 from cmg_mj.cli.terminal import own_stdout, say, say_hints, users_code
 from cmg_mj.errors import InputError
 
@@ -68,49 +69,65 @@ def mount(
     Table 2's, carried over by the robot's time scale and the pair's authority, and it is pushed with 0.6 of what it
     bears.
     """
+    import mujoco
+
     from cmg_mj.mounting import mount as mounted_on
+    from cmg_mj.mounting.mounted import check_target, with_scenario
     from cmg_mj.mounting.prospects import LOW_CEILING_DEG, prospects, scale_that_suffices
-    from cmg_mj.mounting.told import told, write_scenario
+    from cmg_mj.mounting.told import scenario_text, told, write_scenario
+    from cmg_mj.observers.registry import observer_class
     from cmg_mj.plant import load_plant
     from cmg_mj.recoverable import ceiling
 
     along = axis.split() if len(axis.split()) == 3 else axis
 
     def mounted_at(size: float) -> Mounted:
-        return mounted_on(
-            named(robot),
-            body,
-            axis=along,  # type: ignore[arg-type]
-            at=_point(at),
-            cubes=cubes,
-            scale=size,
-            name=name,
-            keyframe=keyframe,
-            hold=hold,  # type: ignore[arg-type]
-            free=free,
-            base="free" if free_base else "as_is",
-        )
+        try:
+            return mounted_on(
+                Path(robot),
+                body,
+                axis=along,  # type: ignore[arg-type]
+                at=_point(at),
+                cubes=cubes,
+                scale=size,
+                name=name,
+                keyframe=keyframe,
+                hold=hold,  # type: ignore[arg-type]
+                free=free,
+                base="free" if free_base else "as_is",
+            )
+        except InputError:
+            raise
+        except (ValueError, KeyError, mujoco.FatalError) as error:  # of MuJoCo's editing: what nobody has foreseen
+            said = " ".join(str(error.args[0] if error.args else error).split()).removeprefix("Error: ")
+            raise InputError(f"{robot}: MuJoCo cannot put a pair on it: {said}") from error
 
-    target = named(out)
+    target = Path(out).expanduser()
+    check_observer("--observer", observer)
+    observer_class(observer)
+    check_target(target, Path(robot).expanduser())
     for path in (target, target.with_suffix(".toml")):
         if path.exists() and not overwrite:
             raise InputError(f"-o {out}: {path} exists; give another name, or --overwrite")
     found = mounted_at(scale)
-    target = found.save(target)
-    can = prospects(write_scenario(target, found.path, observer, axis=name), name)
-    experiment = write_scenario(target, found.path, observer, can, name)
-    plant = experiment.plant.along(name)
-    enough = None
-    if math.degrees(can.ceiling.tilt) < LOW_CEILING_DEG:
+    with with_scenario(target) as model:
+        found.save(model)
+        can = prospects(write_scenario(model, found.path, observer, axis=name), name)
+        experiment = write_scenario(model, found.path, observer, can, name)
+        plant = experiment.plant.along(name)
+        enough = None
+        if math.degrees(can.ceiling.tilt) < LOW_CEILING_DEG:
 
-        def ceiling_at(size: float) -> float:
-            trial = mounted_at(size).save(target.with_name(f".{target.name}.trial.xml"))
-            try:
-                return ceiling(load_plant(model=str(trial)).along(name).reduced, experiment.law.rate_limit).tilt
-            finally:
-                trial.unlink()
+            def ceiling_at(size: float) -> float:
+                trial = mounted_at(size).save(model.with_name(f".{target.stem}.trial.xml"))
+                try:
+                    return ceiling(load_plant(model=str(trial)).along(name).reduced, experiment.law.rate_limit).tilt
+                finally:
+                    trial.unlink()
 
-        enough = scale_that_suffices(ceiling_at, scale)
+            enough = scale_that_suffices(ceiling_at, scale)
+        scenario = scenario_text(target.name, found.path, observer, can, name)
+        model.with_suffix(".toml").write_text(scenario, encoding="utf-8")
     if as_json:
         figures = can.figures() | {"model": str(target), "held": list(found.held), "scale_that_suffices": enough}
         click.echo(json.dumps(figures, indent=2), file=own_stdout())

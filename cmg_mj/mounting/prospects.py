@@ -9,6 +9,7 @@ from typing import Any
 
 from cmg_mj.bearable import PUSH_S, Bearable, bearable
 from cmg_mj.engine import control_callback, quiet
+from cmg_mj.errors import InputError
 from cmg_mj.experiment import Experiment
 from cmg_mj.mounting.asked import SCALES
 from cmg_mj.mounting.falling import falls_with
@@ -55,7 +56,8 @@ class Prospects:
         if not abs(off) < OFF:
             hints.append(
                 f"the robot starts to fall with a pole of {self.pole:.3g} 1/s, its reduced model's is "
-                f"{self.ceiling.pole:.3g}: what it stands on gives way (soft contacts, or joints that are held softly)"
+                f"{self.ceiling.pole:.3g}: what it stands on gives way (soft contacts, or joints that are held softly), or "
+                "the hinge that it tilts about has a spring or damping"
             )
         if self.bears.impulse == 0.0:
             hints.append("with this controller it falls without a push")
@@ -108,9 +110,13 @@ def scale_that_suffices(ceiling_at: Callable[[float], float], scale: float) -> f
         scale: What does not suffice.
 
     Returns:
-        The scale; None if none up to the largest suffices.
+        The scale; None if none suffices up to the largest, or to the largest that can be mounted.
     """
     while (scale := round(1.1 * scale, 2)) <= SCALES[1]:
-        if ceiling_at(scale) >= math.radians(LOW_CEILING_DEG):
+        try:
+            tilt = ceiling_at(scale)
+        except InputError:  # no room for it, say
+            return None
+        if tilt >= math.radians(LOW_CEILING_DEG):
             return scale
     return None

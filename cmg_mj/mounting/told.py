@@ -39,12 +39,20 @@ def write_scenario(model: Path, robot: Path, observer: str, can: Prospects | Non
     Returns:
         The scenario, made ready to run.
     """
+    path = model.with_suffix(".toml")
+    with whole_file(path) as temporary:
+        temporary.write_text(scenario_text(model.name, robot, observer, can, axis), encoding="utf-8")
+    return prepare(load_scenario(str(path)))
+
+
+def scenario_text(model: str, robot: Path, observer: str, can: Prospects | None, axis: str) -> str:
+    """A scenario around a model of that name, as `write_scenario` writes it."""
     tilt = min(START_DEG, SHARE_OF_CEILING * math.degrees(can.ceiling.tilt)) if can else 0.0
     start = {"initial_tilt_deg": float(f"{tilt:.3g}")}
     fields: dict[str, Any] = {
         "title": f"{robot.stem}, balanced",
         "duration_s": DURATION_S,
-        "plant": {"model": model.name, "equilibrium_bias_deg": 0.0, **({} if axis else start)},
+        "plant": {"model": model, "equilibrium_bias_deg": 0.0, **({} if axis else start)},
         "controller": {"gains": "carried_over"},
         "observer": {"kind": observer},
     }
@@ -55,10 +63,7 @@ def write_scenario(model: Path, robot: Path, observer: str, can: Prospects | Non
         torque = float(f"{SHARE_OF_BORNE * can.bears.impulse / PUSH_S:.3g}")
         of_axis = {"axis": axis} if axis else {}
         fields["push"] = [{**of_axis, "start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}]
-    path = model.with_suffix(".toml")
-    with whole_file(path) as temporary:
-        temporary.write_text(tomli_w.dumps(fields), encoding="utf-8")
-    return prepare(load_scenario(str(path)))
+    return tomli_w.dumps(fields)
 
 
 def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -> Iterator[str]:
@@ -68,7 +73,7 @@ def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -
         mounted: The robot with its pair.
         plant: The same as a rig, with the axis of the pair alone.
         can: What the pair can do.
-        enough: If the ceiling is low, the scale that suffices.
+        enough: If the ceiling is low, the scale that suffices, if one does.
 
     Yields:
         Lines.
@@ -98,4 +103,4 @@ def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -
     if enough is not None:
         yield f"  a pair of this size recovers less than {LOW_CEILING_DEG:g} deg: --scale {enough:g} suffices"
     elif figures["ceiling_tilt_deg"] < LOW_CEILING_DEG:
-        yield f"  a pair recovers less than {LOW_CEILING_DEG:g} deg at any scale"
+        yield f"  a pair recovers less than {LOW_CEILING_DEG:g} deg at any scale that it has room for"
