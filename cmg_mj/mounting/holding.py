@@ -18,6 +18,8 @@ IMPEDANCE = 0.9999
 """Of a constraint that holds a joint, MuJoCo's largest. What it lacks of 1 is the share of every acceleration that the
 joint gives way by: with MuJoCo's default of 0.9 to 0.95 a trunk on its waist jerks with every change of the command,
 and its accelerometers show that as tilt."""
+SAME_PLACE = 1e-3
+"""A joint so near is where a constraint holds it [rad, m]: files have six digits."""
 
 
 def held_name(joint: str) -> str:
@@ -40,6 +42,17 @@ def joint_held(spec: mujoco.MjSpec, tie: mujoco.MjsEquality) -> str:
     balls = [joint.name for joint in body.joints if int(joint.type) == int(mujoco.mjtJoint.mjJNT_BALL)]
     of_bodies = int(tie.objtype) == int(mujoco.mjtObj.mjOBJ_BODY) and tie.name1 == body.parent.name
     return balls[0] if of_bodies and len(balls) == len(body.joints) == 1 else ""
+
+
+def _check_stands(model: mujoco.MjModel, pose: np.ndarray, name: str, tie: mujoco.MjsEquality, path: Path) -> None:
+    """See that a constraint of the file's holds a joint where the robot is to stand, not elsewhere."""
+    address = int(model.joint(name).qposadr[0])
+    at, stands = float(model.qpos0[address] + tie.data[0]), float(pose[address])
+    if int(tie.type) == int(mujoco.mjtEq.mjEQ_JOINT) and abs(at - stands) > SAME_PLACE:
+        raise InputError(
+            f"{path}: equality {tie.name!r} holds the joint {name!r} at {at:.4g}, and the robot is to stand with it at "
+            f"{stands:.4g}: give a --keyframe that has it there, or take the equality out of the file"
+        )
 
 
 def hold_joints(
@@ -66,7 +79,7 @@ def hold_joints(
         The joints that are held so.
 
     Raises:
-        InputError: A joint to be left free does not exist.
+        InputError: A joint to be left free does not exist, or the file holds one elsewhere.
     """
     names = [model.joint(i).name for i in range(model.njnt)]
     for name in loose:
@@ -78,6 +91,8 @@ def hold_joints(
     for name in already & {*moving, *loose}:
         if ties[name].name.startswith(held_name(name)):  # the user's own is the user's
             spec.delete(ties[name])
+    for name in already - {*moving, *loose}:
+        _check_stands(model, pose, name, ties[name], path)
     taken = {tie.name for tie in spec.equalities}
     held = [name for name in names if name not in {*moving, *loose, *own, *already}]
     data = mujoco.MjData(model)

@@ -56,7 +56,7 @@ class Prospects:
         if not abs(off) < OFF:
             hints.append(
                 f"the robot starts to fall with a pole of {self.pole:.3g} 1/s, its reduced model's is "
-                f"{self.ceiling.pole:.3g}: what it stands on gives way (soft contacts, or joints that are held softly), or "
+                f"{self.ceiling.pole:.3g}: what it stands on gives way (soft contacts, or joints held softly), or "
                 "the hinge that it tilts about has a spring or damping"
             )
         if self.bears.impulse == 0.0:

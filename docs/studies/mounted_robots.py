@@ -1,6 +1,7 @@
 """What pairs do on robots: the table of docs/mount.md.
 
 python docs/studies/mounted_robots.py [ROBOT ...] (about six minutes on a quiet core)
+python docs/studies/mounted_robots.py --commands (with what each is mounted)
 
 The robots are those of tests/mounting/robots.py; ROBOT is a part of a name. Ten worlds each, the sensors of the
 datasheets, `homogeneous`; from the smaller of a degree and a quarter of the ceiling, 30 s, alone and with a push of
@@ -67,6 +68,9 @@ def row(name: str, robot: Robot, folder: Path) -> list[str]:
 def main() -> None:
     """Print the table."""
     wanted = [name for name in ROBOTS if not sys.argv[1:] or any(part in name for part in sys.argv[1:])]
+    if sys.argv[1:] == ["--commands"]:
+        print("\n".join(robot.command for robot in ROBOTS.values()))
+        return
     with tempfile.TemporaryDirectory() as folder:
         rows = [row(name, ROBOTS[name], Path(folder)) for name in wanted]
     names = ["robot", "tilts about", "scale", "inertia [kg m^2]", "pole: reduced, simulated [1/s]", "ceiling [deg]"]

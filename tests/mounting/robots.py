@@ -17,10 +17,28 @@ def gymnasium_asset(name: str) -> Path:
     return Path(found.origin).parent / "envs" / "mujoco" / "assets" / name
 
 
+def _spaced(point: tuple[float, ...]) -> str:
+    return " ".join(f"{part:g}" for part in point)
+
+
 class Robot(NamedTuple):
     path: Path
     options: dict[str, Any]
     on_contacts: bool = False
+
+    @property
+    def command(self) -> str:
+        """The command that mounts it, from the folder that its file is in."""
+        options = dict(self.options)
+        words = ["cmg-mj mount", self.path.name, f"--body {options.pop('body')}"]
+        for name, value in options.items():
+            if name == "base":
+                words.append("--free-base")
+            elif name == "free":
+                words += [f"--free {joint}" for joint in value]
+            else:
+                words.append(f"--{name} " + (f"{value}" if not isinstance(value, tuple) else f"'{_spaced(value)}'"))
+        return " ".join(words)
 
 
 ROBOTS = {

@@ -192,6 +192,16 @@ def test_joints_without_a_name_get_one_that_is_free() -> None:
     ("changes", "options", "message"),
     [
         ({"more": '<frame name="cube1_mount"><geom size="0.01"/></frame>'}, {}, "has an element 'cube1_mount' already"),
+        (
+            {"joint": NECK, "after": '<equality><joint name="e" joint1="neck" polycoef="0.2 0 0 0 0"/></equality>'},
+            {},
+            "equality 'e' holds the joint 'neck' at 0.2, and the robot is to stand with it at 0",
+        ),
+        (
+            {"after": '<equality><joint name="e" joint1="hip"/></equality>'},
+            {},
+            "does not start to fall from a tilt of 0.05 deg: it stands by itself",
+        ),
         ({}, {"at": ("a", 0, 0)}, "must be three numbers, a point in the body's frame"),
         ({"option": 'gravity="0 0 9.81"'}, {}, 'gravity="0 0 9.81"/> does not pull down: there is nothing to balance'),
         ({"option": 'gravity="0 0 0"'}, {}, 'gravity="0 0 0"/> does not pull down'),

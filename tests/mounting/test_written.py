@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import mujoco
@@ -12,7 +13,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.mounting import mount
 from cmg_mj.mounting.prospects import scale_that_suffices
 from tests.command import cmg_mj
-from tests.mounting.robots import EXAMPLES
+from tests.mounting.robots import EXAMPLES, ROBOTS
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -94,6 +95,19 @@ def test_what_mujoco_cannot_do_is_one_line(monkeypatch: pytest.MonkeyPatch) -> N
     said = cmg_mj(*GIVEN, "-o", "a.xml").complaint
     assert f"{TORSO}: MuJoCo cannot put a pair on it: repeated name 'x' in frame" in said
     assert there() == []
+
+
+def test_the_document_has_the_commands_of_its_robots() -> None:
+    """Each is what the tests mount, in the table's order."""
+    text = (EXAMPLES.parents[1] / "docs" / "mount.md").read_text(encoding="utf-8")
+    assert "\n".join(robot.command for robot in ROBOTS.values()) in text
+
+
+def test_a_command_of_the_document() -> None:
+    words = shlex.split(ROBOTS["bicycle"].command)
+    assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml").status == 0
+    made = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options).save("b.xml")
+    assert made.read_bytes() == Path("a.xml").read_bytes()
 
 
 def test_a_larger_pair_that_has_no_room_is_none_that_suffices() -> None:
