@@ -215,7 +215,7 @@ def test_ctrl_c_keeps_what_was_recorded(receiver: Viewer, ctrl_c: None) -> None:
         _, err = run.communicate(timeout=HANGS_AFTER_S)
     assert run.returncode == 130
     assert err.splitlines()[-1].startswith("cmg-mj: interrupted at ")
-    assert 10 < len(assert_whole("it")) < 2000
+    assert 0 < len(assert_whole("it")) < 2000  # the shapes come first and fill most of what was waited for
     until_it_is_still(Path("received.rrd"))
     assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
 
