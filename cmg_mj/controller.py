@@ -31,6 +31,9 @@ RIDES_ALONG = 20
 """Ticks that a new observer sees before it takes over from another: 0.1 s at 200 Hz."""
 
 
+_new = tuple.__new__  # a named tuple's own takes twice as long
+
+
 class Tick(NamedTuple):
     """All that one control period measured and decided (floats, or arrays (n_worlds,))."""
 
@@ -240,7 +243,8 @@ class Controller:
         )
         if self.coriolis is not None:
             acceleration = acceleration - self.coriolis
-        y = Measurement(y1, y2, acceleration)
+        y = _new(Measurement, (y1, y2))
+        y.acceleration = acceleration
         if not self._single:
             read_only(y1, y2, acceleration)  # observers and the law share them
         if self.tick is None:
@@ -264,5 +268,5 @@ class Controller:
         u, x_e = self._commanding.decide(y, x, held, step)
         if not self._single:
             read_only(u)  # observers get it at the next tick, the trajectory later
-        self.tick = Tick(y1, y2, acceleration, fog, u, x_e, estimates)
+        self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates))
         return self.tick

@@ -107,6 +107,7 @@ def simulate(
     lean_of = rig.axis.line.lean if one else rig.lean
     ideal_of: Any = rig.axis.ideal if one else rig.ideal
     at_work = list(zip(range(len(names)), controller.parts, rows, strict=True))
+    beat, update, state, sense, advance = controller.beat, controller.update, worlds.state, worlds.sense, worlds.advance
     drive: AbstractContextManager = nullcontext() if native else installed(rig, controller)
     try:
         with drive:
@@ -115,7 +116,7 @@ def simulate(
                     torques = held
                     worlds.push(*torques)
                     pushed = torques if single else [np.broadcast_to(torque, len(plants)) for torque in torques]
-                q, v = worlds.state()
+                q, v = state()
                 lean = lean_of(q)
                 if single:
                     if not abs(lean) <= fall:
@@ -130,18 +131,17 @@ def simulate(
                     if not worlds.running.any():
                         break
                 if native:
-                    due = step % controller.beat == 0
-                    ticked = due and controller.update(step, ideal_of(worlds.sense(), v))
+                    ticked = step % beat == 0 and update(step, ideal_of(sense(), v))
                     if ticked:
                         for axis, part, _ in at_work:
                             if not single:
                                 assert part.tick is not None
                                 _stop_blind(worlds, part.tick, ends, step * timestep)
                             worlds.command(part.turning, axis)
-                    worlds.advance(count)
+                    advance(count)
                 else:
                     ticked = step % controller.period == 0
-                    worlds.advance(count)
+                    advance(count)
                 if ticked:
                     running = None if single else worlds.running.copy()
                     for axis, part, own in at_work:
