@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -24,6 +25,8 @@ class OneWorld:
         self.data = plant.new_data()
         self._qpos, self._qvel, self._sensordata = self.data.qpos, self.data.qvel, self.data.sensordata
         self._ctrl, self._applied = self.data.ctrl, self.data.qfrc_applied
+        self._forward = partial(mujoco.mj_forward, self.model, self.data)
+        self._step = partial(mujoco.mj_step, self.model, self.data)
         self._servos = [list(zip(axis.servos, axis.directions, strict=True)) for axis in plant.axes]
         self._pushes = [list(zip(*axis.line.push, strict=True)) for axis in plant.axes]
 
@@ -33,7 +36,7 @@ class OneWorld:
 
     def sense(self) -> Any:
         """MuJoCo's sensordata at the present state, with the torque and the commands that hold there."""
-        mujoco.mj_forward(self.model, self.data)
+        self._forward()
         return self._sensordata.tolist()
 
     def command(self, u: Scalar, axis: int = 0) -> None:
@@ -54,7 +57,7 @@ class OneWorld:
 
     def advance(self, steps: int) -> None:
         """Take physics steps."""
-        mujoco.mj_step(self.model, self.data, steps)
+        self._step(steps)
 
 
 class ManyWorlds:

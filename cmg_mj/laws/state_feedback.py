@@ -98,9 +98,11 @@ class StateFeedback:
         limit = self.rate_limit
         demanded = -(k1 * x1 + k2 * x2 + k3 * x3 + k4 * x_e)
         u = clip(demanded, -limit, limit)
-        # The integrator moves the demand at the rate k4 x3.
-        winding = (u != demanded) & (k4 * x3 * demanded > 0.0)
-        return _new(Integrated, (where(winding, x_e, x_e - self.dt * x3),)), u
+        after = x_e - self.dt * x3
+        if u is not demanded:  # a float within the limit is what it was
+            # The integrator moves the demand at the rate k4 x3.
+            after = where((u != demanded) & (k4 * x3 * demanded > 0.0), x_e, after)
+        return _new(Integrated, (after,)), u
 
     def __call__(self, x1: Scalar, x2: Scalar, x3: Scalar, x_e: Scalar) -> tuple[Scalar, Scalar]:
         """Command and the next integrator state.
