@@ -66,7 +66,6 @@ class AxesController:
         """Forget everything: the next update is the first tick of a run with the same seed."""
         for part in self.parts:
             part.reset()
-            part.coriolis = None
         self.step: int | None = None
         """The physics step of the last update."""
         noise = normals(self.seed, self.worlds, STREAM, self._gyro.channels)

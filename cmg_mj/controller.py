@@ -109,8 +109,6 @@ class Controller:
         self.seed = seed
         self.worlds = worlds
         self.axis = axis
-        self.coriolis: Scalar | None = None
-        """What in the accelerometers' angular acceleration is none, on a rig that turns [rad/s^2]."""
         self.turns_gimbals = True
         """Whether `update` does: with other axes, what a turn couples comes in between."""
         self.feedback: Feedback = feedback
@@ -140,6 +138,8 @@ class Controller:
         self.turning: Scalar = None
         """The rate at which the gimbals are turned since the last tick: its u, behind the backlash [rad/s]."""
         self._gap = None if type(self.backlash) is float and not self.backlash else Backlash(self.backlash, self.law.dt)
+        self.coriolis: Scalar | None = None
+        """What in the accelerometers' angular acceleration is none, on a rig that turns [rad/s^2]."""
         self.step: int | None = None
         """The physics step of the last update."""
         self.beat = math.gcd(self.period, *(sensor.beat for sensor in self._sampled))

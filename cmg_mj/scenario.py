@@ -52,7 +52,7 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
     if observer is not None:
         changes.append(f"--observer {observer}")
         _take_observer(fields, observer)
-    law = _kind_of(fields, "controller")
+    law, overrides = _kind_of(fields, "controller"), list(overrides)  # they are gone through twice
     for setting in overrides:
         changes.append(f"--set {setting}")
         override(fields, setting)

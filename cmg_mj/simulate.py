@@ -83,11 +83,10 @@ def simulate(
     worlds: Any = OneWorld(rig) if single else ManyWorlds(plants, threads)
     fall = np.radians(settings.fall_angle_deg).item()
     names = rig.axis_names
-    parts = list(zip(names, controller.parts, strict=True))
     of_each = observers if isinstance(observers, Mapping) else dict.fromkeys(names, observers)
     judged = [
         _judged(plants, name, part, of_each[name], pushes, settings, keep=keep_trajectory, joints=name == names[0])
-        for name, part in parts
+        for name, part in zip(names, controller.parts, strict=True)
     ]
     rows = [own for own, _ in judged]
     collected = rows[0] if len(rows) == 1 else RowsOfAxes(dict(zip(names, rows, strict=True)))
