@@ -10,48 +10,49 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cmg_mj.callback import control, installed
-    from cmg_mj.controller import Controller
+    from cmg_mj.controllers.controller import Controller
+    from cmg_mj.controllers.laws import LAWS, Fed, Law, StateFeedback, lqr_gains, make_law
     from cmg_mj.errors import InputError, RunStopped
-    from cmg_mj.experiment import Experiment, prepare
-    from cmg_mj.laws import LAWS, Fed, Law, StateFeedback, lqr_gains, make_law
-    from cmg_mj.logs import Log, read_log
-    from cmg_mj.mounting import Mounted, mount
     from cmg_mj.observers import OBSERVERS, Estimate, Measurement, Observer, make_observer
-    from cmg_mj.plant import Plant, load_plant
-    from cmg_mj.plant_settings import PlantSettings
-    from cmg_mj.push import Push
-    from cmg_mj.reduced import ReducedModel
-    from cmg_mj.replay.replayed import Replayed, replay_log
-    from cmg_mj.result import Outcome, Result
-    from cmg_mj.scenario import load_scenario, parse_scenario
-    from cmg_mj.schema import Scenario
-    from cmg_mj.sensors import Accelerometer, Encoder, Fog, Sensors
-    from cmg_mj.sweeps.swept import Swept, sweep
-    from cmg_mj.tilt import RadialTilt
-    from cmg_mj.trajectory import Trajectory
+    from cmg_mj.observers.reduced_model import ReducedModel
+    from cmg_mj.plant.mounting import Mounted
+    from cmg_mj.plant.plant import Plant, load_plant
+    from cmg_mj.plant.plant.mounting import mount
+    from cmg_mj.replay.log_replay import Replayed, replay_log
+    from cmg_mj.replay.logs import Log, read_log
+    from cmg_mj.results.result import Outcome, Result
+    from cmg_mj.results.trajectory import Trajectory
+    from cmg_mj.scenario.disturbances import Push
+    from cmg_mj.scenario.loading import load_scenario, parse_scenario
+    from cmg_mj.scenario.plant_settings import PlantSettings
+    from cmg_mj.scenario.schema import Scenario
+    from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, Sensors
+    from cmg_mj.sensors.tilt import RadialTilt
+    from cmg_mj.simulation.callback import control, installed
+    from cmg_mj.simulation.experiment import Experiment, prepare
+    from cmg_mj.studies.sweeps.api import Swept, sweep
 
 _HOMES = {
-    "callback": ("control", "installed"),
-    "controller": ("Controller",),
+    "simulation.callback": ("control", "installed"),
+    "controllers.controller": ("Controller",),
     "errors": ("InputError", "RunStopped"),
     "observers": ("OBSERVERS", "Estimate", "Measurement", "Observer", "make_observer"),
-    "plant": ("Plant", "load_plant"),
-    "plant_settings": ("PlantSettings",),
-    "push": ("Push",),
-    "reduced": ("ReducedModel",),
-    "replay.replayed": ("Replayed", "replay_log"),
-    "experiment": ("Experiment", "prepare"),
-    "laws": ("LAWS", "Fed", "Law", "StateFeedback", "lqr_gains", "make_law"),
-    "logs": ("Log", "read_log"),
-    "mounting": ("Mounted", "mount"),
-    "scenario": ("load_scenario", "parse_scenario"),
-    "schema": ("Scenario",),
-    "sensors": ("Accelerometer", "Encoder", "Fog", "Sensors"),
-    "result": ("Outcome", "Result"),
-    "sweeps.swept": ("Swept", "sweep"),
-    "tilt": ("RadialTilt",),
-    "trajectory": ("Trajectory",),
+    "plant.plant": ("Plant", "load_plant"),
+    "scenario.plant_settings": ("PlantSettings",),
+    "scenario.disturbances": ("Push",),
+    "observers.reduced_model": ("ReducedModel",),
+    "replay.log_replay": ("Replayed", "replay_log"),
+    "simulation.experiment": ("Experiment", "prepare"),
+    "controllers.laws": ("LAWS", "Fed", "Law", "StateFeedback", "lqr_gains", "make_law"),
+    "replay.logs": ("Log", "read_log"),
+    "plant.mounting": ("Mounted", "mount"),
+    "scenario.loading": ("load_scenario", "parse_scenario"),
+    "scenario.schema": ("Scenario",),
+    "sensors.sampled": ("Accelerometer", "Encoder", "Fog", "Sensors"),
+    "results.result": ("Outcome", "Result"),
+    "studies.sweeps.api": ("Swept", "sweep"),
+    "sensors.tilt": ("RadialTilt",),
+    "results.trajectory": ("Trajectory",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 

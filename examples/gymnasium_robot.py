@@ -9,8 +9,8 @@ from pathlib import Path
 import gymnasium
 
 import cmg_mj
-from cmg_mj.mounting.prospects import prospects
-from cmg_mj.mounting.told import write_scenario
+from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.prospects import prospects
 
 ROBOT = Path(gymnasium.__path__[0]) / "envs" / "mujoco" / "assets" / "inverted_pendulum.xml"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmg_mj
-from cmg_mj.intervals import mean_interval, paired_verdict
+from cmg_mj.results.intervals import mean_interval, paired_verdict
 
 WORLDS = 10
 KEY = "velocity_rms_error_rad_s"

@@ -33,11 +33,11 @@ FACTORS = (0.8, 1.2)
 NUMBER = r"(-?[0-9][0-9.e+-]*)"
 # Equations first: they name the culprit; the closed loop last.
 TESTS = [
-    "tests/test_controller.py",
+    "tests/controllers/test_controller.py",
     "tests/observers",
-    "tests/test_scenario.py",
-    "tests/test_paper_mass_matrix.py",
-    "tests/test_reduced_against_plant.py",
+    "tests/scenario/test_loading.py",
+    "tests/plant/test_paper_mass_matrix.py",
+    "tests/plant/test_reduced_against_plant.py",
     "tests/acceptance",
 ]
 
@@ -58,9 +58,9 @@ def element(parameter: str, file: str, opening: str, index: int) -> Mutation:
 
 OBSERVERS = "cmg_mj/observers/"
 MUTATIONS = [
-    *(element(f"law: K_e[{i}]", "cmg_mj/laws/state_feedback.py", "TABLE_2_GAINS = (", i) for i in range(4)),
-    Mutation("law: rate limit", "cmg_mj/laws/state_feedback.py", r"rate_limit: float = " + NUMBER),
-    Mutation("scenario: rate limit", "cmg_mj/schema.py", r"rate_limit_rad_s: Positive = " + NUMBER),
+    *(element(f"law: K_e[{i}]", "cmg_mj/controllers/laws/state_feedback.py", "TABLE_2_GAINS = (", i) for i in range(4)),
+    Mutation("law: rate limit", "cmg_mj/controllers/laws/state_feedback.py", r"rate_limit: float = " + NUMBER),
+    Mutation("scenario: rate limit", "cmg_mj/scenario/schema.py", r"rate_limit_rad_s: Positive = " + NUMBER),
     Mutation("linear: tau", OBSERVERS + "linear.py", r"tau: Positive = " + NUMBER),
     *(element(f"ltv: Q[{i}]", OBSERVERS + "ltv.py", "Q: tuple[Positive, Positive, Positive] = (", i) for i in range(3)),
     *(
@@ -122,7 +122,7 @@ def mutate(copy: Path, parameter: str, factor: float) -> None:
     """
     name = parameter.removeprefix("reduced: ")
     if name in REDUCED:
-        path = copy / "cmg_mj/reduced.py"
+        path = copy / "cmg_mj/observers/reduced_model.py"
         text = path.read_text()
         line = f"    {name}: float\n"
         # After construction, so that every reader sees the wrong value.

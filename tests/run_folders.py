@@ -8,8 +8,8 @@ from pathlib import Path
 
 from rerun.chunk import RrdReader
 
-from cmg_mj.run_folder.manifest import HIDDEN
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.run_folder.manifest import HIDDEN
+from cmg_mj.results.trajectory import Trajectory
 
 FILES = ["recording.rrd", "scenario.toml", "summary.json", "trajectory.parquet"]
 

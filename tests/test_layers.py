@@ -113,7 +113,7 @@ def test_nothing_above_the_line_imports_mujoco() -> None:
 
 
 def test_a_bundled_scenario_is_checked_without_mujoco() -> None:
-    code = "import sys; import cmg_mj.scenario; print('mujoco' in sys.modules); "
+    code = "import sys; import cmg_mj.scenario.loading; print('mujoco' in sys.modules); "
     code += "from cmg_mj.cli import main; main(['check', 'push_recovery']); print('mujoco' in sys.modules)"
     first, *_, last = in_a_fresh_interpreter(code)
     assert (first, last) == ("False", "False")
@@ -134,8 +134,8 @@ def test_every_observer_works_without_mujoco() -> None:
     code = f"""
 import sys
 from cmg_mj.observers import OBSERVERS, Measurement, make_observer
-from cmg_mj.reduced import ReducedModel
-from cmg_mj.tilt import TiltNoise
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.sensors.tilt import TiltNoise
 model = {PAPER!r}
 for kind in OBSERVERS:
     observer = make_observer(kind, 0.005, model, TiltNoise(0.006, 0.4, 0.9))

@@ -15,10 +15,10 @@ from click.core import ParameterSource
 from cmg_mj.errors import InputError, nearest
 
 if TYPE_CHECKING:
-    from cmg_mj.experiment import Experiment
-    from cmg_mj.result import Driver
-    from cmg_mj.run_folder import RunFolder
-    from cmg_mj.schema import Scenario
+    from cmg_mj.results.result import Driver
+    from cmg_mj.results.run_folder import RunFolder
+    from cmg_mj.scenario.schema import Scenario
+    from cmg_mj.simulation.experiment import Experiment
 
 
 MOST_WORLDS = 10_000
@@ -45,7 +45,7 @@ class Chosen:
 
     def scenario(self, observer: str | None = None) -> Scenario:
         """The scenario with what the options change."""
-        from cmg_mj.scenario import load_scenario
+        from cmg_mj.scenario.loading import load_scenario
 
         settings = [_letters(setting) for setting in self.settings]
         scenario = load_scenario(self.name, settings, observer)
@@ -55,8 +55,8 @@ class Chosen:
         self, what: str, names: Sequence[str], experiment: Experiment, driver: Driver = "native", world: int = 0
     ) -> RunFolder:
         """The folder to write these files to: without --out it is named for what is run and what differs in it."""
-        from cmg_mj.differences import in_a_name, safe_name
-        from cmg_mj.run_folder import unused_folder
+        from cmg_mj.results.run_folder import unused_folder
+        from cmg_mj.scenario.differences import in_a_name, safe_name
 
         if self.out is not None:
             return claim(named(self.out), names)
@@ -128,7 +128,7 @@ of_observers = click.option(
 
 def claim(path: Path, names: Sequence[str] = ()) -> RunFolder:
     """The folder for what a command writes: no other may write to it until the command is done."""
-    from cmg_mj.run_folder import RunFolder
+    from cmg_mj.results.run_folder import RunFolder
 
     return released_at_the_end(RunFolder(path, names))
 

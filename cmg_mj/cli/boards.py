@@ -58,10 +58,10 @@ def export(
     accelerations and encoders to the gimbal rate. NAME_example.c compiles, runs, and compares the C with the
     test vector in NAME_test_vector.h. What is written has been compared with Python on random signals.
     """
-    from cmg_mj.experiment import prepare
-    from cmg_mj.export import check_installed, code, save
-    from cmg_mj.export.names import files_of, name_of
-    from cmg_mj.export.table import export_table
+    from cmg_mj.codegen.export import check_installed, code, save
+    from cmg_mj.codegen.export.names import files_of, name_of
+    from cmg_mj.codegen.export.signal_table import export_table
+    from cmg_mj.simulation.experiment import prepare
 
     check_observer("OBSERVER", observer)
     check_installed()

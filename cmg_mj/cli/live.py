@@ -13,9 +13,9 @@ from cmg_mj.cli.arguments import refuse_given
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.experiment import Experiment
-    from cmg_mj.live import LiveRun
-    from cmg_mj.result import Driver
+    from cmg_mj.results.result import Driver
+    from cmg_mj.simulation.experiment import Experiment
+    from cmg_mj.studies.live_run import LiveRun
 
 HERE = "127.0.0.1:9876"
 """Where rerun listens if it is not told otherwise."""
@@ -75,8 +75,8 @@ def live_run(
     factor = factor_of(pace)
     # Rerun reads it when it is imported. What it would say of a viewer that has gone, the command says at the end.
     os.environ.setdefault("RUST_LOG", "off")
-    from cmg_mj.live import LiveRun, Pace
-    from cmg_mj.recording.viewer import require_listening, start_viewer, url_of
+    from cmg_mj.studies.live_run import LiveRun, Pace
+    from cmg_mj.visualization.recording.viewer import require_listening, start_viewer, url_of
 
     if connect is not None:
         require_listening(connect)

@@ -18,7 +18,7 @@ from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, 
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.logs import Log
+    from cmg_mj.replay.logs import Log
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Reading:
 
     def read(self, path: str) -> Log:
         """One log."""
-        from cmg_mj.logs import read_log
+        from cmg_mj.replay.logs import read_log
 
         return read_log(path, self.columns, **self.options)
 
@@ -93,7 +93,7 @@ def of_a_log(command: Callable) -> Callable:
         between: str | None,
         **others: Any,
     ) -> Any:
-        from cmg_mj.logs.columns import assignments
+        from cmg_mj.replay.logs.columns import assignments
 
         if rate is not None and not 0.1 <= rate <= 1e6:
             raise InputError(f"--rate {rate:g}: must be from 0.1 to 1e6 Hz")
@@ -204,10 +204,12 @@ def replay(
     measured one) and the roughness. Without --model only those observers take part that need none. The recording of a
     run, whose columns are known, replays to the figures of the run. docs/replay.md has the details.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.replay import files, report, told
-    from cmg_mj.replay.noise import noise_numbers
-    from cmg_mj.replay.options import parameters_of
-    from cmg_mj.replay.pendulum import model_of
+    from cmg_mj.replay import observer_inputs as told
+    from cmg_mj.replay import report
+    from cmg_mj.replay import save as files
+    from cmg_mj.replay.parameter_options import parameters_of
+    from cmg_mj.replay.user_noise import noise_numbers
+    from cmg_mj.replay.user_pendulum import model_of
 
     names = names_of(observers)
     spans = [span(text, "--window") for text in windows]
@@ -232,7 +234,7 @@ def replay(
     if out is not None:
         folder = claim(named(out), written)
     else:
-        from cmg_mj.run_folder import unused_folder
+        from cmg_mj.results.run_folder import unused_folder
 
         more = f"-and-{len(read) - 1}-more" if len(read) > 1 else ""
         name = f"replay-{distinct[0]}{more}"

@@ -14,7 +14,7 @@ from cmg_mj.cli.terminal import own_stdout, say, say_hints, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.mounting import Mounted
+    from cmg_mj.plant.mounting import Mounted
 
 
 @click.command(short_help="Mount a pair on a robot of your own: any MJCF in, a rig out.")
@@ -71,13 +71,13 @@ def mount(
     """
     import mujoco
 
-    from cmg_mj.mounting import mount as mounted_on
-    from cmg_mj.mounting.mounted import check_target, with_scenario
-    from cmg_mj.mounting.prospects import LOW_CEILING_DEG, prospects, scale_that_suffices
-    from cmg_mj.mounting.told import scenario_text, told, write_scenario
     from cmg_mj.observers.registry import observer_class
-    from cmg_mj.plant import load_plant
-    from cmg_mj.recoverable import ceiling
+    from cmg_mj.plant.mounting.mounted import check_target, with_scenario
+    from cmg_mj.plant.plant import load_plant
+    from cmg_mj.plant.plant.mounting import mount as mounted_on
+    from cmg_mj.studies.push_limits.mount_report import scenario_text, told, write_scenario
+    from cmg_mj.studies.push_limits.prospects import LOW_CEILING_DEG, prospects, scale_that_suffices
+    from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
     along = axis.split() if len(axis.split()) == 3 else axis
 

@@ -27,7 +27,7 @@ from cmg_mj.cli.terminal import (
 from cmg_mj.errors import InputError, RunStopped
 
 if TYPE_CHECKING:
-    from cmg_mj.result import Driver
+    from cmg_mj.results.result import Driver
 
 LAST_WORLD = 2**63 - 1
 """Tables hold its number in 64 bits."""
@@ -70,8 +70,9 @@ def run(
     default written out and reruns to the same numbers (of a run on the board, with --driver board again; of another
     world than 0, with --world again).
     """
-    from cmg_mj import report, runs
-    from cmg_mj.experiment import prepare
+    from cmg_mj.results import terminal_tables as report
+    from cmg_mj.simulation.experiment import prepare
+    from cmg_mj.studies import save as runs
 
     if observer is not None:
         check_observer("--observer", observer)
@@ -133,11 +134,13 @@ def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown:
     world by world. worlds.parquet has a row per observer and world; the recording has world 0 of every observer, and
     scenario.toml runs to the same comparison: cmg-mj compare FOLDER/scenario.toml.
     """
-    from cmg_mj import comparison, report, runs
-    from cmg_mj.differences import in_words
-    from cmg_mj.laws.protocol import needs
-    from cmg_mj.schema import CompareSettings
-    from cmg_mj.standings import standings
+    from cmg_mj.controllers.laws.protocol import needs
+    from cmg_mj.results import terminal_tables as report
+    from cmg_mj.scenario.differences import in_words
+    from cmg_mj.scenario.schema import CompareSettings
+    from cmg_mj.studies import save as runs
+    from cmg_mj.studies.compare import comparison
+    from cmg_mj.studies.compare.statistics import standings
 
     names = None if observers is None else names_of(observers)
     scenario = chosen.scenario()
@@ -190,7 +193,7 @@ def list_names(what: str | None) -> None:
 
     Parameters are shown with their defaults; change them with --set observer.NAME=VALUE or controller.NAME=VALUE.
     """
-    from cmg_mj import report
+    from cmg_mj.results import terminal_tables as report
 
     if what in (None, "scenarios"):
         click.echo(report.scenario_list())
@@ -209,23 +212,13 @@ def list_names(what: str | None) -> None:
 @users_code()
 def check(file: str) -> None:
     """Check a scenario file, or a model file (.xml), without running it, and say what it amounts to."""
-    from cmg_mj.description import description, rig_description
-    from cmg_mj.design import design
-    from cmg_mj.known_rigs import known_rig
-    from cmg_mj.scenario import load_scenario, parse_scenario
+    from cmg_mj.scenario.description import description, rig_description
+    from cmg_mj.scenario.loading import load_scenario, parse_scenario
+    from cmg_mj.simulation.experiment import prepare
 
     is_model = Path(file).suffix.lower() == ".xml"
     scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file)
     describe = rig_description if is_model else description
-    of_axes = scenario.axes or any(push.axis for push in scenario.push)
-    rig = None if of_axes else known_rig(scenario.plant)
-    if rig is not None:
-        words = [describe(file, scenario, design(scenario, rig), rig)]
-    else:
-        from cmg_mj.experiment import prepare  # MuJoCo, which a bundled rig does without
-
-        experiment = prepare(scenario)
-        words = [
-            describe(file, own.scenario, own.design, own.plant.facts, own.plant.axis.name) for own in experiment.parts
-        ]
+    parts = prepare(scenario).parts
+    words = [describe(file, part.scenario, part.design, part.plant.facts, part.plant.axis.name) for part in parts]
     click.echo("\n".join(words), file=own_stdout())

@@ -24,8 +24,8 @@ from cmg_mj.cli.arguments import (
 )
 from cmg_mj.cli.logs import READING, Reading, each_once, of_a_log
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code, where
-from cmg_mj.differences import safe_name
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.scenario.differences import safe_name
 
 BATCH, CHUNK = 256, 512
 """Worlds that are timed at once: of a batch, and of a sweep's chunk."""
@@ -55,9 +55,9 @@ def bench(observers: str, worlds: int | None, board: bool, sweep: bool, as_json:
     if board:
         if worlds is not None:
             raise InputError("--worlds: is for the batch on the host; --board has no worlds")
-        from cmg_mj.board.cost import cost_markdown, cost_table, counted_on
-        from cmg_mj.board.cost import measure as count
-        from cmg_mj.experiment import prepare
+        from cmg_mj.codegen.board.cost import cost_markdown, cost_table, counted_on
+        from cmg_mj.codegen.board.cost import measure as count
+        from cmg_mj.simulation.experiment import prepare
 
         with progress("Bench on the board", 1.0) as on_progress:
             figures = count([prepare(counted_on(name)) for name in names], on_progress)
@@ -66,14 +66,14 @@ def bench(observers: str, worlds: int | None, board: bool, sweep: bool, as_json:
     if markdown:
         raise InputError("--markdown: only the table of --board is printed so")
     if sweep:
-        from cmg_mj.sweeps.cost import measure as chunks
-        from cmg_mj.sweeps.cost import table
+        from cmg_mj.studies.sweeps.cost import measure as chunks
+        from cmg_mj.studies.sweeps.cost import table
 
         with progress("Bench of sweeps", 1.0) as on_progress:
             figures = chunks(names, worlds or CHUNK, on_progress)
         show(figures, table(figures), as_json)
         return
-    from cmg_mj.bench import bench_table, measure
+    from cmg_mj.studies.benchmark import bench_table, measure
 
     with progress("Bench", 1.0) as on_progress:
         figures = measure(names, worlds or BATCH, on_progress)
@@ -185,9 +185,9 @@ def tune(
     if not chosen.name:
         raise InputError("tune: name a scenario, such as observer_tuning, or a log with --log")
     refuse_given((*READING, "split", "model", "skip"), "is for --log LOG")
-    from cmg_mj.runs import file_name
-    from cmg_mj.tuning import figures_of, files_of_study, save_study, tuning_table
-    from cmg_mj.tuning import tune as fit
+    from cmg_mj.studies.save import file_name
+    from cmg_mj.studies.tuning import figures_of, files_of_study, save_study, tuning_table
+    from cmg_mj.studies.tuning import tune as fit
 
     if observer is not None:
         check_observer("--observer", observer)
@@ -230,13 +230,13 @@ def _tune_on_logs(
     ranges: Mapping[str, tuple[float, float]],
 ) -> None:
     """Tune on a user's logs."""
-    from cmg_mj.replay.noise import noise_numbers
-    from cmg_mj.replay.options import parameters_of
-    from cmg_mj.replay.pendulum import model_of
-    from cmg_mj.runs import file_name
-    from cmg_mj.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
-    from cmg_mj.tuning.logged_written import FILES
-    from cmg_mj.tuning.written import plain
+    from cmg_mj.replay.parameter_options import parameters_of
+    from cmg_mj.replay.user_noise import noise_numbers
+    from cmg_mj.replay.user_pendulum import model_of
+    from cmg_mj.studies.save import file_name
+    from cmg_mj.studies.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
+    from cmg_mj.studies.tuning.save import plain
+    from cmg_mj.studies.tuning.save_on_logs import FILES
 
     if chosen.name:
         raise InputError(f"{chosen.name}: either a scenario or --log, not both")

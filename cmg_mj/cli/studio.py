@@ -12,7 +12,7 @@ from cmg_mj.cli.terminal import say_hints, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.experiment import Experiment
+    from cmg_mj.simulation.experiment import Experiment
 
 GRAPHICS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_software")
 
@@ -59,7 +59,7 @@ def studio(
     rate that is fed back, pushes, and sets the bias and the accelerometers' noise; Studio pauses, steps, resets, and
     goes back in time (docs/studio.md).
     """
-    from cmg_mj.experiment import prepare
+    from cmg_mj.simulation.experiment import prepare
 
     if observer is not None:
         check_observer("--observer", observer)
@@ -75,6 +75,6 @@ def studio(
     say_hints(first.hints)
     if importlib.util.find_spec("mujoco.studio") is None:
         raise InputError("this MuJoCo comes without Studio: install the wheel from PyPI, python -m pip install mujoco")
-    from cmg_mj.studio.opened import open_in_studio
+    from cmg_mj.visualization.studio.open import open_in_studio
 
     open_in_studio(opened, first.scenario.title or scenario, gfx, port, browser)

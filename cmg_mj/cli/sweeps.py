@@ -16,8 +16,8 @@ from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, 
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.sweeps.report import Found
-    from cmg_mj.sweeps.study import Study
+    from cmg_mj.studies.sweeps.report import Found
+    from cmg_mj.studies.sweeps.study import Study
 
 
 @click.command(short_help="Vary fields over many worlds: every observer, with intervals.")
@@ -64,14 +64,14 @@ def sweep(
     95 % intervals, shares of falls, paired differences to the best), report.md with pictures, and study.toml, which
     reruns. The same command again goes on where it was stopped.
     """
-    from cmg_mj.sweeps.cells import COLUMNS, Trials
-    from cmg_mj.sweeps.plan import expected
-    from cmg_mj.sweeps.report import FILES, found_of, save, summary
-    from cmg_mj.sweeps.store import Store
-    from cmg_mj.sweeps.study import MOST_TRIALS, check_values, counted
+    from cmg_mj.studies.sweeps.cells import COLUMNS, Trials
+    from cmg_mj.studies.sweeps.chunk_store import Store
+    from cmg_mj.studies.sweeps.plan import expected
+    from cmg_mj.studies.sweeps.report import FILES, found_of, save, summary
+    from cmg_mj.studies.sweeps.study import MOST_TRIALS, check_values, counted
 
     if cluster is not None:
-        from cmg_mj.sweeps.cluster import local_workers
+        from cmg_mj.studies.sweeps.dask_cluster import local_workers
 
         local_workers(cluster)
     study = _study(chosen, varied, observers, worlds, sample, sobol, order)
@@ -110,11 +110,11 @@ def sweep(
 def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
     """What runs the chunks: this process, or a cluster."""
     if cluster is None:
-        from cmg_mj.sweeps.store import run
+        from cmg_mj.studies.sweeps.chunk_store import run
 
         yield run
     else:
-        from cmg_mj.sweeps.cluster import on_cluster
+        from cmg_mj.studies.sweeps.dask_cluster import on_cluster
 
         with on_cluster(cluster, say) as connected:
             yield connected.run
@@ -129,10 +129,10 @@ def _study(
     sobol: int | None,
     order: str | None,
 ) -> Study:
-    from cmg_mj.sweeps.axes import parse_axis
-    from cmg_mj.sweeps.file import axes_of, design_of, scenario_of, study_file
-    from cmg_mj.sweeps.study import Study
-    from cmg_mj.sweeps.swept import WORLDS
+    from cmg_mj.studies.sweeps.api import WORLDS
+    from cmg_mj.studies.sweeps.axes import parse_axis
+    from cmg_mj.studies.sweeps.file import axes_of, design_of, scenario_of, study_file
+    from cmg_mj.studies.sweeps.study import Study
 
     if sample is not None and sobol is not None:
         raise InputError("--sample and --sobol: one of them")
@@ -164,7 +164,7 @@ def _split(setting: str) -> tuple[str, str]:
 
 
 def _as_json(found: Found) -> dict[str, Any]:
-    from cmg_mj.sweeps.cells import cells_of
+    from cmg_mj.studies.sweeps.cells import cells_of
 
     study = found.trials.study
     tables: dict[str, Any] = {"trials": study.trials, "cells": list(cells_of(found.trials))}
@@ -174,7 +174,7 @@ def _as_json(found: Found) -> dict[str, Any]:
 
 
 def _plan_text(takes: dict[str, Any]) -> str:
-    from cmg_mj.sweeps.study import counted
+    from cmg_mj.studies.sweeps.study import counted
 
     how_many = " x ".join(counted(takes[what], what[:-1]) for what in ("points", "observers", "worlds"))
     seconds, chunks = takes["minutes"] * 60.0, counted(takes["chunks"], "chunk")

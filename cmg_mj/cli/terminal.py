@@ -17,7 +17,7 @@ import click
 from cmg_mj.cli.pace import Pace
 
 if TYPE_CHECKING:
-    from cmg_mj.run_folder import RunFolder
+    from cmg_mj.results.run_folder import RunFolder
 
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 """Exit statuses."""

@@ -15,10 +15,9 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, cos, dot
-from cmg_mj.fields import STRICT, NonNegative, Positive
+from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
 from cmg_mj.observers.protocol import BIAS, TORQUE, Measurement
-from cmg_mj.reduced import ReducedModel
-from cmg_mj.stability import MARGIN, is_hurwitz
+from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
 
 SINUSOID = "disturbance_n_m"
 

@@ -10,10 +10,10 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, exp, signed_power
-from cmg_mj.fields import STRICT, Positive
+from cmg_mj.inputs.field_types import STRICT, Positive
 from cmg_mj.observers.model_copy import follow, require_stable_step, stages
 from cmg_mj.observers.protocol import Estimate, Measurement
-from cmg_mj.reduced import ReducedModel, Terms
+from cmg_mj.observers.reduced_model import ReducedModel, Terms
 
 GIMBAL_RATE = 0.4
 """Gimbal rate at which L must still be small enough for the sample period [rad/s]. A slow one: at a faster one a

@@ -9,11 +9,11 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.fields import STRICT, Positive
+from cmg_mj.inputs.field_types import STRICT, Positive
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.homogeneous import Homogeneous
 from cmg_mj.observers.protocol import BIAS, Measurement
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.observers.reduced_model import ReducedModel
 
 
 class State(NamedTuple):

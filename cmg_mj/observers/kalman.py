@@ -11,10 +11,10 @@ from pydantic.dataclasses import dataclass
 from scipy.linalg import expm
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.fields import STRICT, Positive
+from cmg_mj.inputs.field_types import STRICT, Positive
 from cmg_mj.observers.protocol import TORQUE, Measurement
-from cmg_mj.reduced import ReducedModel
-from cmg_mj.tilt import TiltNoise
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.sensors.tilt import TiltNoise
 
 TERMS = 6
 """Of the transition's series. What these leave off phi, psi and chi is below 4e-12 of each while the rig's pole times

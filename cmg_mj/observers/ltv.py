@@ -9,11 +9,11 @@ from typing import NamedTuple
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip
-from cmg_mj.fields import STRICT, Positive
+from cmg_mj.inputs.field_types import STRICT, Positive
 from cmg_mj.observers.model_copy import LARGEST_RATE, follow, stages
 from cmg_mj.observers.protocol import Estimate, Measurement
+from cmg_mj.observers.reduced_model import ReducedModel, Terms
 from cmg_mj.observers.riccati import exact_step, map_of_one
-from cmg_mj.reduced import ReducedModel, Terms
 
 MOST_PIECES = 1000
 

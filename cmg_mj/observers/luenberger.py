@@ -9,11 +9,10 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.fields import STRICT, Positive
-from cmg_mj.observers.hold import hold_matrices
+from cmg_mj.inputs.field_types import STRICT, Positive
 from cmg_mj.observers.protocol import Estimate, Measurement
-from cmg_mj.reduced import ReducedModel
-from cmg_mj.stability import MARGIN, is_hurwitz
+from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
+from cmg_mj.observers.zero_order_hold import hold_matrices
 
 
 class State(NamedTuple):

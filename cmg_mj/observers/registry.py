@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from cmg_mj.errors import InputError
+from cmg_mj.inputs.user_classes import Kind
 from cmg_mj.observers.protocol import Observer
-from cmg_mj.own_class import Kind
-from cmg_mj.reduced import ReducedModel
-from cmg_mj.tilt import TiltNoise
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.sensors.tilt import TiltNoise
 
 OBSERVERS = {
     "linear": "cmg_mj.observers.linear:LinearDifferentiator",

@@ -10,9 +10,9 @@ from typing import ClassVar, NamedTuple
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, sign, sqrt, where
-from cmg_mj.fields import STRICT, Positive
+from cmg_mj.inputs.field_types import STRICT, Positive
 from cmg_mj.observers.protocol import Estimate, Measurement
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.observers.reduced_model import ReducedModel
 
 
 class State(NamedTuple):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from cmg_mj.picture import Picture
+from cmg_mj.visualization.plots.figure_spec import Picture
 
 Verdict = Literal["reproduced", "reproduced within stated conditions", "not reproduced"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.result import Result
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.result import Result
+from cmg_mj.results.trajectory import Trajectory
 
 
 def trajectory_of(result: Result) -> Trajectory:

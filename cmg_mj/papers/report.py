@@ -10,12 +10,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from cmg_mj import markdown
 from cmg_mj.papers import BEYOND, PAPERS, Reproduced
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.sentences import Once
-from cmg_mj.plots import draw
-from cmg_mj.run_folder import RunFolder, Writers, claimed, write_text
+from cmg_mj.results import markdown
+from cmg_mj.results.run_folder import RunFolder, Writers, claimed, write_text
+from cmg_mj.visualization.plots.run_plot import draw
 
 
 def figures_of(entries: Sequence[Reproduced]) -> dict[str, Any]:

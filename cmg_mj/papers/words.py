@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cmg_mj.intervals import Interval
+from cmg_mj.results.intervals import Interval
 
 
 def plus_minus(interval: Interval | None, digits: int = 4, *, signed: bool = False) -> str:

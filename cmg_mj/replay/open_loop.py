@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.observers import Estimate, Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
-from cmg_mj.trajectory import ESTIMATES, Trajectory
+from cmg_mj.results.trajectory import ESTIMATES, Trajectory
 
 
 def replay(observer: Observer, trajectory: Trajectory) -> Estimate:

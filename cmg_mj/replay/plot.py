@@ -8,13 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.colours import colours, hexadecimal
-from cmg_mj.legible import shortened
-from cmg_mj.logs.log import REFERENCE
-from cmg_mj.plots import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_COLUMNS, SMALL_HEIGHT, fit, pyplot
-from cmg_mj.replay.replayed import Replayed, described
+from cmg_mj.replay.log_replay import Replayed, described
+from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import shown_first, written
-from cmg_mj.trajectory import whole_file
+from cmg_mj.results.trajectory import whole_file
+from cmg_mj.visualization.plots.colours import colours, hexadecimal
+from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.plots.run_plot import (
+    INK,
+    MEASURED,
+    PAGE,
+    PANEL_HEIGHT,
+    SMALL_COLUMNS,
+    SMALL_HEIGHT,
+    fit,
+    pyplot,
+)
 
 CLOSE_S = 2.0
 """So much is drawn close by [s]."""

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cmg_mj.colours import YARDSTICKS, colours
-from cmg_mj.legible import shortened
-from cmg_mj.logs.log import REFERENCE
 from cmg_mj.observers.protocol import BIAS
-from cmg_mj.recording.logs import LogSeries, write_logs
-from cmg_mj.recording.signals import CONTROLLER, CUBES, Series, numbered
-from cmg_mj.replay.replayed import Replayed
+from cmg_mj.replay.log_replay import Replayed
+from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import replay_markdown, shown_first
+from cmg_mj.visualization.plots.colours import YARDSTICKS, colours
+from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.recording.replay_recording import LogSeries, write_logs
+from cmg_mj.visualization.recording.signals import CONTROLLER, CUBES, Series, numbered
 
 
 def write_replay(path: Path, replays: Sequence[Replayed], names: Sequence[str], settings_toml: str) -> None:

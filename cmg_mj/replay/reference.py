@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from cmg_mj.logs import Log
-from cmg_mj.logs.log import REFERENCE
 from cmg_mj.replay.alignment import Alignment, alignment
+from cmg_mj.replay.logs import Log
+from cmg_mj.replay.logs.log import REFERENCE
 
 OFF = 0.05
 """A reference whose size differs by more from what the tilt shows is worth a word."""

@@ -11,14 +11,14 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from cmg_mj import markdown
-from cmg_mj.intervals import known_interval
-from cmg_mj.legible import best
-from cmg_mj.references import ZERO
+from cmg_mj.replay.log_replay import Replayed, described
 from cmg_mj.replay.reference import remarks_on
-from cmg_mj.replay.replayed import Replayed, described
 from cmg_mj.replay.scores import RECONSTRUCTED_S
-from cmg_mj.summary_keys import Key
+from cmg_mj.results import markdown
+from cmg_mj.results.baselines import ZERO
+from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.summary_keys import Key
+from cmg_mj.visualization.plots.readability import best
 
 FIGURES = {
     "velocity_rms_error_rad_s": Key("RMS error", "rad/s", "{:.4f}"),

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from cmg_mj.logs import Log
-from cmg_mj.logs.log import REFERENCE
-from cmg_mj.push import inside
 from cmg_mj.replay.lag import lag
+from cmg_mj.replay.logs import Log
+from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.scenario.disturbances import inside
 
 RECONSTRUCTED_S = 1.0
 """The estimated rate is integrated over so long at a time [s]."""

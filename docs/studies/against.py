@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from cmg_mj import OBSERVERS, load_scenario, prepare
-from cmg_mj.markdown import table
+from cmg_mj.results.markdown import table
 
 HERE = Path(__file__).resolve().parents[2]
 

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj import load_scenario, markdown, prepare
+from cmg_mj import load_scenario, prepare
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.side_by_side import Run, run_side_by_side
+from cmg_mj.results import markdown
+from cmg_mj.simulation.batched_observers import Run, run_side_by_side
 
 SEED, WORLDS, LARGEST_DEG, CUTS, PARTS = 30_000, 5, 4.0, 2, 8
 

@@ -12,14 +12,15 @@ import argparse
 import numpy as np
 from bias_limits import Case, limits
 
-from cmg_mj import load_scenario, markdown, prepare
-from cmg_mj.board.cost import counted_on, measure
+from cmg_mj import load_scenario, prepare
+from cmg_mj.codegen.board.cost import counted_on, measure
 from cmg_mj.errors import InputError
-from cmg_mj.intervals import mean_interval
 from cmg_mj.observers import OBSERVERS, needs, observer_class
-from cmg_mj.references import REFERENCES
-from cmg_mj.result import Result
-from cmg_mj.side_by_side import run_of, run_side_by_side
+from cmg_mj.results import markdown
+from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.intervals import mean_interval
+from cmg_mj.results.result import Result
+from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
 
 ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
 WORDS = {"model": "model", "gimbals": "y2, u", "acceleration": "acceleration"}

@@ -27,15 +27,15 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from cmg_mj.experiment import Experiment, prepare
-from cmg_mj.floors import TiltFloor
-from cmg_mj.intervals import Interval, mean_interval
-from cmg_mj.markdown import table
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers.beyond.floor import velocity_floor
-from cmg_mj.push import inside, push_windows
-from cmg_mj.result import Result
-from cmg_mj.scenario import load_scenario
+from cmg_mj.results.error_bounds import TiltFloor
+from cmg_mj.results.intervals import Interval, mean_interval
+from cmg_mj.results.markdown import table
+from cmg_mj.results.result import Result
+from cmg_mj.scenario.disturbances import inside, push_windows
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
 
 SEED, TUNING_SEED, TUNING_WORLDS = 70_000, 71_000, 10
 NEW = ("gyro_free", "kalman")

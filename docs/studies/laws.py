@@ -13,9 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 from bias_limits import LARGEST_DEG, PARTS, SEED, WORLDS, Case, cell, limits
 
-from cmg_mj import load_scenario, markdown, prepare
-from cmg_mj.intervals import known_interval
-from cmg_mj.result import Result
+from cmg_mj import load_scenario, prepare
+from cmg_mj.results import markdown
+from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.result import Result
 
 LQG = "`lqg`"
 LOOPS = {

@@ -17,9 +17,9 @@ mpl.use("agg")
 import matplotlib.pyplot as plt
 
 from cmg_mj import mount
-from cmg_mj.colours import colour, hexadecimal
-from cmg_mj.mounting.prospects import prospects
-from cmg_mj.mounting.told import PUSHED_AT_S, write_scenario
+from cmg_mj.studies.push_limits.mount_report import PUSHED_AT_S, write_scenario
+from cmg_mj.studies.push_limits.prospects import prospects
+from cmg_mj.visualization.plots.colours import colour, hexadecimal
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "torso.xml"
 SIZE = 1200

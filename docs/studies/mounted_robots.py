@@ -3,7 +3,7 @@
 python docs/studies/mounted_robots.py [ROBOT ...] (about six minutes on a quiet core)
 python docs/studies/mounted_robots.py --commands (with what each is mounted)
 
-The robots are those of tests/mounting/robots.py; ROBOT is a part of a name. Ten worlds each, the sensors of the
+The robots are those of tests/plant/mounting/robots.py; ROBOT is a part of a name. Ten worlds each, the sensors of the
 datasheets, `homogeneous`; from the smaller of a degree and a quarter of the ceiling, 30 s, alone and with a push of
 0.6 E at 10 s. The simulated E is the largest push, in steps of 0.05 E, up to which at least half of the worlds stand.
 """
@@ -18,12 +18,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
-from cmg_mj.bearable import PUSH_S
-from cmg_mj.experiment import Experiment
-from cmg_mj.markdown import table
-from cmg_mj.mounting.prospects import prospects
-from cmg_mj.mounting.told import write_scenario
-from tests.mounting.robots import ROBOTS, Robot
+from cmg_mj.results.markdown import table
+from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.studies.push_limits.largest_push import PUSH_S
+from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.prospects import prospects
+from tests.plant.mounting.robots import ROBOTS, Robot
 
 WORLDS = 10
 SHARES = np.arange(0.6, 1.86, 0.05)

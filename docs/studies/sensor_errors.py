@@ -27,9 +27,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cmg_mj import OBSERVERS, Accelerometer, load_plant, load_scenario, prepare
-from cmg_mj.intervals import known_interval, ratio_interval
-from cmg_mj.laws.state_feedback import TABLE_2_GAINS
-from cmg_mj.markdown import table
+from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS
+from cmg_mj.results.intervals import known_interval, ratio_interval
+from cmg_mj.results.markdown import table
 
 SEED = 90_000
 OURS = "gyro_free"

@@ -19,12 +19,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from cmg_mj import load_scenario, prepare
+from cmg_mj.codegen.export import export
+from cmg_mj.codegen.export.check import FLAGS, compiler
 from cmg_mj.errors import InputError
-from cmg_mj.export import export
-from cmg_mj.export.check import FLAGS, compiler
-from cmg_mj.intervals import mean_interval
-from cmg_mj.markdown import table
 from cmg_mj.observers import OBSERVERS, Measurement
+from cmg_mj.results.intervals import mean_interval
+from cmg_mj.results.markdown import table
 
 SIGNALS = ("y1_rad", "y2_rad", "acceleration_rad_s2", "u_rad_s")
 HEADINGS = ["observer", "C, off by [rad/s]", "rounded once", "last digit", "error [rad/s]: Python", "C", "within"]

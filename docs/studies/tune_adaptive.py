@@ -16,8 +16,9 @@ import math
 
 import numpy as np
 
-from cmg_mj import load_scenario, markdown, prepare
-from cmg_mj.schema import ObserverSettings
+from cmg_mj import load_scenario, prepare
+from cmg_mj.results import markdown
+from cmg_mj.scenario.schema import ObserverSettings
 
 SEED, WORLDS, LATE_S = 30_000, 6, 5.0
 LARGEST_BIAS_ERROR_DEG = 0.05

@@ -14,10 +14,11 @@ import math
 import numpy as np
 from scipy.optimize import minimize
 
-from cmg_mj import load_scenario, make_observer, markdown, prepare
+from cmg_mj import load_scenario, make_observer, prepare
 from cmg_mj.papers.andrieu2009.bi_limit import largest_b
 from cmg_mj.replay import replay
-from cmg_mj.summary_keys import heading
+from cmg_mj.results import markdown
+from cmg_mj.results.summary_keys import heading
 
 SEED, LOOP_SEED, WORLDS = 30_000, 31_000, 20
 ERROR = "velocity_rms_error_rad_s"

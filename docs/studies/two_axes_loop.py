@@ -13,11 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmg_mj import markdown
-from cmg_mj.experiment import Experiment, prepare
-from cmg_mj.recoverable import ceiling
-from cmg_mj.result import Result
-from cmg_mj.scenario import load_scenario
+from cmg_mj.results import markdown
+from cmg_mj.results.result import Result
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
 AXES = ("roll", "pitch")
 ERROR = "velocity_rms_error_rad_s"

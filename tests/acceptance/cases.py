@@ -5,10 +5,10 @@ from __future__ import annotations
 import statistics
 from functools import cache
 
-from cmg_mj.experiment import prepare
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.result import Result
-from cmg_mj.scenario import load_scenario
+from cmg_mj.results.result import Result
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import prepare
 
 STANDING = {
     # observer -> settings in which it stands: the headline push at 0.5 degrees of bias, unless it cannot

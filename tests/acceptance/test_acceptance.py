@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.worlds_table import riding_along
+from cmg_mj.results.per_world_table import riding_along
 from tests.acceptance.cases import (
     FALLING,
     GROUP,

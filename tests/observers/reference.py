@@ -13,9 +13,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from cmg_mj.observers import Measurement, Observer, make_observer
-from cmg_mj.reduced import ReducedModel
-from cmg_mj.tilt import TiltNoise
-from tests import paper_model as paper
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.sensors.tilt import TiltNoise
+from tests.plant import paper_model as paper
 
 DT = 0.005
 

@@ -16,7 +16,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.protocol import extra_signals
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.observers.reduced_model import ReducedModel
 from tests.observers.reference import DT, PAPER, Signal
 
 PAIR = dataclasses.replace(PAPER, gimbals=2)

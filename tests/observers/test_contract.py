@@ -13,8 +13,8 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.observers import GIVEN, OBSERVERS, Estimate, Measurement
-from tests import paper_model as paper
 from tests.observers.reference import DT, PAPER, observer, rough_signals
+from tests.plant import paper_model as paper
 
 EVERY = sorted(OBSERVERS)
 

@@ -13,8 +13,8 @@ from scipy.stats import chi2
 import cmg_mj
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.gyro_free import GyroFree, State
-from cmg_mj.reduced import ReducedModel
-from cmg_mj.tilt import TiltNoise
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.sensors.tilt import TiltNoise
 from tests.observers.reference import DT, NOISE, PAPER
 
 C = NOISE.correlation * NOISE.tilt / NOISE.acceleration  # v = C n + what is independent of n

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.high_gain import HighGain
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.observers.reduced_model import ReducedModel
 from tests.observers.reference import DT, HEAVY, PAPER, Slope, integrate, observer, power, rough_signals, run
 
 DEFAULTS = {"l1": 29.5, "l2": 12.4, "d_inf": 0.6, "b": 0.333, "phi1": 0.03, "phi2": 1.0, "phi3": 3.0}

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Measurement, Observer
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.observers.reduced_model import ReducedModel
 from tests.observers.reference import (
     DT,
     GRAVITY_TORQUE,

@@ -12,10 +12,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, solve_continuous_are
 
 from cmg_mj.errors import InputError
-from cmg_mj.experiment import prepare
 from cmg_mj.observers import Measurement
-from cmg_mj.scenario import load_scenario
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import (
     DT,
     GRAVITY_TORQUE,

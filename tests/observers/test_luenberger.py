@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.observers.reduced_model import ReducedModel
 from tests.observers.reference import (
     GRAVITY_TORQUE,
     HEAVY,

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.experiment import prepare
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
-from cmg_mj.reduced import ReducedModel
-from cmg_mj.scenario import parse_scenario
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.scenario.loading import parse_scenario
+from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import DT, NOISE, PAPER, observer
 
 
@@ -85,7 +85,7 @@ def test_a_users_class_in_a_scenario() -> None:
     ],
 )
 def test_what_is_wrong_with_a_class_is_named_in_one_line(kind: str, parameters: dict, message: str) -> None:
-    """What is wrong with a name, or with a parameter of the bench's own: tests/bad_input/."""
+    """What is wrong with a name, or with a parameter of the bench's own: tests/inputs/."""
     with pytest.raises(InputError, match=message) as caught:
         observer(kind, **parameters)
     assert "\n" not in str(caught.value)

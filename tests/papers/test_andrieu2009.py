@@ -38,8 +38,8 @@ from cmg_mj.papers.andrieu2009.simulation import (
 )
 from cmg_mj.papers.andrieu2009.study import Study, rms_by_kind, study
 from cmg_mj.papers.claim import Claim
-from cmg_mj.picture import Picture
-from cmg_mj.result import Outcome, Result
+from cmg_mj.results.result import Outcome, Result
+from cmg_mj.visualization.plots.figure_spec import Picture
 
 SEEDS, FIRST = 6, 500
 """Other seeds than the report's."""

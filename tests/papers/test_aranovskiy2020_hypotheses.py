@@ -10,7 +10,7 @@ import pytest
 
 from cmg_mj.papers.aranovskiy2020 import hypotheses, mismatch, yaw_momentum
 from cmg_mj.papers.recorded import trajectory_of
-from tests import paper_model as paper
+from tests.plant import paper_model as paper
 
 SEED = 910_000
 SMALL = {"flywheel speed": 0.01, "gimbal offset": 1.0, "servo gain": 0.02}

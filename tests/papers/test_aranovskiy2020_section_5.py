@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from cmg_mj.intervals import mean_interval
 from cmg_mj.papers.aranovskiy2020 import comparison, figure_4, figures_5_to_7, second_place
 from cmg_mj.papers.aranovskiy2020.comparison import Angles, Measured, order_of
 from cmg_mj.papers.aranovskiy2020.figures_5_to_7 import ANGLES, figure, in_the_loop
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.second_place import ELEVEN, ELEVEN_BY_EULER, TEN, TEN_BY_EULER, TEN_EXACT_GAIN
-from cmg_mj.result import Outcome, Result
+from cmg_mj.results.intervals import mean_interval
+from cmg_mj.results.result import Outcome, Result
 
 SEED = 910_000
 

@@ -11,8 +11,8 @@ import pytest
 from cmg_mj.papers.aranovskiy2020 import servo, two_axes
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1, printed_model
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.plant import load_plant
-from cmg_mj.result import Result
+from cmg_mj.plant.plant import load_plant
+from cmg_mj.results.result import Result
 
 SEED = 910_000
 

@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from cmg_mj.intervals import Interval
 from cmg_mj.papers.aranovskiy2020 import joint, retuned, table_2
 from cmg_mj.papers.aranovskiy2020.joint import nearest_joint
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, TABLE_2
 from cmg_mj.papers.aranovskiy2020.tuning_procedure import Tried, loops_of, procedure_claim
-from cmg_mj.scenario import load_scenario
-from cmg_mj.tuning import Level, Study
+from cmg_mj.results.intervals import Interval
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.studies.tuning import Level, Study
 
 SEED = 910_001
 SCENARIO = load_scenario("observer_tuning")

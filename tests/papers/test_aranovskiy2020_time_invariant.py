@@ -15,7 +15,7 @@ from cmg_mj.papers.aranovskiy2020.paper import printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.aranovskiy2020.time_invariant import BIASES_DEG, FROZEN, GAINS, LINEAR, MEASURED, MODELS, PREDECESSOR
 from cmg_mj.replay import replay
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.trajectory import Trajectory
 
 SEED = 910_000
 STANDS, FALLS = ti.Fate(0.0, 0.05), ti.Fate(1.0, None)

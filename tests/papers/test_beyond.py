@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.floors import acceleration_floor
-from cmg_mj.intervals import Interval
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.papers.beyond.all_observers import order_claim
 from cmg_mj.papers.beyond.character import Motion, character, push_lag, record_motion, update_us
@@ -17,6 +15,8 @@ from cmg_mj.papers.beyond.fed_bias import fed_bias, fed_bias_claim
 from cmg_mj.papers.beyond.friction import friction, friction_claim
 from cmg_mj.papers.beyond.league import league
 from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
+from cmg_mj.results.error_bounds import acceleration_floor
+from cmg_mj.results.intervals import Interval
 from tests.observers.reference import DT, PAPER
 
 SEED = 410_000

@@ -15,7 +15,7 @@ from cmg_mj import papers
 from cmg_mj.errors import InputError
 from cmg_mj.papers.claim import Claim, OnShare, Section
 from cmg_mj.papers.report import report_text
-from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 from tests.command import cmg_mj
 
 PICTURE = Picture("a-fig-1", "a Fig. 1", [Panel("tilt [deg]", [Line([0.0, 1.0], [0.0, 2.0], "true")])])

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.experiment import prepare
 from cmg_mj.papers.beyond.floor import kalman_filter, velocity_floor
-from cmg_mj.scenario import load_scenario
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import PAPER
 
 POLE = math.sqrt(PAPER.gravity_torque / PAPER.J1)

@@ -118,7 +118,7 @@ def test_papers_inertia_for_any_parameters() -> None:
 
 def test_exact_numbers_are_the_models() -> None:
     """Table 1's fractions against the constants that the tests of the plant use."""
-    from tests import paper_model as paper
+    from tests.plant import paper_model as paper
 
     for name, J1, gimbals in (("aranovskiy2020", paper.J1, 2), ("sokolov2019", paper.J1_single, 1)):
         m1 = sp.lambdify(q2, plvcc.papers_m1(name, numbers=True))  # type: ignore[arg-type]

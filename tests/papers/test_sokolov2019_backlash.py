@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.backlash import Backlash
+from cmg_mj.controllers.backlash import Backlash
 from cmg_mj.papers.sokolov2019 import backlash
 from cmg_mj.papers.sokolov2019.cycles import cycles
 from cmg_mj.papers.sokolov2019.gap_prediction import share_of

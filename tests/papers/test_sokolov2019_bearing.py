@@ -8,7 +8,7 @@ import pytest
 
 from cmg_mj.papers.sokolov2019 import bearing
 from cmg_mj.papers.sokolov2019.vertical_torque import Motion, vertical_momentum, vertical_torque
-from cmg_mj.plant import load_plant
+from cmg_mj.plant.plant import load_plant
 
 SEED = 5_000
 

@@ -24,7 +24,7 @@ from cmg_mj.papers.sokolov2019.lag import Lags, predicted
 from cmg_mj.papers.sokolov2019.loops import Loops, better, deviation, loops, numbers, smaller, tail
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.release import LAGS_S, Sweep, Threshold
-from cmg_mj.result import Outcome, Result
+from cmg_mj.results.result import Outcome, Result
 
 SEED = 5_000
 WITHIN = "reproduced within stated conditions"

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cmg_mj.experiment import prepare
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.sokolov2019 import equations, paper
 from cmg_mj.papers.sokolov2019.rig import estimator, experiment
-from cmg_mj.scenario import load_scenario
-from tests import paper_model
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import prepare
+from tests.plant import paper_model
 
 SEED = 5_000
 

@@ -10,8 +10,8 @@ import pytest
 from cmg_mj.papers.sokolov2019 import lag, paper, release
 from cmg_mj.papers.sokolov2019.rig import experiment, servo_of
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, rig_matrices
-from cmg_mj.trajectory import Trajectory
-from tests import paper_model
+from cmg_mj.results.trajectory import Trajectory
+from tests.plant import paper_model
 
 
 def synthetic(rates: list[np.ndarray], t: np.ndarray) -> Trajectory:

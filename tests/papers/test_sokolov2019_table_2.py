@@ -12,7 +12,7 @@ from cmg_mj.papers.sokolov2019 import table_2
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import estimator, experiment
 from cmg_mj.replay import replay
-from cmg_mj.tuning import Level
+from cmg_mj.studies.tuning import Level
 
 SEED = 5_000
 

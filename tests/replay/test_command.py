@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.recording.logs import MAIN
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.visualization.recording.replay_recording import MAIN
 from tests.command import ROOT, Said, cmg_mj
-from tests.logs.motion import COLUMNS, sine, write_csv
+from tests.replay.logs.motion import COLUMNS, sine, write_csv
 
 LOG = ROOT / "examples" / "data" / "stepper_encoder_gyro.csv"
 REAL = "time=time_s,tilt=encoder_rad,rate=gyr_y_rad_s"

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.logs import read_log
 from cmg_mj.observers import make_observer
 from cmg_mj.replay import replay
 from cmg_mj.replay.alignment import alignment
 from cmg_mj.replay.lag import lag
-from cmg_mj.replay.replayed import Replayed, replay_log
-from cmg_mj.trajectory import Trajectory
-from tests.logs.motion import AMPLITUDE, COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
+from cmg_mj.replay.log_replay import Replayed, replay_log
+from cmg_mj.replay.logs import read_log
+from cmg_mj.results.trajectory import Trajectory
 from tests.observers.reference import PAPER
+from tests.replay.logs.motion import AMPLITUDE, COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
 
 PEAK = AMPLITUDE * OMEGA
 GAIN = math.sin(OMEGA * DT / 2.0) / (OMEGA * DT / 2.0)

@@ -7,12 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.replay import replay
-from cmg_mj.result import Result
-from cmg_mj.scenario import load_scenario
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.result import Result
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
 
 SETTINGS = ["duration_s=0.8", "push.0.start_s=0.3", 'companions="all"', 'controller.feedback="fog"']
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.logs import read_log
+from cmg_mj.replay.logs import read_log
 from cmg_mj.replay.reference import AGREES, alignment_of, remarks_on
 from tests.command import ROOT, cmg_mj
-from tests.logs.motion import COLUMNS, DT, N, sine, write_csv
+from tests.replay.logs.motion import COLUMNS, DT, N, sine, write_csv
 
 REAL = ROOT / "examples" / "data" / "stepper_encoder_gyro.csv"
 ENCODER = {"time": "time_s", "tilt": "encoder_rad", "rate": "gyr_y_rad_s"}

@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
-from cmg_mj.logs import Log, read_log
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
 from cmg_mj.observers.protocol import needs
-from cmg_mj.replay.noise import noise_numbers, noise_of
-from cmg_mj.replay.options import parameters_of
-from cmg_mj.replay.pendulum import model_of
-from cmg_mj.replay.replayed import NO_MODEL, replay_log
-from cmg_mj.replay.told import replay_ready, told
-from cmg_mj.runs import save_run, summary_of
-from cmg_mj.tilt import RadialTilt, TiltNoise
-from cmg_mj.trajectory import Trajectory
-from cmg_mj.tuning import tune_on_logs
-from tests.logs.motion import COLUMNS, DT, N, sine, write_csv
+from cmg_mj.replay.log_replay import NO_MODEL, replay_log
+from cmg_mj.replay.logs import Log, read_log
+from cmg_mj.replay.observer_inputs import replay_ready, told
+from cmg_mj.replay.parameter_options import parameters_of
+from cmg_mj.replay.user_noise import noise_numbers, noise_of
+from cmg_mj.replay.user_pendulum import model_of
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
+from cmg_mj.studies.save import save_run, summary_of
+from cmg_mj.studies.tuning import tune_on_logs
 from tests.observers.reference import PAPER
+from tests.replay.logs.motion import COLUMNS, DT, N, sine, write_csv
 
 KEYS = ("velocity_rms_error_rad_s", "velocity_fit", "velocity_rms_error_push_rad_s", "velocity_fit_push")
 SETTINGS = ["duration_s=1.4", "push.0.start_s=0.3", 'companions="all"', "observer.k1=23.0", "seed=5"]

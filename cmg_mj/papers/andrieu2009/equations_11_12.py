@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj import markdown
 from cmg_mj.elementwise import signed_power
 from cmg_mj.papers.andrieu2009.theorem_1 import HOMOGENEOUS, system_1
 from cmg_mj.papers.claim import Claim
+from cmg_mj.results import markdown
 
 P, DT, END, LATE = 0.5, 2e-3, 10.0, 6.0
 SIZES = (1e-1, 1e-2, 1e-3)

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj import markdown
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b
 from cmg_mj.papers.andrieu2009.lyapunov import ANGLES, Decay, Lyapunov, decay, states
 from cmg_mj.papers.claim import Claim
+from cmg_mj.results import markdown
 
 DEGREES = (0.0, 0.25, 0.5, 0.75, 0.9)
 """d_inf tried, of [0, 1)."""

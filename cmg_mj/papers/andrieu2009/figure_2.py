@@ -6,7 +6,6 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import spearmanr
 
-from cmg_mj import markdown
 from cmg_mj.papers.andrieu2009.simulation import (
     CONSTANT,
     KINDS,
@@ -19,7 +18,8 @@ from cmg_mj.papers.andrieu2009.simulation import (
 )
 from cmg_mj.papers.andrieu2009.study import LOUD, Study, rms_by_kind
 from cmg_mj.papers.claim import Claim
-from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.results import markdown
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 LEAST_SEEDS = 0.95
 """Share of the seeds in which an order must hold."""

@@ -6,18 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmg_mj.experiment import Experiment, prepare
-from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.observers import make_observer
 from cmg_mj.observers.high_gain import HighGain, updated_gain
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
-from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.result import Result
-from cmg_mj.scenario import load_scenario
-from cmg_mj.side_by_side import run_of, run_side_by_side
-from cmg_mj.summary_keys import written
+from cmg_mj.results.intervals import Interval, known_interval
+from cmg_mj.results.result import Result
+from cmg_mj.results.summary_keys import written
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
+from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 WORLDS, SEED = 20, 82_000
 KINDS = {

@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 
-from cmg_mj import markdown
 from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.papers.andrieu2009 import equations_11_12, equations_19_20
 from cmg_mj.papers.andrieu2009.bi_limit import largest_b, violated_conditions
@@ -17,6 +16,7 @@ from cmg_mj.papers.andrieu2009.increments import exponent_of_6, increments, line
 from cmg_mj.papers.andrieu2009.paper import B, P
 from cmg_mj.papers.andrieu2009.theorem_1 import theorem_1
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.results import markdown
 
 
 def claims(on_share: OnShare) -> list[Claim]:

@@ -7,13 +7,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import listed_and
-from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.result import Result
-from cmg_mj.summary_keys import KEYS, written
+from cmg_mj.results.intervals import Interval, known_interval
+from cmg_mj.results.result import Result
+from cmg_mj.results.summary_keys import KEYS, written
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 Numbers = Mapping[str, np.ndarray]
 """Observer -> a measure in the loop, (n_worlds,); NaN for a world that did not stand. Less is better."""

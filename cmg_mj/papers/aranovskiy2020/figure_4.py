@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.experiment import prepare
-from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import pushed, rms, trajectory_of
 from cmg_mj.papers.words import listed_and, plus_minus
-from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.scenario import load_scenario
-from cmg_mj.trajectory import Trajectory
-from cmg_mj.tuning.recorded import window_of
+from cmg_mj.results.intervals import Interval, mean_interval
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import prepare
+from cmg_mj.studies.tuning.on_simulations import window_of
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 72_000
 WORLDS = 20

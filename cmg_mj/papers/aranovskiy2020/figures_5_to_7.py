@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmg_mj.intervals import known_interval
 from cmg_mj.papers.aranovskiy2020 import comparison, second_place
 from cmg_mj.papers.aranovskiy2020.comparison import Angles
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
@@ -15,10 +14,11 @@ from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import pushed, trajectory_of
 from cmg_mj.papers.scales import on_common_scales
 from cmg_mj.papers.words import plus_minus
-from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.result import Result
-from cmg_mj.side_by_side import run_of, run_side_by_side
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.result import Result
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 FIGURES = {"linear": "Fig. 5", "ltv": "Fig. 6", "homogeneous": "Fig. 7"}
 ANGLES: tuple[Angles, Angles] = ("measured", "estimated")

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.intervals import Interval, ratio_interval
 from cmg_mj.papers.aranovskiy2020.mismatch import MISMATCHES, Mismatch, Ran, run_all
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S
 from cmg_mj.papers.aranovskiy2020.yaw_momentum import balanced_yaw_rate, foreseen_yaw_rate
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import pushed, rms, trajectory_of
-from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.results.intervals import Interval, ratio_interval
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 75_000
 WORLDS = 4

@@ -9,8 +9,8 @@ from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, level_at, worth_it
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import listed_and
-from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.tuning import Level
+from cmg_mj.studies.tuning import Level
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 ROUNDED = 1.05
 """What printing a parameter to one digit costs: tau = 0.02 stands for 0.015 to 0.025."""

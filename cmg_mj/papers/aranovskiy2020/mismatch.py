@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cmg_mj.papers.aranovskiy2020.rig import push_recovery
-from cmg_mj.plant import Plant, load_plant
-from cmg_mj.result import Result
+from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.results.result import Result
 
 Change = Callable[[Plant, float], None]
 """Makes the second cube of a rig differ by so much."""

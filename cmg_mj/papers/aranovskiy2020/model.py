@@ -10,10 +10,10 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.papers.aranovskiy2020.paper import gimbal_torque, printed_model
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.plant import Plant, load_plant
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.plant.plant import Plant, load_plant
 
 SEED = 70_000
 

@@ -10,12 +10,12 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from cmg_mj.board.cost import cost_of
-from cmg_mj.board.tools import available
-from cmg_mj.experiment import prepare
+from cmg_mj.codegen.board.cost import cost_of
+from cmg_mj.codegen.board.tools import available
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain, euler, rk4
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.scenario import parse_scenario
+from cmg_mj.scenario.loading import parse_scenario
+from cmg_mj.simulation.experiment import prepare
 
 RECORDED = Path(__file__).with_suffix(".json")
 

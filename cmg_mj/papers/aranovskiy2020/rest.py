@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.intervals import Interval, mean_interval
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import K_E, gimbal_rest, integrator_rest, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
-from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
-from cmg_mj.side_by_side import run_of, run_side_by_side
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.intervals import Interval, mean_interval
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 73_000
 WORLDS = 6

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 
-from cmg_mj.experiment import Experiment, prepare
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.scenario import load_scenario
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
 
 DT = 0.005
 """The bench's control period [s]; the paper does not give its own."""

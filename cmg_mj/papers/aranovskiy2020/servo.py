@@ -8,13 +8,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.intervals import Interval, known_interval, ratio_interval
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.plant import Plant, load_plant
-from cmg_mj.result import Result
+from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.results.intervals import Interval, known_interval, ratio_interval
+from cmg_mj.results.result import Result
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 78_000
 WORLDS = 4

@@ -15,7 +15,7 @@ from cmg_mj.papers.aranovskiy2020.retuned import (
 )
 from cmg_mj.papers.aranovskiy2020.tuning_procedure import LOOP_SHARE, loops_of, procedure_claim
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.tuning import Level
+from cmg_mj.studies.tuning import Level
 
 
 def table_2_claim(case: Tuned, studies: Studies, together: Together) -> Claim:

@@ -10,9 +10,9 @@ from cmg_mj.papers.aranovskiy2020.paper import printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import listed_and
-from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.side_by_side import Run, run_side_by_side
-from cmg_mj.summary_keys import written
+from cmg_mj.results.summary_keys import written
+from cmg_mj.simulation.batched_observers import Run, run_side_by_side
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 72_002
 WORLDS = 5

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from cmg_mj.intervals import Interval
 from cmg_mj.papers.aranovskiy2020.joint import Together, experiments, listed
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.retuned import CASES, DEFAULT_NOISE, PUSHES, SEED, STRONG, Studies, in_the_loop
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import listed_and
+from cmg_mj.results.intervals import Interval
 
 LOOP_WORLDS = 10
 LOOP_SHARE = 0.1

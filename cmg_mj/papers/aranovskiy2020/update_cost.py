@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.bench import time_of_update
-from cmg_mj.board.cost import CLOCK_MHZ
+from cmg_mj.codegen.board.cost import CLOCK_MHZ
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
 from cmg_mj.papers.aranovskiy2020.on_the_board import PLAIN, instructions
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.studies.benchmark import time_of_update
 
 
 def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, float]:

@@ -13,9 +13,9 @@ from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import rms
-from cmg_mj.picture import Line, Panel, Picture
 from cmg_mj.replay import replay
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 77_000
 ALPHAS = (0.55, 0.7, 0.85, 1.0)

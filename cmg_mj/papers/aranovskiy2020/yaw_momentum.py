@@ -8,8 +8,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.plant import Plant
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.plant.plant import Plant
+from cmg_mj.results.trajectory import Trajectory
 
 
 class Inertia(NamedTuple):

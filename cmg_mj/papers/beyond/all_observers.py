@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj import markdown
-from cmg_mj.intervals import Interval
 from cmg_mj.papers.beyond.league import MEANS, league
 from cmg_mj.papers.beyond.push_recovery import ERROR
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.picture import Line, Panel, Picture
-from cmg_mj.summary_keys import heading, written
+from cmg_mj.results import markdown
+from cmg_mj.results.intervals import Interval
+from cmg_mj.results.summary_keys import heading, written
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED, WORLDS = 90_000, 100
 ORDER = ("homogeneous", "ltv", "linear")

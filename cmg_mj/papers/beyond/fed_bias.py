@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from cmg_mj import markdown
-from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import plus_minus
-from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.results import markdown
+from cmg_mj.results.intervals import Interval, known_interval
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED, WORLDS = 90_002, 100
 BIASES_DEG = (0.25, 0.5, 1.0, 1.5)

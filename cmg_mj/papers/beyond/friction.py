@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.summary_keys import written
+from cmg_mj.results.intervals import Interval, known_interval
+from cmg_mj.results.summary_keys import written
 
 SEED, WORLDS = 90_001, 100
 FRICTION_N_M = 0.05

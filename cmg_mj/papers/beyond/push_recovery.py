@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmg_mj.experiment import Experiment, prepare
-from cmg_mj.intervals import Interval, known_interval
-from cmg_mj.result import Result
-from cmg_mj.scenario import load_scenario
+from cmg_mj.results.intervals import Interval, known_interval
+from cmg_mj.results.result import Result
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
 
 ERROR = "velocity_rms_error_rad_s"
 """What is compared."""

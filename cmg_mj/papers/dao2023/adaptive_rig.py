@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.experiment import prepare
 from cmg_mj.papers.recorded import rms, trajectory_of
-from cmg_mj.push import Push
-from cmg_mj.result import Result
-from cmg_mj.scenario import load_scenario
-from cmg_mj.schema import Scenario
-from cmg_mj.side_by_side import Run, run_side_by_side
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.result import Result
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.simulation.batched_observers import Run, run_side_by_side
+from cmg_mj.simulation.experiment import prepare
 
 DURATION_S, LATE_S = 10.0, 5.0
 

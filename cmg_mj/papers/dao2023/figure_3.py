@@ -17,7 +17,7 @@ from cmg_mj.papers.dao2023.study import (
     known_times,
     words_of_time,
 )
-from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 TESTED = (
     "It holds for the three weights tested, not as a rule: past some hundreds a larger Sigma is slower. One output is "

@@ -18,9 +18,9 @@ import numpy as np
 from scipy.linalg import expm
 
 from cmg_mj.errors import InputError
+from cmg_mj.observers.reduced_model import is_hurwitz
 from cmg_mj.papers.dao2023.matrices import real, real_matrix, require_positive_definite, require_shape, solve, times
 from cmg_mj.papers.require import require_positive
-from cmg_mj.stability import is_hurwitz
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The cycles that the backlash of the gimbal's servo makes (`cmg_mj.backlash`)."""
+"""The cycles that the backlash of the gimbal's servo makes (`cmg_mj.controllers.backlash`)."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.experiment import Experiment
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.release import RELEASE, is_sustained
 from cmg_mj.papers.sokolov2019.rig import experiment
-from cmg_mj.side_by_side import run_of, run_side_by_side
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
+from cmg_mj.simulation.experiment import Experiment
 
 GAP_ARCMIN = 20.0
 """Backlash of the Dynamixel MX-106 (Robotis e-Manual, MX-106: 20 arcmin), from one side of the gap to the other."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cmg_mj import markdown
-from cmg_mj.intervals import known_interval
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.sokolov2019.loops import Loops, better, numbers, shown, smaller
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
-from cmg_mj.result import Result
+from cmg_mj.results import markdown
+from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.result import Result
 
 KEYS = {"velocity_rms_error_rad_s": "velocity RMS error [rad/s]", "tilt_rms_deg": "tilt RMS [deg]"}
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import (
     controllability_margin,
@@ -18,8 +19,7 @@ from cmg_mj.papers.linear_check import (
 )
 from cmg_mj.papers.sokolov2019 import paper
 from cmg_mj.papers.sokolov2019.rig import experiment, servo_of
-from cmg_mj.plant import Plant
-from cmg_mj.reduced import ReducedModel
+from cmg_mj.plant.plant import Plant
 
 
 def claims(on_share: OnShare) -> list[Claim]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from cmg_mj.intervals import known_interval
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.cycles import WITH_Y2, Cycles
@@ -18,6 +17,7 @@ from cmg_mj.papers.sokolov2019.loops import (
     tail,
 )
 from cmg_mj.papers.sokolov2019.pictures_4_to_6 import picture
+from cmg_mj.results.intervals import known_interval
 
 HELD = (
     f"With {GAP_ARCMIN:g} arcmin of backlash behind the servo's motor, as its datasheet has it, and friction that "

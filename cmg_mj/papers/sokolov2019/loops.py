@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.intervals import Interval, known_interval
 from cmg_mj.papers.claim import OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment
 from cmg_mj.papers.words import plus_minus
-from cmg_mj.result import Result
-from cmg_mj.side_by_side import Run, run_side_by_side
+from cmg_mj.results.intervals import Interval, known_interval
+from cmg_mj.results.result import Result
+from cmg_mj.simulation.batched_observers import Run, run_side_by_side
 
 SEED, WORLDS = 83_000, 20
 DURATION_S = 15.0

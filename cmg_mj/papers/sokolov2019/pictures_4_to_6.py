@@ -8,7 +8,7 @@ from cmg_mj.papers.recorded import pushed, trajectory_of
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.loops import SHOWN_DEG, Loops
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
-from cmg_mj.picture import Line, Panel, Picture
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 NUMBERS = {"linear": 4, "luenberger": 5, "homogeneous": 6}
 

@@ -11,8 +11,8 @@ import numpy as np
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, experiment, rig_with, servo_of
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
-from cmg_mj.side_by_side import Run, run_side_by_side
-from cmg_mj.trajectory import Trajectory
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.simulation.batched_observers import Run, run_side_by_side
 
 RELEASE = (
     *NO_NOISE,

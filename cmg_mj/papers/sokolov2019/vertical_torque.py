@@ -15,10 +15,10 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.callback import control
-from cmg_mj.experiment import Experiment
 from cmg_mj.papers.sokolov2019.rig import servo_of
-from cmg_mj.plant import Plant, load_plant
+from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.simulation.callback import control
+from cmg_mj.simulation.experiment import Experiment
 
 
 class Motion(NamedTuple):

@@ -1,0 +1,1 @@
+"""Generates C from a controller, and runs it on an emulated board."""

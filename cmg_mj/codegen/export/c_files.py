@@ -1,0 +1,204 @@
+"""The code of an export: NAME.h and NAME.c."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi
+
+from cmg_mj.codegen.export.c_code import Precision, body, literal
+from cmg_mj.codegen.export.constants import Constants
+from cmg_mj.codegen.export.header_comment import about
+from cmg_mj.codegen.export.names import places_of
+from cmg_mj.codegen.export.trace import MEASURED, Traced
+from cmg_mj.controllers.controller import Controller
+
+WIDEST = 110
+"""Characters of a line."""
+
+TYPES = {"double": "double", "single": "float"}
+
+
+@dataclass(frozen=True)
+class Texts:
+    """The code of one controller's export.
+
+    Attributes:
+        controller: The controller.
+        traced: Its formulas.
+        constants: Its numbers.
+        precision: Of every number in C.
+        name: What everything in C begins with.
+    """
+
+    controller: Controller
+    traced: Traced
+    constants: Constants
+    precision: Precision
+    name: str
+
+    @cached_property
+    def places(self) -> list[str]:
+        """Of an estimate's parts."""
+        return places_of(self.controller.extra_signals[0])
+
+    def header(self) -> str:
+        """NAME.h."""
+        n, N, real = self.name, self.name.upper(), f"{self.name}_real"
+        members = "".join(f"    {real} {member};\n" for member in self.traced.state or ("unused",))
+        places = "".join(f"    {N}_{place},\n" for place in self.places)
+        count = "    long updates; /* so far, while the integrator is trimmed */\n" if self.constants.trimmed else ""
+        return f"""{about(n, self.controller, self.precision)}
+#ifndef {N}_H
+#define {N}_H
+
+typedef {TYPES[self.precision]} {real};
+
+#define {N}_ENCODERS {self.constants.gimbals} /* one a gimbal */
+
+/* Places in an estimate: tilt, tilt rate, gimbal angle, and what else the observer estimates. */
+enum {{
+{places}    {N}_ESTIMATES
+}};
+
+/* The observer's state. */
+typedef struct {{
+{members}}} {n}_state;
+
+/* The whole controller's state. */
+typedef struct {{
+    {n}_state observer;
+    {real} x_e; /* integrator [rad s] */
+    {real} u; /* last command [rad/s] */
+    int started;
+{count}}} {n}_controller;
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+/* The whole controller: start once, then update every {self.controller.law.dt:g} s.
+ * accelerations: specific force as the two accelerometers show it, inner x, inner z, outer x, outer z [m/s^2];
+ *     x along the tilt's motion, z outward
+ * encoders: the gimbals' angles [rad]
+ * estimate: what the observer makes of it
+ * u: gimbal rate to hold until the next update, each gimbal with its direction's sign [rad/s] */
+{self._declared("start")};
+{self._declared("update")};
+
+/* The observer alone: its state at the first sample, and a sample further.
+ * y1: tilt [rad]
+ * y2: gimbal angle [rad]
+ * acceleration: of the tilt [rad/s^2]
+ * u: gimbal rate held since the sample before [rad/s] */
+{self._declared("init")};
+{self._declared("step")};
+
+#ifdef __cplusplus
+}}
+#endif
+
+#endif
+"""
+
+    def source(self) -> str:
+        """NAME.c."""
+        n, real, traced = self.name, f"{self.name}_real", self.traced
+        constants, measured = self.constants, list(MEASURED)
+        raw = [f"accelerations[{i}]" for i in range(4)] + [f"encoders[{i}]" for i in range(constants.gimbals)]
+        state = [f"state->{member}" for member in traced.state]
+        estimate = [f"estimate[{i}]" for i in range(len(self.places))]
+        x1, x3 = ("y1", "y2") if self.controller.angles == "measured" else (estimate[0], estimate[2])
+        start = ["0", "y2", *["0"] * (len(estimate) - 3)]
+        first = "".join(f"        {place} = {x};\n" for place, x in zip(estimate, ["y1", *start], strict=True))
+        trim = f"""    if (controller->updates < {constants.trimmed}) {{ /* while the bias is still being found */
+        controller->x_e = trim_gain * {estimate[constants.trim_part]};
+        ++controller->updates;
+    }}
+"""
+        return f"""#include "{n}.h"
+
+#include <math.h>
+
+{self._numbers()}
+/* Tilt, gimbal angle and the tilt's acceleration from what the sensors show. */
+{self._declared("measure")}
+{{
+{self._body(traced.measure, raw + _names(constants.of_measure), [f"*{name}" for name in measured])}}}
+
+/* u = -K_e [x1, x2, x3, x_e], limited; then a step of the integrator, unless it would wind up. */
+{self._declared("law")}
+{{
+{self._body(traced.law, ["x1", "x2", "x3", "*x_e", *_names(constants.of_law)], ["*u", "*x_e"])}}}
+
+{self._declared("init")}
+{{
+    (void)state, (void)y1, (void)y2, (void)acceleration;
+{self._body(traced.init, measured, state)}}}
+
+{self._declared("step")}
+{{
+    (void)state, (void)y1, (void)y2, (void)acceleration, (void)u;
+{self._body(traced.step, [*state, *measured, "u"], [*state, *estimate])}}}
+
+{self._declared("start")}
+{{
+    controller->x_e = 0;
+    controller->u = 0;
+    controller->started = 0;
+{"    controller->updates = 0;" + chr(10) if constants.trimmed else ""}}}
+
+{self._declared("update")}
+{{
+    {real} y1, y2, acceleration;
+    measure(accelerations, encoders, &y1, &y2, &acceleration);
+    if (controller->started) {{
+        {n}_step(&controller->observer, y1, y2, acceleration, controller->u, estimate);
+    }} else {{
+        {n}_init(&controller->observer, y1, y2, acceleration);
+{first}        controller->started = 1;
+    }}
+{trim if constants.trimmed else ""}    law({x1}, {estimate[1]}, {x3}, &controller->x_e, &controller->u);
+    *u = controller->u;
+}}
+"""
+
+    def _declared(self, function: str) -> str:
+        """A function's name and parameters, on as many lines as they need."""
+        n, N, real = self.name, self.name.upper(), f"{self.name}_real"
+        controller, state, estimate = (
+            f"{n}_controller *controller",
+            f"{n}_state *state",
+            f"{real} estimate[{N}_ESTIMATES]",
+        )
+        raw = (f"const {real} accelerations[4]", f"const {real} encoders[{N}_ENCODERS]")
+        y = tuple(f"{real} {name}" for name in MEASURED)
+        head, parameters = {
+            "start": (f"void {n}_start", (controller,)),
+            "update": (f"void {n}_update", (controller, *raw, estimate, f"{real} *u")),
+            "init": (f"void {n}_init", (state, *y)),
+            "step": (f"void {n}_step", (state, *y, f"{real} u", estimate)),
+            "measure": ("static void measure", (*raw, *(f"{real} *{name}" for name in MEASURED))),
+            "law": (
+                "static void law",
+                (*(f"{real} {name}" for name in ("x1", "x2", "x3")), f"{real} *x_e", f"{real} *u"),
+            ),
+        }[function]
+        text = f"{head}({', '.join(parameters)})"
+        return text if len(text) <= WIDEST else f"{head}(\n    {(',' + chr(10) + '    ').join(parameters)})"
+
+    def _numbers(self) -> str:
+        """The constants, with what they are."""
+        lines = [(f"{c.name} = {literal(c.value, self.precision)};", c.meaning) for c in self.constants.all]
+        width = max(len(text) for text, _ in lines)
+        return "".join(f"static const {self.name}_real {text:<{width}} /* {words} */\n" for text, words in lines)
+
+    def _body(self, function: casadi.Function, inputs: Sequence[str], outputs: Sequence[str]) -> str:
+        lines = body(function, inputs, outputs, f"{self.name}_real", self.precision)
+        return "".join(f"    {line}\n" for line in lines)
+
+
+def _names(constants: Sequence) -> list[str]:
+    return [constant.name for constant in constants]

@@ -1,0 +1,210 @@
+"""Whether the traced formulas, and the C, do what Python does: on random signals."""
+
+from __future__ import annotations
+
+import copy
+import os
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.codegen.export.c_code import Precision
+from cmg_mj.codegen.export.constants import Constants
+from cmg_mj.codegen.export.trace import Traced
+from cmg_mj.controllers.controller import Controller
+from cmg_mj.errors import InputError, RunStopped
+
+TICKS = 400
+
+SHARE = {"double": 1e-9, "single": 1e-4}
+"""Of its largest value, by which a number may be off; besides what the observer makes of one rounding of its inputs."""
+
+ROUNDINGS = 4
+"""How many times that may be."""
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+GRAVITY = 9.81
+
+
+def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarray:
+    """What the sensors of a restless rig might show: the tilt swings, the gimbals wander, both with noise; then rest.
+
+    Args:
+        controller: Whose sensors.
+        seed: Of the random numbers; every other one swings little.
+        precision: The numbers are exact in it.
+
+    Returns:
+        Raw accelerations [m/s^2] and encoders [rad], (TICKS, 4 + gimbals).
+    """
+    rng = np.random.default_rng(seed)
+    t = controller.law.dt * np.arange(TICKS)
+    size, noise = (0.2, 0.05) if seed % 2 == 0 else (0.01, 0.002)
+    w, phase = 2.0 * np.pi * rng.uniform(0.2, 1.5, 3), rng.uniform(0.0, 2.0 * np.pi, 3)
+    swings = size / 3.0 * np.sin(np.outer(t, w) + phase)
+    tilt, acceleration = swings.sum(axis=1), (-(w**2) * swings).sum(axis=1)
+    x, z = -GRAVITY * np.sin(tilt), GRAVITY * np.cos(tilt)
+    forces = [part for r in (controller.tilt.r_inner, controller.tilt.r_outer) for part in (x + r * acceleration, z)]
+    gimbal = 5.0 * size * np.sin(w[0] * t)
+    turned = zip(controller.directions, controller.gimbal_zero, strict=True)
+    encoders = [zero + direction * gimbal + 1e-3 * rng.normal(size=TICKS) for direction, zero in turned]
+    samples = np.array([force + noise * rng.normal(size=TICKS) for force in forces] + encoders).T
+    samples[-TICKS // 4 :] = samples[-TICKS // 4]  # equal readings, as a resolution makes them
+    return samples.astype(np.float32).astype(float) if precision == "single" else samples
+
+
+def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
+    """The estimates and u of the controller itself, (n, 4 + extra signals)."""
+    fresh = Controller(
+        copy.deepcopy(controller.observer),
+        controller.law,
+        controller.tilt,
+        controller.sensors,
+        directions=controller.directions,
+        gimbal_zero=controller.gimbal_zero,
+        timestep=controller.timestep,
+        angles=controller.angles,
+        trim_s=controller.trim_s,
+    )
+    rows = []
+    for k, row in enumerate(samples.tolist()):
+        tick = fresh.decide(k * fresh.period, row[:4], row[4:], 0.0, 0.0)
+        rows.append([*tick.estimates[0], tick.u])
+    return np.array(rows)
+
+
+def in_casadi(controller: Controller, traced: Traced, constants: Constants, samples: np.ndarray) -> np.ndarray:
+    """The same by the traced formulas, put together as in C."""
+
+    def values(function: Any, *arguments: float) -> list[float]:
+        return [float(value) for value in function.call(arguments)]
+
+    measured_with = [constant.value for constant in constants.of_measure]
+    law_of = [constant.value for constant in constants.of_law]
+    width = 3 + len(controller.extra_signals[0])
+    state: list[float] | None = None
+    u = x_e = 0.0
+    rows = []
+    for k, row in enumerate(samples.tolist()):
+        y = values(traced.measure, *row, *measured_with)
+        if state is None:
+            state = values(traced.init, *y)
+            estimate = [y[0], 0.0, y[1], *[0.0] * (width - 3)]
+        else:
+            result = values(traced.step, *state, *y, u)
+            state, estimate = result[: len(state)], result[len(state) :]
+        if k < constants.trimmed:
+            x_e = constants.trim_gain.value * estimate[constants.trim_part]
+        x1, x3 = (y[0], y[1]) if controller.angles == "measured" else (estimate[0], estimate[2])
+        u, x_e = values(traced.law, x1, estimate[1], x3, x_e, *law_of)
+        rows.append([*estimate, u])
+    return np.array(rows)
+
+
+def columns(controller: Controller) -> list[str]:
+    """What is compared: the parts of an estimate, and u."""
+    return ["x1_rad", "x2_rad_s", "x3_rad", *controller.extra_signals[0], "u_rad_s"]
+
+
+def rounded(expected: np.ndarray, precision: Precision) -> np.ndarray:
+    """How far each column may be off by rounding, (4 + extra signals,)."""
+    return SHARE[precision] * np.abs(expected).max(axis=0)
+
+
+def allowed(controller: Controller, samples: np.ndarray, expected: np.ndarray, precision: Precision) -> np.ndarray:
+    """How far each column may be off: by rounding, and by what the observer makes of it, (4 + extra signals,).
+
+    One that switches may make much of little: what a last digit of its inputs moves, rounding may move as well.
+    """
+    kind = np.float32 if precision == "single" else np.float64
+    near = samples.astype(kind)
+    ends = np.where(np.random.default_rng(0).random(samples.shape) < 0.5, -np.inf, np.inf).astype(kind)
+    moved = np.abs(in_python(controller, np.nextafter(near, ends).astype(float)) - expected)
+    return rounded(expected, precision) + ROUNDINGS * moved.max(axis=0)
+
+
+def check_trace(controller: Controller, traced: Traced, constants: Constants, seeds: Sequence[int]) -> float:
+    """Compare the formulas with Python, in double precision.
+
+    Returns:
+        The largest difference, in units of what is allowed.
+
+    Raises:
+        InputError: They differ by more.
+    """
+    largest = 0.0
+    for seed in seeds:
+        samples = signals(controller, seed, "double")
+        try:
+            expected = in_python(controller, samples)
+        except RunStopped as error:
+            raise InputError(f"it cannot be compared on random signals: {error}") from error
+        if not np.array_equal(in_python(controller, samples), expected):
+            raise InputError("in Python it is not twice the same on the same signals, so that nothing can be compared")
+        off = np.abs(in_casadi(controller, traced, constants, samples) - expected)
+        share = off / np.maximum(allowed(controller, samples, expected, "double"), np.finfo(float).tiny)
+        if not np.all(share <= 1.0):
+            tick, part = np.argwhere(~(share <= 1.0))[0]
+            name = columns(controller)[part]
+            raise InputError(
+                f"traced, it is not what Python runs: on random signals {name} is off by {off[tick, part]:.3g} at "
+                f"sample {tick}. Does it look at the type of a number, or remember something outside of its state?"
+            )
+        largest = max(largest, float(off.max()))
+    return largest
+
+
+def compiler() -> list[str] | None:
+    """The C compiler that is there: CC, or else cc, gcc or clang."""
+    try:
+        named = shlex.split(os.environ.get("CC", ""))
+    except ValueError as error:
+        raise InputError(f"CC = {os.environ['CC']!r}: {error}") from error
+    if named:
+        return named
+    return next(([found] for found in map(shutil.which, ("cc", "gcc", "clang")) if found), None)
+
+
+def check_c(folder: Path, name: str, compile_with: Sequence[str]) -> dict[str, float]:
+    """Compile an export's example, which compares the C with the test vector, and run it.
+
+    Args:
+        folder: Where the files are.
+        name: What they begin with.
+        compile_with: The compiler.
+
+    Returns:
+        For each part of an estimate and u by how much it is off at most.
+
+    Raises:
+        InputError: It does not compile, or it is not what Python says.
+    """
+    program = folder / f"{name}_example"
+    sources = [str(folder / f"{name}.c"), str(folder / f"{name}_example.c")]
+    said = _run([*compile_with, *FLAGS, *sources, "-o", str(program), "-lm"], "the C compiler")
+    if said.returncode:
+        hint = " (CC must name a compiler for this machine)" if os.environ.get("CC") else ""
+        raise InputError(f"the C does not compile with {shlex.join(compile_with)}{hint}: {_first_line(said.stderr)}")
+    said = _run([str(program)], "the compiled example")
+    program.unlink()
+    if said.returncode:
+        raise InputError(f"the C is not what Python runs: {'; '.join(said.stdout.splitlines())}")
+    found = re.findall(r"^(\w+): off by at most (\S+),", said.stdout, re.MULTILINE)
+    return {part: float(off) for part, off in found}
+
+
+def _run(command: Sequence[str], what: str) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=300, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise InputError(f"{what} cannot be run: {getattr(error, 'strerror', None) or error}") from error
+
+
+def _first_line(text: str) -> str:
+    return next((line for line in text.splitlines() if "error" in line), text.strip().split("\n")[0])

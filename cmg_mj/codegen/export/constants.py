@@ -1,0 +1,68 @@
+"""The numbers of a controller beside its observer: with names, units and words, and open to change in the C."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, cast
+
+from cmg_mj.controllers.controller import Controller
+from cmg_mj.controllers.laws import StateFeedback
+
+
+class Constant(NamedTuple):
+    """A number of the controller."""
+
+    name: str
+    value: float
+    meaning: str
+
+
+class Constants(NamedTuple):
+    """The numbers that the measurement, the law and the trim take.
+
+    Attributes:
+        of_measure: Radii, then the gimbals' directions, then their zeros.
+        of_law: The period, the gains, the limit.
+        trimmed: For how many updates the integrator is trimmed.
+        trim_gain: See `controller.trim_of`.
+        trim_part: Which part of the estimate it is trimmed with.
+        gimbals: How many there are.
+    """
+
+    of_measure: list[Constant]
+    of_law: list[Constant]
+    trimmed: int
+    trim_gain: Constant
+    trim_part: int
+    gimbals: int
+
+    @property
+    def all(self) -> list[Constant]:
+        """All that stand in the C."""
+        return [*self.of_measure, *self.of_law, *([self.trim_gain] if self.trimmed else [])]
+
+
+def constants_of(controller: Controller) -> Constants:
+    """The numbers of a controller."""
+    tilt, law = controller.tilt, cast("StateFeedback", controller.law)
+    k1, k2, k3, k4 = law.gains
+    numbered = list(enumerate(zip(controller.directions, controller.gimbal_zero, strict=True), 1))
+    return Constants(
+        of_measure=[
+            Constant("r_inner", tilt.r_inner, "inner accelerometer from the tilt axis [m]"),
+            Constant("r_outer", tilt.r_outer, "outer accelerometer from the tilt axis [m]"),
+            *(Constant(f"direction_{i}", sign, f"sign of u that gimbal {i} is given") for i, (sign, _) in numbered),
+            *(Constant(f"zero_{i}", zero, f"encoder {i} at a gimbal angle of 0 [rad]") for i, (_, zero) in numbered),
+        ],
+        of_law=[
+            Constant("period", law.dt, "from one update to the next [s]"),
+            Constant("gain_x1", k1, "on the tilt [1/s]"),
+            Constant("gain_x2", k2, "on the tilt rate"),
+            Constant("gain_x3", k3, "on the gimbal angle [1/s]"),
+            Constant("gain_x_e", k4, "on the integrator [1/s^2]"),
+            Constant("rate_limit", law.rate_limit, "largest gimbal rate [rad/s]"),
+        ],
+        trimmed=-(-controller.trimmed_until // controller.period),
+        trim_gain=Constant("trim_gain", controller.trim_gain, "from the bias to the integrator [s]"),
+        trim_part=controller.trim_part,
+        gimbals=len(controller.directions),
+    )

@@ -1,0 +1,49 @@
+"""What cannot be exported, and where in the user's code it stands."""
+
+from __future__ import annotations
+
+import linecache
+import os
+import sys
+from pathlib import Path
+from types import FrameType, TracebackType
+
+import numpy as np
+
+from cmg_mj.errors import InputError
+
+_NOT_THE_USERS = (
+    str(Path(__file__).parent),
+    str(Path(np.__file__).parent),
+    str(Path(__file__).parents[2] / "elementwise"),
+)
+
+
+class Refused(InputError):
+    """Something that has no place in a formula."""
+
+
+def here() -> str:
+    """The line that is at work now, the first one below what traces it: `(own.py, line 12: if y1 > 0.1:)`."""
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None and frame.f_code.co_filename.startswith(_NOT_THE_USERS):
+        frame = frame.f_back
+    return "" if frame is None else _shown(frame.f_code.co_filename, frame.f_lineno)
+
+
+def raised_at(traceback: TracebackType | None) -> str:
+    """The innermost line of the user's that an exception came from."""
+    place = ""
+    while traceback is not None:
+        file = traceback.tb_frame.f_code.co_filename
+        if not file.startswith(_NOT_THE_USERS):
+            place = _shown(file, traceback.tb_lineno)
+        traceback = traceback.tb_next
+    return place
+
+
+def _shown(file: str, line: int) -> str:
+    text = linecache.getline(file, line).strip()
+    near = os.path.relpath(file)
+    name = near if len(near) < len(file) else file
+    return f"({name}, line {line}{': ' if text else ''}{text})"

@@ -1,0 +1,1 @@
+"""Runs the controller: sensors, tilt, observer and law once a control period."""

@@ -1,0 +1,272 @@
+"""The controller: sensors -> tilt -> observer -> law -> gimbal rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Literal, NamedTuple
+
+from cmg_mj.controllers.backlash import Backlash
+from cmg_mj.controllers.integrator_trim import trim_of
+from cmg_mj.controllers.law_runner import Commanding, Succeeding
+from cmg_mj.controllers.laws.protocol import Law, fed
+from cmg_mj.elementwise import Scalar
+from cmg_mj.errors import InputError
+from cmg_mj.observers.protocol import Measurement, Observer
+from cmg_mj.observers.runner import Joining, Observing, read_only
+from cmg_mj.sensors.gimbal_angle import GimbalAngle
+from cmg_mj.sensors.ideal import Ideal
+from cmg_mj.sensors.sampled import Sensors, at_work
+from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.sensors.timing import steps_until, whole_steps
+
+Feedback = Literal["observer", "fog", "truth"]
+Angles = Literal["measured", "estimated"]
+
+
+CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s", "axis"})
+"""Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
+
+RIDES_ALONG = 20
+"""Ticks that a new observer sees before it takes over from another: 0.1 s at 200 Hz."""
+
+
+_new = tuple.__new__  # a named tuple's own takes twice as long
+
+
+class Tick(NamedTuple):
+    """All that one control period measured and decided (floats, or arrays (n_worlds,))."""
+
+    y1: Scalar
+    y2: Scalar
+    acceleration: Scalar
+    fog: Scalar
+    u: Scalar
+    x_e: Scalar
+    estimates: Sequence[Sequence[Scalar]]
+    """The observer's estimate (x1, x2, x3, its extra signals), then those of the companions."""
+
+
+class Controller:
+    """Runs the sensors, the observer and the law, tick after tick.
+
+    It does not know MuJoCo: `update` takes the number of the physics step and the ideal readings at that step.
+
+    Args:
+        observer: The observer whose estimate the law uses.
+        law: The control law; its `dt` is the control period, beyond its `rate_limit` no command goes.
+        tilt: The tilt estimate.
+        sensors: What stands between the ideal readings and the controller.
+        directions: For each gimbal +1 or -1: the sign of u that it is given.
+        gimbal_zero: For each gimbal the angle at which y2 = 0 [rad].
+        timestep: Physics step [s].
+        seed: Seed of the sensors' noise.
+        worlds: The number of one world, on floats, or the numbers of many, on arrays.
+        feedback: Which rate the law uses: the observer's, the gyro's or the true one.
+        angles: Whether the law uses y1, y2 as (8) says or the estimates, as the text after (10) says.
+        companions: Observers that ride along open loop, by name.
+        trim_s: For so long from the start, the integrator is held at the value that the observer's bias estimate asks
+            for, k_e1/k_e4 e, instead of finding it by integration [s].
+        backlash: Between the servos' motors and the gimbals, one for all worlds or (n_worlds,) [rad].
+        axis: The number of the rig's axis, on which the noise depends.
+
+    Attributes:
+        extra_signals: Names of what the observer, then each companion, estimates beyond x.
+        trimmed_until: The physics step from which on the integrator goes free.
+        trim_part: Which part of the estimate is the bias that it is trimmed with.
+        trim_gain: The gain on it [s].
+
+    Raises:
+        InputError: A rate does not fit the physics step, or there is no bias estimate to trim with.
+    """
+
+    def __init__(
+        self,
+        observer: Observer,
+        law: Law,
+        tilt: RadialTilt,
+        sensors: Sensors,
+        *,
+        directions: Sequence[float],
+        gimbal_zero: Sequence[float],
+        timestep: float,
+        seed: int = 0,
+        worlds: int | Sequence[int] = 0,
+        feedback: Feedback = "observer",
+        angles: Angles = "measured",
+        companions: Mapping[str, Observer] | None = None,
+        trim_s: float = 0.0,
+        backlash: Scalar = 0.0,
+        axis: int = 0,
+    ) -> None:
+        self.observer = observer
+        self.law = law
+        self.tilt = tilt
+        self.sensors = sensors
+        self.directions = tuple(directions)
+        self.gimbal_zero = tuple(gimbal_zero)
+        self.timestep = timestep
+        self.seed = seed
+        self.worlds = worlds
+        self.axis = axis
+        self.turns_gimbals = True
+        """Whether `update` does: with other axes, what a turn couples comes in between."""
+        self.feedback: Feedback = feedback
+        self.angles: Angles = angles
+        self.companions = dict(companions or {})
+        self._single = isinstance(worlds, int)
+        self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
+        self._commanding: Commanding = Commanding(law, self._single, timestep)
+        self._observing: Observing = Observing([observer, *self.companions.values()], self._single, timestep)
+        self.extra_signals = self._observing.extra_signals
+        self.trim_s = trim_s
+        self.trim_part, self.trim_gain = trim_of(trim_s, law, self.extra_signals[0])
+        self.trimmed_until = steps_until(trim_s, timestep)
+        self.backlash = backlash
+        self.gimbal_angle = GimbalAngle(self.directions, self.gimbal_zero)
+        self.reset()
+
+    @property
+    def parts(self) -> Sequence[Controller]:
+        """Those of the axes: of a rig's only one itself."""
+        return (self,)
+
+    def reset(self) -> None:
+        """Forget everything: the next update is the first tick of a run with the same seed."""
+        self._sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds, self.axis)
+        self.tick: Tick | None = None
+        self.turning: Scalar = None
+        """The rate at which the gimbals are turned since the last tick: its u, behind the backlash [rad/s]."""
+        self._gap = None if type(self.backlash) is float and not self.backlash else Backlash(self.backlash, self.law.dt)
+        self.coriolis: Scalar | None = None
+        """What in the accelerometers' angular acceleration is none, on a rig that turns [rad/s^2]."""
+        self.step: int | None = None
+        """The physics step of the last update."""
+        self.beat = math.gcd(self.period, *(sensor.beat for sensor in self._sampled))
+        """Physics steps between the moments at which anything may be due."""
+
+    def exchange(
+        self,
+        *,
+        observer: Observer | None = None,
+        law: Law | None = None,
+        sensors: Sensors | None = None,
+        feedback: Feedback | None = None,
+    ) -> None:
+        """Go on with something else from the next update on; an integrator and the command that is held stay.
+
+        An integrator that was trimmed until now goes free with another observer or law.
+
+        Args:
+            observer: Another one for the loop. It starts from the next tick's sample and takes over `RIDES_ALONG` ticks
+                later; companions start again with it.
+            law: Another law of the same control period, which starts from the next tick's sample.
+            sensors: Others, of the same rates. All sensors start afresh, with their noise from its beginning.
+            feedback: Which rate the law uses.
+
+        Raises:
+            InputError: A rate does not fit.
+        """
+        if law is not None and law.dt != self.law.dt:
+            raise InputError(f"controller.rate_hz: stays {1.0 / self.law.dt:g} Hz while it runs")
+        if sensors is not None:
+            sampled = at_work(sensors, self.timestep, self.seed, self.worlds, self.axis)
+            if math.gcd(self.period, *(sensor.beat for sensor in sampled)) != self.beat:
+                raise InputError("sensors: their rates stay while it runs")
+            self._sampled, self.sensors = sampled, sensors
+            self.step = None  # all of them sample at the next update, due or not
+        if observer is not None:
+            observers = [observer, *self.companions.values()]
+            if self.tick is None:
+                self._observing = Observing(observers, self._single, self.timestep)
+            else:
+                self._observing = Joining(self._observing, RIDES_ALONG, observers, self._single, self.timestep)
+            self.observer, self.extra_signals = observer, self._observing.extra_signals
+        if law is not None:
+            self._commanding = Succeeding(self._commanding, law, self._single, self.timestep)
+            self.law = law
+        if law is not None or observer is not None:
+            self.trimmed_until = 0
+        self.feedback = feedback or self.feedback
+
+    def update(self, step: int, ideal: Ideal) -> bool:
+        """Take the samples and the control decision that are due at a physics step.
+
+        Args:
+            step: Number of the physics step, a multiple of `beat`.
+            ideal: The ideal readings at that step.
+
+        Returns:
+            Whether a control tick was due; `tick` then is its record.
+
+        Raises:
+            RunStopped: An observer returned a number that is not finite.
+        """
+        first, self.step = self.step is None, step
+        for sensor in self._sampled:
+            if step % sensor.beat == 0 or first:  # a start between two samples still has something to show
+                sensor.sample(step, ideal)
+        if step % self.period:
+            return False
+        accelerometers, encoders, fog = self._sampled
+        u = self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), ideal.rate).u
+        if self.turns_gimbals:
+            self.turning = u if self._gap is None else self._gap(u)
+        return True
+
+    def turn(self, u: Scalar) -> None:
+        """Turn the gimbals at a rate from now on [rad/s]."""
+        self.turning = u if self._gap is None else self._gap(u)
+
+    def decide(
+        self, step: int, forces: Sequence[Scalar], encoders: Sequence[Scalar], fog: Scalar, rate: Scalar
+    ) -> Tick:
+        """What a control tick makes of the samples that have been delivered.
+
+        Args:
+            step: Number of the physics step.
+            forces: Specific force: inner x, inner z, outer x, outer z [m/s^2].
+            encoders: Gimbal angles, one a gimbal [rad].
+            fog: The gyro's rate [rad/s].
+            rate: The true one, where that is fed back [rad/s].
+
+        Returns:
+            The tick, which counts as the last one from now on.
+
+        Raises:
+            RunStopped: The observer or the law failed, or returned a number that is not finite.
+        """
+        y1, y2, acceleration = (
+            self.tilt(*forces),
+            self.gimbal_angle(encoders),
+            self.tilt.acceleration(forces[0], forces[2]),
+        )
+        if self.coriolis is not None:
+            acceleration = acceleration - self.coriolis
+        y = _new(Measurement, (y1, y2))
+        y.acceleration = acceleration
+        if not self._single:
+            read_only(y1, y2, acceleration)  # observers and the law share them
+        if self.tick is None:
+            estimates, held = self._observing.start(y, step), 0.0 * y1
+            self._commanding.start(y, step)
+        else:
+            held = self.tick.u
+            estimates = self._observing.advance(y, held, step)
+        estimate = estimates[0]
+        if step < self.trimmed_until:
+            self._commanding.trim(self.trim_gain * estimate[self.trim_part])
+        x1, x2, x3 = (y1, estimate[1], y2) if self.angles == "measured" else estimate[:3]
+        if self.feedback != "observer":
+            x2 = fog if self.feedback == "fog" else rate
+        if not self._single:
+            x2 = x2.copy()
+            read_only(x2, *estimate)
+        x = fed(x1, x2, x3)
+        if len(estimate) > 3:
+            x.extra = estimate[3:]
+        u, x_e = self._commanding.decide(y, x, held, step)
+        if not self._single:
+            read_only(u)  # observers get it at the next tick, the trajectory later
+        self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates))
+        return self.tick

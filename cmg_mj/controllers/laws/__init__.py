@@ -1,0 +1,18 @@
+"""Control laws, one a file."""
+
+from cmg_mj.controllers.laws.protocol import Fed, Law
+from cmg_mj.controllers.laws.registry import LAWS, law_class, make_law
+from cmg_mj.controllers.laws.scaled_gains import carried_over_gains
+from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS, StateFeedback, lqr_gains
+
+__all__ = [
+    "LAWS",
+    "TABLE_2_GAINS",
+    "Fed",
+    "Law",
+    "StateFeedback",
+    "carried_over_gains",
+    "law_class",
+    "lqr_gains",
+    "make_law",
+]

@@ -1,0 +1,144 @@
+"""A controller an axis, at the same ticks, and the gimbals turned against what a turn about the vertical couples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.controllers.controller import Controller, Feedback, Tick
+from cmg_mj.elementwise import Scalar, clip, cos, dot, sin, where
+from cmg_mj.errors import InputError
+from cmg_mj.observers.runner import read_only
+from cmg_mj.sensors.ideal import Ideal, Ideals
+from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.sensors.sampled import normals
+
+Rows = Sequence[Sequence[float]]
+
+STREAM = 5
+"""Of the noise of the gyro about the vertical: those before it are an axis' sensors'."""
+
+
+class Turning(NamedTuple):
+    """By how much the axes of a rig that turns at w couple, (n_axes, n_axes) each, zero on the diagonals.
+
+    In a frame that turns at w about the vertical z, with n_i along axis i, two momenta of axis j are swept round. That
+    of its wheels, its gimbals at x3_j, is s_j sin(x3_j), where s_j = sum over its cubes of direction (gimbal axis x
+    momentum at x3 = 0); it changes by
+
+        s_j cos(x3_j) u_j + w (z x s_j) sin(x3_j),
+
+    and the frame gets the opposite torque. That of all that tilts, whose inertia about the vertical is I_z and about
+    the axes I_i and I_j, tilting at x2_j, is a torque (I_i + I_j - I_z) w x2_j n_i . (n_j x z) about axis i (Euler's
+    equations in that frame). Of both nothing is left with
+
+        u_i = w sum_j (c_ij sin(x3_j) + d_ij x2_j) / cos(x3_i),
+        c_ij = -n_i . (z x s_j)/(n_i . s_i),   d_ij = (I_i + I_j - I_z) n_i . (n_j x z)/(n_i . s_i).
+
+    And what accelerometers show as the angular acceleration about axis i has w k_ij x2_j in it that is none,
+    k_ij = 2 n_i . (z x n_j): Coriolis' acceleration, once of the frame and once of the point in it.
+    """
+
+    wheels: np.ndarray
+    """c [1]: for two axes at right angles whose pairs are alike +-1."""
+    body: np.ndarray
+    """d [s]."""
+    shown: np.ndarray
+    """k [1]."""
+
+
+class AxesController:
+    """Runs a controller an axis, tick after tick.
+
+    Where the rig turns about the vertical at w, the momenta of axis j, its wheels' and its tilt's, are swept round with
+    it, and what torque that takes acts about axis i. Its gimbals cancel it at the rate
+
+        u_i = w sum_j (c_ij sin(x3_j) + d_ij x2_j) / cos(x3_i)
+
+    (`Turning`) beside the law's own u, with the x2_j that is fed back (the observers', unless `feedback` says
+    otherwise). The observers are told the law's u alone: the rest makes no torque. From the accelerometers' angular
+    acceleration w k_ij x2_j is taken, with x2_j of the tick before. w is what a cheap gyro about the frame's vertical
+    shows.
+
+    Args:
+        parts: The controllers, one an axis, of one control period.
+        turning: The coefficients; None for a rig whose turns are not minded.
+        gyro: What shows w; by default the first axis' cheap gyro.
+
+    Raises:
+        InputError: The control periods differ.
+    """
+
+    def __init__(
+        self, parts: Sequence[Controller], turning: Turning | None = None, gyro: MemsGyro | None = None
+    ) -> None:
+        self.parts = tuple(parts)
+        first = self.parts[0]
+        if any(part.period != first.period for part in self.parts):
+            raise InputError("controller.rate_hz: must be the same on all axes")
+        self.period, self.timestep = first.period, first.timestep
+        self.law, self.sensors = first.law, first.sensors
+        self._gyro = gyro or first.sensors.mems_gyro
+        self.seed, self.worlds = first.seed, first.worlds
+        self.beat = math.gcd(*(part.beat for part in self.parts))
+        """Physics steps between the moments at which anything may be due."""
+        self._turning = None if turning is None else [coefficients.tolist() for coefficients in turning]
+        for part in self.parts:
+            part.turns_gimbals = turning is None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the next update is the first tick of a run with the same seed."""
+        for part in self.parts:
+            part.reset()
+        self.step: int | None = None
+        """The physics step of the last update."""
+        noise = normals(self.seed, self.worlds, STREAM, self._gyro.channels)
+        self._read = self._gyro.meter(self.law.dt, noise)
+
+    def update(self, step: int, ideals: Ideals) -> bool:
+        """Take the samples and the control decisions that are due at a physics step.
+
+        Args:
+            step: Number of the physics step, a multiple of `beat`.
+            ideals: The ideal readings at that step.
+
+        Returns:
+            Whether a control tick was due.
+
+        Raises:
+            RunStopped: An observer or a law of an axis returned a number that is not finite.
+        """
+        self.step = step
+        ticked = [part.update(step, ideal) for part, ideal in zip(self.parts, ideals.axes, strict=True)]
+        if ticked[0] and self._turning is not None:
+            self._against(ideals, *self._turning)
+        return ticked[0]
+
+    def _against(self, ideals: Ideals, wheels: Rows, body: Rows, shown: Rows) -> None:
+        """Add to each axis' command what cancels the torque of momenta that are swept round."""
+        turn_rate = ideals.turn_rate
+        read = self._read(np.atleast_1d(turn_rate)[None, :])[0]
+        w = float(read[0]) if type(turn_rate) is float else read
+        ticks = [part.tick for part in self.parts if part.tick is not None]
+        turned = [sin(tick.y2) for tick in ticks]
+        known = zip(self.parts, ticks, ideals.axes, strict=True)
+        rates = [_fed_back(part.feedback, tick, ideal) for part, tick, ideal in known]
+        for part, tick, c, d, k in zip(self.parts, ticks, wheels, body, shown, strict=True):
+            added = w * (dot(c, turned) + dot(d, rates)) / cos(tick.y2)
+            limit = part.law.rate_limit
+            total = clip(tick.u + added, -limit, limit)
+            u = where(tick.u + added == total, tick.u, total - added)  # the law's, as far as it was not limited
+            part.coriolis = none = w * dot(k, rates)
+            if type(u) is not float:
+                read_only(u, none)  # as in `Controller.decide`
+            part.tick = tick._replace(u=u)
+            part.turn(total)
+
+
+def _fed_back(feedback: Feedback, tick: Tick, ideal: Ideal) -> Scalar:
+    """The tilt rate of an axis that its law is given [rad/s]."""
+    return tick.estimates[0][1] if feedback == "observer" else tick.fog if feedback == "fog" else ideal.rate

@@ -1,0 +1,102 @@
+"""A processor that takes the control decision in the controller's place, such as a board that runs all of it in C."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+from cmg_mj.controllers.controller import Controller, Tick
+from cmg_mj.elementwise import Scalar
+from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.observers.protocol import Measurement, Observer
+from cmg_mj.observers.runner import named
+
+
+class Decision(NamedTuple):
+    """What a processor has decided."""
+
+    u: float
+    """Gimbal rate [rad/s]."""
+    x_e: float
+    """The integrator before it [rad s], which went into it unless it is being trimmed."""
+    estimate: Sequence[float]
+    """The observer's: x1, x2, x3, its extra signals."""
+
+
+class Processor(Protocol):
+    """What takes the control decision in the controller's place, in C or otherwise."""
+
+    def start(self) -> None:
+        """The next update is the first."""
+
+    def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
+        """One control period, from what the sensors show.
+
+        Args:
+            accelerations: Inner x, z, outer x, z [m/s^2].
+            encoders: The gimbals' angles [rad].
+
+        Returns:
+            The decision.
+
+        Raises:
+            RunStopped: There is none.
+        """
+        ...
+
+
+class _Elsewhere:
+    """Stands for the observer that a processor runs: what it estimates has just been decided."""
+
+    def __init__(self, observer: Observer) -> None:
+        self.stands_for = observer
+        self.extra_signals: Sequence[str] = getattr(observer, "extra_signals", ())
+        self.estimate: Sequence[float] = ()
+
+    def init(self, y: Measurement) -> None:
+        return None
+
+    def step(self, state: None, y: Measurement, u: Scalar) -> tuple[None, Any]:
+        return None, self.estimate
+
+
+class WithProcessor(Controller):
+    """A controller whose decisions a processor takes, from what the sensors show (one world only).
+
+    Args:
+        processor: It.
+        observer: The observer that it runs.
+        *args: The rest of what a `Controller` takes, which says what the processor runs.
+        **options: The same.
+
+    Raises:
+        InputError: There are many worlds, or the rate is not to be the observer's.
+    """
+
+    def __init__(self, processor: Processor, observer: Observer, *args: Any, **options: Any) -> None:
+        self.processor = processor
+        self._elsewhere = _Elsewhere(observer)
+        super().__init__(self._elsewhere, *args, **options)
+        self.observer = observer
+        if not isinstance(self.worlds, int) or self.feedback != "observer":
+            raise InputError("a processor runs one world, on the observer's rate: no batch, and feedback = 'observer'")
+
+    def reset(self) -> None:
+        """Forget everything, the processor too."""
+        super().reset()
+        self.processor.start()
+
+    def decide(
+        self, step: int, forces: Sequence[Scalar], encoders: Sequence[Scalar], fog: Scalar, rate: Scalar
+    ) -> Tick:
+        """What the processor makes of the samples that have been delivered; as `Controller.decide`."""
+        try:
+            decision = self.processor.update(forces, encoders)
+        except RunStopped as error:
+            raise RunStopped(f"{error}, at t = {step * self.timestep:g} s") from error
+        self._elsewhere.estimate = decision.estimate
+        tick = super().decide(step, forces, encoders, fog, rate)
+        trimmed = step < self.trimmed_until
+        x_e = self.trim_gain * decision.estimate[self.trim_part] if trimmed else decision.x_e
+        self.tick = tick._replace(u=decision.u, x_e=x_e, estimates=[named(decision.estimate), *tick.estimates[1:]])
+        return self.tick

@@ -1,0 +1,135 @@
+"""A class by its name, or a user's own by dotted path: found, its parameters checked, made."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import json
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from cmg_mj.errors import InputError, nearest, raised
+from cmg_mj.inputs.messages import complaint, fields_of, not_allowed
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What such classes are for, and what messages call them.
+
+    Attributes:
+        what: `observer` or `law`.
+        section: The scenario's section whose `kind` names one and whose other fields are its parameters.
+        known: Name a user types -> dotted path of the class.
+        given: Parameters that the bench gives, not the user.
+        methods: What it must have: name -> its parameters, in words.
+    """
+
+    what: str
+    section: str
+    known: Mapping[str, str]
+    given: Collection[str]
+    methods: Mapping[str, str]
+
+    def find(self, kind: str) -> type:
+        """Find a class.
+
+        Args:
+            kind: A name of `known`, or `package.module:Class`.
+
+        Returns:
+            The class.
+
+        Raises:
+            InputError: There is none, or its module cannot be imported.
+        """
+        said = f"{self.section}.kind = {kind!r}"
+        if ":" not in kind and kind not in self.known:
+            raise InputError(
+                f"{said}: no such {self.what}; {nearest(kind, self.known)}, or your own as package.module:Class"
+            )
+        module_name, _, class_name = self.known.get(kind, kind).partition(":")
+        try:
+            found = getattr(importlib.import_module(module_name), class_name)
+        except (Exception, SystemExit) as error:  # a user's module may fail in any way while it is imported
+            raise InputError(f"{said}: cannot be imported: {raised(error)}") from error
+        if not (inspect.isclass(found) and all(callable(getattr(found, name, None)) for name in self.methods)):
+            methods = " and ".join(f"{name}({parameters})" for name, parameters in self.methods.items())
+            raise InputError(f"{said}: must be a class with the methods {methods}")
+        return found
+
+    def takes(self, kind: str) -> Mapping[str, inspect.Parameter]:
+        """What the constructor takes, by name."""
+        return inspect.signature(self.find(kind)).parameters
+
+    def may_take(self, kind: str, name: str) -> bool:
+        """Whether the constructor takes a parameter of this name."""
+        taken = self.takes(kind)
+        return name in taken or any(p.kind == inspect.Parameter.VAR_KEYWORD for p in taken.values())
+
+    def own(self, kind: str) -> list[str]:
+        """Names of the parameters that are the user's choice."""
+        return [name for name in self.takes(kind) if name not in self.given]
+
+    def check_names(self, kind: str, names: Iterable[str]) -> None:
+        """Refuse the names of parameters that a class does not have.
+
+        Raises:
+            InputError: Unknown class or parameter.
+        """
+        allowed = self.own(kind)
+        for name in names:
+            if name not in allowed and not self.may_take(kind, name):
+                what = nearest(name, allowed) if allowed else "it has none"
+                raise InputError(f"{self.section}.{name}: {kind} has no such parameter; {what}")
+
+    def check_types(self, kind: str, parameters: Mapping[str, Any]) -> None:
+        """Parameters are of their types: no text for a number.
+
+        Raises:
+            InputError: One is not, or is the bench's to give.
+        """
+        types = fields_of(self.find(kind))
+        for name, value in parameters.items():
+            if name in self.given:
+                raise InputError(f"{self.section}.{name}: set by the bench, which gives it to every {self.what}")
+            if name not in types:
+                continue  # a name that the class does not have, or no class of pydantic's: its constructor decides
+            adapter = TypeAdapter(types[name], config=ConfigDict(strict=True, allow_inf_nan=False))
+            try:
+                adapter.validate_json(json.dumps(value, default=as_json))
+            except ValidationError as error:
+                finite = all(detail["type"] != "finite_number" for detail in error.errors())
+                wrong = not_allowed(f"{self.section}.{name}", value, types[name], finite=finite)
+                raise InputError(f"{wrong} ({self.what} {kind})") from error
+
+    def make(self, kind: str, given: Mapping[str, Any], parameters: Mapping[str, Any]) -> Any:
+        """Construct one.
+
+        Args:
+            kind: A name of `known`, or `package.module:Class`.
+            given: What the bench gives it.
+            parameters: The user's choice; those left out keep their defaults.
+
+        Returns:
+            The object.
+
+        Raises:
+            InputError: Unknown class or parameter, or one that it refuses.
+        """
+        cls = self.find(kind)
+        self.check_names(kind, parameters)
+        try:
+            return cls(**given, **parameters)
+        except ValidationError as error:
+            clause = complaint(cls, error.errors()[0], {**given, **parameters})
+            raise InputError(f"{self.section}.{clause} ({self.what} {kind})") from error
+        except (Exception, SystemExit) as error:  # a user's own class may refuse its parameters in its own way
+            raise InputError(f"{self.what} {kind}: {raised(error)}") from error
+
+
+def as_json(value: Any) -> Any:
+    """Numbers of numpy, for those who write a scenario in Python; a date of TOML, which no field takes."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)

@@ -1,6 +1,0 @@
-"""A user's own log, CSV or Parquet -> evenly sampled signals in SI and radians, with a word on all that was done."""
-
-from cmg_mj.logs.log import Log
-from cmg_mj.logs.reading import read_log
-
-__all__ = ["Log", "read_log"]

@@ -1,6 +1,0 @@
-"""Pairs mounted on a user's own robot: any MJCF in, a rig out."""
-
-from cmg_mj.mounting.mount import mount
-from cmg_mj.mounting.mounted import Mounted
-
-__all__ = ["Mounted", "mount"]

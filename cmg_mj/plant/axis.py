@@ -1,0 +1,225 @@
+"""One axis of a rig: its line, its cubes and sensors by address, and the reduced model read off about that line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from operator import itemgetter
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from cmg_mj.elementwise import Scalar
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.plant.effective_inertia import at_keyframe, inertia_about
+from cmg_mj.plant.parts import LINE, Cube, cubes_of
+from cmg_mj.plant.tilt_line import Line, line_at_site, line_of_joint
+from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.ideal import Ideal
+from cmg_mj.sensors.tilt import RadialTilt
+
+_new = tuple.__new__  # a named tuple's own takes twice as long
+
+QUARTER_TURN = math.pi / 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One axis of a rig, with its names resolved.
+
+    Attributes:
+        name: What its elements' names begin with, without the slash; empty for a rig's only one.
+        line: What it tilts about.
+        frame: The body that carries its sensors.
+        point: A point of the line, in the frame's axes [m].
+        direction: Along the line, in the frame's axes, (3,).
+        cubes: Addresses of its modules.
+        reduced: Parameters of the reduced model.
+        radial_tilt: The tilt estimate for its accelerometers.
+        forces: Addresses in sensordata of inner x, inner z, outer x, outer z.
+        encoders: Those of the gimbals' encoders.
+        gyro: That of the gyro along the line.
+        bias: e [rad].
+        initial_tilt: From the equilibrium, at the start [rad].
+    """
+
+    name: str
+    line: Line
+    frame: int
+    point: np.ndarray
+    direction: np.ndarray
+    cubes: tuple[Cube, ...]
+    reduced: ReducedModel
+    radial_tilt: RadialTilt
+    forces: list[int]
+    encoders: list[int]
+    gyro: int
+    bias: float = 0.0
+    initial_tilt: float = 0.0
+
+    @property
+    def prefix(self) -> str:
+        """What its elements' names begin with."""
+        return f"{self.name}/" if self.name else ""
+
+    @cached_property
+    def servos(self) -> list[int]:
+        """The gimbal servos' controls."""
+        return [cube.servo for cube in self.cubes]
+
+    @cached_property
+    def directions(self) -> list[float]:
+        """For each gimbal the sign of u that it is given."""
+        return [cube.direction for cube in self.cubes]
+
+    @cached_property
+    def _forces_of(self) -> Callable[[Any], Any]:
+        return itemgetter(*self.forces)
+
+    @cached_property
+    def _encoders_of(self) -> Callable[[Any], Any]:
+        (only, *others) = self.encoders
+        return itemgetter(*self.encoders) if others else lambda sensordata: (sensordata[only],)
+
+    @cached_property
+    def _gimbals(self) -> list[tuple[int, float, float]]:
+        """Of each gimbal its address, its share of x3 and where it is zero."""
+        n = len(self.cubes)
+        return [(cube.gimbal, cube.direction / n, cube.gimbal_zero) for cube in self.cubes]
+
+    def ideal(self, sensordata: Any, qvel: Any) -> Ideal:
+        """What perfect sensors show.
+
+        Args:
+            sensordata: MuJoCo's sensor readings after a forward pass, indexed by address: floats, or an array
+                (n_numbers, n_worlds).
+            qvel: Joint rates, the same way [rad/s].
+
+        Returns:
+            The ideal readings, of the elements' own type (float, or array (n_worlds,)).
+        """
+        if type(sensordata) is list:  # of one world, at every tick
+            forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
+        else:
+            forces, encoders = sensordata[self.forces], [sensordata[address] for address in self.encoders]
+        return _new(Ideal, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel)))
+
+    def gimbal_angle(self, qpos: Any) -> Scalar:
+        """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""
+        angle = 0.0
+        for gimbal, share, zero in self._gimbals:
+            angle = angle + share * (qpos[gimbal] - zero)
+        return angle
+
+    def apparent_bias(self, accelerometer: Accelerometer, gravity: float) -> float:
+        """What an observer of the bias should find: e less the tilt that the accelerometers' constant errors make.
+
+        With y1 = x1 - e + offset, the two cannot be told apart.
+
+        Args:
+            accelerometer: The sensors of the tilt.
+            gravity: [m/s^2].
+
+        Returns:
+            The bias at the equilibrium [rad].
+        """
+        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.constant_errors(), gravity)
+
+
+def find_axis(model: mujoco.MjModel, key: int, name: str) -> Axis:
+    """Resolve the names of an axis whose elements `rig_parts.lacks` has found.
+
+    Args:
+        model: The compiled model, as its file has it.
+        key: The keyframe at which the rig stands upright.
+        name: Of the axis.
+
+    Returns:
+        The axis, without bias.
+    """
+    prefix = f"{name}/" if name else ""
+    data = at_keyframe(model, key)
+    joint, site = _id(model, "joint", prefix + LINE), _id(model, "site", prefix + LINE)
+    if joint >= 0:
+        line: Line | None = line_of_joint(model, joint, key)
+        frame, point, direction = int(model.jnt_bodyid[joint]), model.jnt_pos[joint], model.jnt_axis[joint]
+    else:
+        line = line_at_site(model, data, site, key)
+        frame, point = int(model.site_bodyid[site]), model.site_pos[site]
+        direction = data.xmat[frame].reshape(3, 3).T @ data.site_xmat[site].reshape(3, 3)[:, 1]
+    assert line is not None  # `rig_check` has looked
+    addresses, radii = [], []
+    for which in ("inner", "outer"):
+        sensor = _id(model, "sensor", f"{prefix}accelerometer_{which}")
+        arm = model.site_pos[model.sensor_objid[sensor]] - point
+        radii.append(math.hypot(*(arm - (arm @ direction) * direction)))
+        addresses.append(int(model.sensor_adr[sensor]))
+    names = cubes_of(model, name)
+    axis = Axis(
+        name,
+        line,
+        frame,
+        point.copy(),
+        direction.copy(),
+        tuple(_cube(model, key, line, cube) for cube in names),
+        ReducedModel(1.0, 0.0, 1.0, 1.0, 1.0),
+        RadialTilt(*radii),
+        [address + along for address in addresses for along in (0, 2)],
+        [int(model.sensor_adr[_id(model, "sensor", f"{cube}/gimbal_encoder")]) for cube in names],
+        int(model.sensor_adr[_id(model, "sensor", f"{prefix}fog")]) + 1,  # its y axis
+    )
+    return replace(axis, reduced=read_reduced(model, key, axis))
+
+
+def held_cubes(model: mujoco.MjModel, key: int, name: str) -> tuple[Cube, ...]:
+    """The modules of an axis that is locked, whose gimbals get no share of u."""
+    return tuple(_cube(model, key, None, cube) for cube in cubes_of(model, name))
+
+
+def _cube(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Cube:
+    gimbal, flywheel = (_id(model, "joint", f"{name}/{joint}") for joint in ("gimbal", "flywheel"))
+    servo, motor = (_id(model, "actuator", f"{name}/{drive}") for drive in ("gimbal_servo", "flywheel_motor"))
+    angle, spin = int(model.jnt_qposadr[gimbal]), int(model.jnt_dofadr[flywheel])
+    zero = float(model.key_qpos[key, angle])
+    speed = float(model.key_ctrl[key, motor])
+    # A quarter turn back, the flywheel's momentum lies along the tilt axis; u > 0 turns it away from there.
+    direction = 0.0
+    if line is not None:
+        inertia = inertia_about(model, key, line, {angle: zero - QUARTER_TURN})
+        direction = math.copysign(1.0, inertia.row[spin] * speed)
+    addresses = angle, int(model.jnt_dofadr[gimbal]), int(model.jnt_qposadr[flywheel]), spin
+    return Cube(name, *addresses, servo, motor, direction, zero, speed)
+
+
+def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
+    """Read J1, J2, J_d, omega_d and m g l/sqrt(2) off the model's inertia and gravity, a share per cube.
+
+    Args:
+        model: The compiled model, as its file has it but for the flywheels' speed.
+        key: The keyframe at which the rig stands upright.
+        axis: The axis.
+
+    Returns:
+        The reduced model.
+    """
+    n = len(axis.cubes)
+    line = axis.line
+    upright = inertia_about(model, key, line, {})
+    turned = inertia_about(model, key, line, {c.gimbal: c.gimbal_zero - c.direction * QUARTER_TURN for c in axis.cubes})
+    J1 = upright.own / n
+    J2 = turned.own / n - J1
+    J_d = sum(abs(turned.row[c.flywheel_dof]) for c in axis.cubes) / n
+    momentum = sum(turned.row[c.flywheel_dof] * c.speed for c in axis.cubes)
+    data = at_keyframe(model, key)
+    data.qvel[:] = 0.0
+    line.tilt(data, QUARTER_TURN)
+    mujoco.mj_forward(model, data)
+    gravity_torque = -(line.motion(model, data) @ data.qfrc_bias) / n
+    return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n)
+
+
+def _id(model: mujoco.MjModel, kind: str, name: str) -> int:
+    return int(mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))

@@ -1,0 +1,69 @@
+"""What a turn about the vertical couples: the momenta of one axis, its wheels' and its tilt's, are swept round."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from cmg_mj.controllers.multi_axis import Turning
+from cmg_mj.plant.axis import Axis
+from cmg_mj.plant.effective_inertia import at_keyframe
+from cmg_mj.plant.parts import Cube
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> Turning:
+    """What a turn about the vertical couples.
+
+    Args:
+        model: The compiled model.
+        key: The keyframe at which the rig stands upright.
+        axes: Its axes.
+
+    Returns:
+        The coefficients, from the wheels' axes and speeds and the masses as the model has them.
+    """
+    data = at_keyframe(model, key)
+    along = [data.xmat[axis.frame].reshape(3, 3) @ axis.direction for axis in axes]
+    swept = [sum((_turned(model, data, cube) for cube in axis.cubes), np.zeros(3)) for axis in axes]
+    pushes = [float(n @ own) for n, own in zip(along, swept, strict=True)]
+    rows = [(n, own, _inertia(model, data, axis)) for n, own, axis in zip(along, pushes, axes, strict=True)]
+    wheels = [[-float(n @ np.cross(UP, s)) / own for s in swept] for n, own, _ in rows]
+    body = [
+        [float((n @ about @ n + m @ about @ m - UP @ about @ UP) * (n @ np.cross(m, UP))) / own for m in along]
+        for n, own, about in rows
+    ]
+    shown = [[2.0 * float(n @ np.cross(UP, m)) for m in along] for n, _, _ in rows]
+    return Turning(np.array(wheels), np.array(body), np.array(shown))
+
+
+def _turned(model: mujoco.MjModel, data: mujoco.MjData, cube: Cube) -> np.ndarray:
+    """How a wheel's momentum changes with x3 at x3 = 0, in the world (3,) [N m s]."""
+    gimbal, wheel = int(model.dof_jntid[cube.gimbal_dof]), int(model.dof_jntid[cube.flywheel_dof])
+    body = int(model.jnt_bodyid[wheel])
+    shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[wheel]  # of the principal inertias
+    momentum = float(model.body_inertia[body] @ shares**2) * cube.speed * data.xaxis[wheel]
+    return cube.direction * np.cross(data.xaxis[gimbal], momentum)
+
+
+def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarray:
+    """The inertia of all that tilts about a point of the line, in the world (3, 3) [kg m^2]."""
+    pivot = data.xpos[axis.frame] + data.xmat[axis.frame].reshape(3, 3) @ axis.point
+    found = np.zeros((3, 3))
+    for body in _tilting(model, int(model.jnt_bodyid[axis.line.joint])):
+        axes, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - pivot
+        found += axes @ np.diag(model.body_inertia[body]) @ axes.T
+        found += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return found
+
+
+def _tilting(model: mujoco.MjModel, root: int) -> list[int]:
+    """A body and all that hangs on it."""
+    found = {root}
+    for body in range(root + 1, model.nbody):  # children come after their parents
+        if int(model.body_parentid[body]) in found:
+            found.add(body)
+    return sorted(found)

@@ -1,0 +1,114 @@
+"""The inertia that a tilt feels: what hangs on the line, less what what it hangs on gives way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from cmg_mj.plant.tilt_line import HingeLine, Line
+
+SMALL = 1e-9
+"""Below this share of the largest singular value a matrix takes a direction to zero."""
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """About a line: `row` couples a tilt with every joint, (nv,); `own` is the tilt's [kg m^2]."""
+
+    row: np.ndarray
+    own: float
+
+
+def at_keyframe(model: mujoco.MjModel, key: int) -> mujoco.MjData:
+    """Fresh data at a keyframe, after a forward pass."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, key)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int, float]) -> Inertia:
+    """The inertia of all that tilts at the keyframe, with some joint angles replaced.
+
+    What a hinge's body hangs on may move: the tilt then feels less inertia, that which is left when all that nothing
+    holds gives way. The floor does not, nor what stands on it at the keyframe, as far as the contacts hold that.
+
+    Args:
+        model: The compiled model.
+        key: The keyframe at which the rig stands upright.
+        line: What it tilts about.
+        angles: Joint angles by their addresses in qpos, the others being those of the keyframe [rad].
+
+    Returns:
+        The inertia.
+    """
+    data = at_keyframe(model, key)
+    for address, angle in angles.items():
+        data.qpos[address] = angle
+    mujoco.mj_forward(model, data)
+    dense = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, dense)
+    motion = line.motion(model, data)
+    row = motion @ dense
+    own = row @ motion
+    loose = _loose(model, data) if isinstance(line, HingeLine) else []
+    loose = [dof for dof in loose if not motion[dof]]
+    if loose:
+        gives, inertia = row[loose], dense[np.ix_(loose, loose)]
+        held = np.concatenate([_contacts(model, data), _ties(model, data)])[:, loose]
+        if held.size:
+            ways = _null_space(held)
+            gives, inertia = gives @ ways, ways.T @ inertia @ ways
+        own = own - gives @ np.linalg.solve(inertia, gives)
+    return Inertia(row, float(own))
+
+
+def _loose(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
+    """Degrees of freedom that neither a constraint nor a servo holds, flywheels and gimbals left out."""
+    held = set()
+    for constraint in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (data.eq_active == 1)):
+        held.add(int(model.jnt_dofadr[model.eq_obj1id[constraint]]))
+    on_a_joint = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    for actuator in range(model.nu):
+        holds = model.actuator_biasprm[actuator, 1:3].any()  # a servo of position or rate
+        if holds and int(model.actuator_trntype[actuator]) in on_a_joint:
+            held.add(int(model.jnt_dofadr[model.actuator_trnid[actuator, 0]]))
+    return [dof for dof in range(model.nv) if dof not in held]
+
+
+def _ties(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """How fast what welds and connects tie together parts for the joints' rates, (n, nv): a ball is held by a weld."""
+    kinds = int(mujoco.mjtEq.mjEQ_WELD), int(mujoco.mjtEq.mjEQ_CONNECT)
+    rows = np.zeros((data.nefc, model.nv))
+    if data.nefc and mujoco.mj_isSparse(model):
+        mujoco.mju_sparse2dense(rows, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+    elif data.nefc:
+        rows[:] = np.asarray(data.efc_J).reshape(data.nefc, model.nv)
+    of_equality = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+    wanted = [bool(of_equality[i]) and int(model.eq_type[data.efc_id[i]]) in kinds for i in range(data.nefc)]
+    return rows[wanted] if data.nefc else rows
+
+
+def _contacts(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """How fast touching bodies part or slide at each contact for the joints' rates, (n, nv).
+
+    What twists or rolls there is not held: it is of the size of a foot.
+    """
+    rows, one, other = [], np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    for contact in data.contact:
+        if contact.efc_address < 0:  # near, and not touching
+            continue
+        for jacobian, geom in ((one, contact.geom[0]), (other, contact.geom[1])):
+            mujoco.mj_jac(model, data, jacobian, None, contact.pos, int(model.geom_bodyid[geom]))
+        directions = contact.frame.reshape(3, 3)[: 1 if contact.dim == 1 else 3]  # the normal is the first
+        rows.append(directions @ (other - one))
+    return np.concatenate(rows) if rows else np.zeros((0, model.nv))
+
+
+def _null_space(matrix: np.ndarray) -> np.ndarray:
+    """An orthonormal basis of what a matrix (m, n) takes to zero, (n, k)."""
+    _, sizes, directions = np.linalg.svd(matrix)
+    rank = int(np.sum(sizes > SMALL * sizes[0])) if sizes[0] > 0.0 else 0
+    return directions[rank:].T

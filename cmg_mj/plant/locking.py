@@ -1,0 +1,139 @@
+"""Hinges taken out of a rig: what a locked axis or thrust bearing is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from cmg_mj.errors import InputError, nearest, shown
+from cmg_mj.plant.effective_inertia import at_keyframe
+from cmg_mj.plant.parts import KEYFRAME, LINE, axes_in
+from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
+
+_QPOS_SIZES = {0: 7, 1: 4, 2: 1, 3: 1}
+_QVEL_SIZES = {0: 6, 1: 3, 2: 1, 3: 1}
+"""Of a free joint, a ball, a slide and a hinge, by MuJoCo's mjtJoint."""
+YAW = "yaw"
+
+
+def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
+    """Take the yaw joint out.
+
+    Raises:
+        InputError: There is none.
+    """
+    if YAW not in [joint.name for joint in spec.joints]:
+        raise InputError(f"plant.lock_thrust_bearing = true: {path} has no joint 'yaw' to lock")
+    take_out(spec, YAW)
+
+
+def lock_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, axes: Sequence[str], path: Path) -> None:
+    """Take the hinges of axes out, upright as they are at the keyframe.
+
+    Args:
+        spec: The parsed model, which is changed.
+        model: The same, compiled: a rig.
+        axes: Names of the axes.
+        path: The file, for messages.
+
+    Raises:
+        InputError: There is no such axis, it tilts about no hinge, or no axis is left.
+    """
+    key = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, KEYFRAME))
+    for line in _hinges_of(model, key, axes, path):
+        name = model.joint(line.joint).name
+        angle = line.zero - float(model.qpos0[line.angle])
+        if angle:
+            if line.joint != int(model.body_jntadr[model.jnt_bodyid[line.joint]]):
+                raise InputError(
+                    f"{_said(axes, path)}: hinge {name!r} stands at {angle:g} rad at the keyframe, behind another "
+                    "joint of its body; give it a body of its own"
+                )
+            _turn(spec.joint(name), angle)
+        take_out(spec, name)
+
+
+def _hinges_of(model: mujoco.MjModel, key: int, axes: Sequence[str], path: Path) -> list[HingeLine]:
+    joints, sites = ([of(i).name for i in range(n)] for of, n in ((model.joint, model.njnt), (model.site, model.nsite)))
+    known, said = axes_in([*joints, *sites]), _said(axes, path)
+    data = at_keyframe(model, key)
+    found = []
+    for axis in dict.fromkeys(axes):
+        if axis not in known:
+            names = nearest(axis, known, "its axes") if any(known) else "its only one has no name"
+            raise InputError(f"{said} has no axis {axis!r}; {names}")
+        name = f"{axis}/{LINE}".lstrip("/")
+        line: Line | None = line_of_joint(model, joints.index(name), key) if name in joints else None
+        if line is None:
+            line = line_at_site(model, data, sites.index(name), key)
+        if not isinstance(line, HingeLine):
+            raise InputError(f"{said} tilts about {name!r} as a free body does; only a hinge can be locked")
+        found.append(line)
+    if len(found) == len(known):
+        leave = f"; leave one of {', '.join(map(repr, known))}" if len(known) > 1 else ""
+        raise InputError(f"{said} would have no axis left to tilt about{leave}")
+    return found
+
+
+def _said(axes: Sequence[str], path: Path) -> str:
+    return f"plant.locked_axes = {shown(list(axes))}: {path}"
+
+
+def _turn(hinge: Any, angle: float) -> None:
+    """Turn the body of a hinge, its first joint, about it [rad]."""
+    body = hinge.parent
+    own = np.array(body.quat)
+    if body.alt.type != mujoco.mjtOrientation.mjORIENTATION_QUAT:
+        compiler = body.compiler
+        own = np.array(
+            mujoco.MjSpec.resolve_orientation(degree=compiler.degree, sequence=compiler.eulerseq, orientation=body.alt)
+        )
+        body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    own /= np.linalg.norm(own)
+    turn, both, arm, moved = np.empty(4), np.empty(4), np.empty(3), np.empty(3)
+    axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
+    mujoco.mju_axisAngle2Quat(turn, axis, angle)
+    mujoco.mju_rotVecQuat(arm, np.array(hinge.pos), turn)
+    mujoco.mju_rotVecQuat(moved, np.array(hinge.pos) - arm, own)
+    mujoco.mju_mulQuat(both, own, turn)
+    body.pos, body.quat = np.array(body.pos) + moved, both
+
+
+def take_out(spec: mujoco.MjSpec, name: str) -> None:
+    """Take a joint out, with what drives, reads or holds it, and their entries in every keyframe.
+
+    Args:
+        spec: The parsed model, which is changed.
+        name: The joint.
+    """
+    before = spec.joints[: [joint.name for joint in spec.joints].index(name)]
+    of_joints = [sum(sizes[int(joint.type)] for joint in before) for sizes in (_QPOS_SIZES, _QVEL_SIZES)]
+    drives = list(spec.actuators)
+    gone = [i for i, drive in enumerate(drives) if _drives(drive, name)]
+    starts = np.cumsum([0, *map(_states, drives)])
+    states = [state for i in gone for state in range(starts[i], starts[i + 1])]
+    hinge = int(mujoco.mjtObj.mjOBJ_JOINT)
+    reads = [sensor for sensor in spec.sensors if sensor.objname == name and int(sensor.objtype) == hinge]
+    holds = [one for one in spec.equalities if int(one.type) == int(mujoco.mjtEq.mjEQ_JOINT)]
+    holds = [one for one in holds if name in (one.name1, one.name2)]
+    for element in [*(drives[i] for i in gone), *reads, *holds, spec.joint(name)]:
+        spec.delete(element)
+    for key in spec.keys:  # which may leave any of these out, or have them wrong, of which the compiler speaks
+        values = (key.qpos, of_joints[:1]), (key.qvel, of_joints[1:]), (key.act, states), (key.ctrl, gone)
+        key.qpos, key.qvel, key.act, key.ctrl = (np.delete(of, at if len(of) else []) for of, at in values)
+
+
+def _drives(drive: Any, joint: str) -> bool:
+    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    return drive.target == joint and int(drive.trntype) in map(int, kinds)
+
+
+def _states(drive: Any) -> int:
+    """How many numbers of act an actuator has."""
+    if int(drive.dyntype) == int(mujoco.mjtDyn.mjDYN_NONE):
+        return 0
+    return max(1, int(drive.actdim))

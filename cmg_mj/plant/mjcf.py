@@ -1,0 +1,113 @@
+"""An MJCF file -> a compiled model that has all that a rig needs, or a line that says what it lacks."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+
+from cmg_mj.errors import InputError
+from cmg_mj.inputs.includes import check_files
+from cmg_mj.plant.checks import Placement, numbers_that_are_none
+from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
+from cmg_mj.plant.parts import NEEDS, lacks
+
+
+def _one_line(error: Exception) -> str:
+    """MuJoCo's message without what tells a user nothing."""
+    text = " ".join(str(error).split()).removeprefix("Error: ")
+    syntax = re.match(r"XML parse error .*Line number=(\d+)", text)
+    return (
+        f"XML syntax error at line {syntax[1]}" if syntax else re.sub(r" The (static|visual) .* remain so\.", "", text)
+    )
+
+
+def parse(path: Path) -> mujoco.MjSpec:
+    """Read a model file.
+
+    Raises:
+        InputError: It is no MJCF.
+    """
+    check_files(path)
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
+
+
+def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
+    """Compile a parsed model.
+
+    Raises:
+        InputError: MuJoCo's compiler refuses it.
+    """
+    try:
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            model = spec.compile()
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        raise InputError(f"{path}: does not compile: {_one_line(error)}") from error
+    for warning in warned:
+        if "singular" in str(warning.message):
+            raise InputError(f"{path}: does not compile: its masses and inertias are of too different sizes")
+    return model
+
+
+def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> tuple[mujoco.MjModel, list[str]]:
+    """Read and compile a model, without what is only seen, and see that it is a rig.
+
+    Args:
+        path: The model's file.
+        lock: Whether to take the yaw joint out.
+        locked_axes: Axes whose hinges to take out.
+
+    Returns:
+        The model, and what is right on it and yet not what the reduced model takes it for, in clauses.
+
+    Raises:
+        InputError: It is no rig. All that is missing or wrong is named.
+    """
+    spec = parse(path)
+    missing = lacks(spec)
+    if lock and not missing:
+        lock_thrust_bearing(spec, path)
+    spec.compiler.discardvisual = True
+    model, hints = None, []
+    wrong = list(missing)
+    try:
+        model = compile_model(spec, path)
+    except InputError as error:
+        if not missing:
+            raise
+        if "keyframe" not in str(error):  # whose sizes are wrong because something is missing
+            wrong.append(str(error).removeprefix(f"{path}: "))
+    else:
+        numbers = numbers_that_are_none(model)
+        placement = None if numbers else Placement(model)
+        wrong += numbers if placement is None else placement.wrong
+        hints = [] if placement is None else placement.hints
+    if wrong or model is None:
+        raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([NEEDS] if missing else [])]))
+    if locked_axes:
+        lock_axes(spec, model, locked_axes, path)
+        model = compile_model(spec, path)
+    return model, hints
+
+
+def check_rig(path: Path, name: Path) -> None:
+    """See that a file is a rig.
+
+    Args:
+        path: The file.
+        name: What to call it in messages.
+
+    Raises:
+        InputError: It is none.
+    """
+    try:
+        load_rig(path, lock=False)
+    except InputError as error:
+        raise InputError(str(error).replace(str(path), str(name))) from error

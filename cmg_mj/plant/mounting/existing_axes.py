@@ -1,0 +1,68 @@
+"""What earlier mounts have put on a robot, which a second axis leaves as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+
+from cmg_mj.errors import InputError
+from cmg_mj.plant.axis import find_axis
+from cmg_mj.plant.parts import KEYFRAME, axes_in, lacks
+from cmg_mj.plant.tilt_line import HingeLine
+
+
+class Earlier(NamedTuple):
+    """Axes that a robot has already."""
+
+    lines: Sequence[str]
+    """The hinges that it tilts about."""
+    drives: Sequence[str]
+    """The joints of their modules."""
+    speeds: Mapping[str, float]
+    """Of their flywheels, by joint [rad/s]."""
+    controls: Mapping[str, float]
+    """Of their flywheels' motors, by actuator."""
+
+
+def earlier_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, path: Path) -> Earlier:
+    """Look for axes that a robot has.
+
+    Args:
+        spec: The robot.
+        model: The same, compiled.
+        name: Of the axis that it is to get.
+        path: The file, for messages.
+
+    Returns:
+        What they consist of.
+
+    Raises:
+        InputError: It has one and the new one has no name, or has half of one, or a keyframe of that name that is none.
+    """
+    elements = [element.name for kind in (spec.joints, spec.sites, spec.sensors) for element in kind]
+    names = axes_in(elements)
+    if not names or not any(key.name == KEYFRAME for key in spec.keys):
+        taken = [element for element in elements if names and axes_in([element])]
+        taken += [f"keyframe {key.name}" for key in spec.keys if key.name == KEYFRAME]
+        if taken:
+            raise InputError(f"{path}: has an element {taken[0]!r} already, which a mounted pair brings: rename it")
+        return Earlier((), (), {}, {})
+    missing = lacks(spec)
+    if missing:
+        raise InputError(f"{path}: has an axis already, and yet {missing[0]}")
+    if not name:
+        known = f" {', '.join(filter(None, names))}" if any(names) else ""
+        raise InputError(f"{path}: has an axis{known} already: give the new one a name, such as --name pitch")
+    key = model.key(KEYFRAME).id
+    axes = [find_axis(model, key, axis) for axis in names]
+    cubes = [cube for axis in axes for cube in axis.cubes]
+    lines = [model.joint(axis.line.joint).name for axis in axes if isinstance(axis.line, HingeLine)]
+    return Earlier(
+        lines,
+        [f"{cube.name}/{joint}" for cube in cubes for joint in ("gimbal", "flywheel")],
+        {f"{cube.name}/flywheel": cube.speed for cube in cubes},
+        {f"{cube.name}/flywheel_motor": cube.speed for cube in cubes},
+    )

@@ -1,0 +1,201 @@
+"""A free robot put on its feet: kept from tilting until it rests on the floor, it shows what it stands on."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from cmg_mj.errors import InputError
+from cmg_mj.plant.mounting.servos import at_rest
+
+LONGEST_S = 10.0
+"""So long a robot may take to come to rest [s]."""
+AT_REST = 1e-4
+"""Rates below which it rests [m/s, rad/s]."""
+UPRIGHT_DEG = 0.005
+"""So near above the line its mass is brought [deg]."""
+LARGEST_LEAN_DEG = 20.0
+"""A robot whose mass lies farther off what it stands on has fallen, whatever holds it [deg]."""
+STANDS_DEG = 2.0
+"""A robot that must lean so far before it falls stands by itself [deg]."""
+LONG_M = 0.02
+"""Contacts farther apart along the axis say how it lies [m]."""
+UP = np.array([0.0, 0.0, 1.0])
+
+
+class Support(NamedTuple):
+    """What a robot stands on."""
+
+    pose: np.ndarray
+    """Where its joints stand, (nq,)."""
+    point: np.ndarray
+    """A point of the line, in the world (3,) [m]."""
+    direction: np.ndarray
+    """Along the line, horizontal, in the world (3,)."""
+
+
+def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.ndarray, path: Path) -> Support:
+    """Let a free robot settle on the floor, its mass above a line through what it stands on.
+
+    Args:
+        model: The robot with its modules, all joints held that are to be.
+        pose: Where its joints are at first, (nq,).
+        joint: Its free joint.
+        direction: Along the line that it tilts about, nearly, horizontal, in the world. What it stands on says it
+            better, if that is long.
+        path: The file, for messages.
+
+    Returns:
+        Where it stands, and the line.
+
+    Raises:
+        InputError: It has nothing to stand on, falls over, or stands by itself.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    _keep_servos(model, data)
+    mujoco.mj_forward(model, data)
+    _touch_down(model, data, joint, path)
+    leaned = 0.0
+    for _ in range(8):
+        target = data.xquat[int(model.jnt_bodyid[joint])].copy()
+        _rest(model, data, joint, direction, target, path)
+        point, direction = _support(model, data, joint, direction, path)
+        body = int(model.jnt_bodyid[joint])
+        arm = data.subtree_com[body] - point
+        lean = math.atan2(float(arm @ np.cross(direction, UP)), float(arm[2]))
+        leaned += lean
+        if abs(math.degrees(leaned)) > LARGEST_LEAN_DEG:
+            raise InputError(
+                f"{path}: falls over: where it stands its mass lies {abs(math.degrees(leaned)):.3g} deg beside the "
+                "line that it tilts about; give a keyframe in which it stands"
+            )
+        if abs(math.degrees(lean)) < UPRIGHT_DEG:
+            return Support(data.qpos.copy(), point, direction)
+        _turn(model, data, joint, point, direction, lean)
+    raise InputError(f"{path}: does not come to stand upright; give a keyframe in which it stands")
+
+
+def _keep_servos(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Position servos keep the joints where they are; nothing else is driven."""
+    mujoco.mj_forward(model, data)
+    data.act[:], data.ctrl[:] = at_rest(model, data)
+
+
+def _of_tree(model: mujoco.MjModel, joint: int) -> np.ndarray:
+    """Which bodies hang on a free joint, (nbody,)."""
+    root = int(model.jnt_bodyid[joint])
+    return model.body_rootid == model.body_rootid[root]
+
+
+def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, joint: int, path: Path) -> None:
+    """Lower it, or lift it, until it touches what does not move."""
+    tree = _of_tree(model, joint)
+    own = [geom for geom in range(model.ngeom) if tree[model.geom_bodyid[geom]]]
+    floor = [geom for geom in range(model.ngeom) if model.body_weldid[model.geom_bodyid[geom]] == 0]
+    gaps = [
+        mujoco.mj_geomDistance(model, data, here, there, 100.0, None)
+        for here in own
+        for there in floor
+        if model.geom_contype[here] & model.geom_conaffinity[there]
+        or model.geom_contype[there] & model.geom_conaffinity[here]
+    ]
+    if not gaps or model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CONTACT):
+        raise InputError(
+            f"{path}: has nothing to stand on: no geom of the robot's collides with one of the world's; give it a "
+            'floor (<geom type="plane" size="5 5 0.1"/> in the worldbody), and let contacts be on'
+        )
+    data.qpos[model.jnt_qposadr[joint] + 2] -= min(gaps)
+    mujoco.mj_forward(model, data)
+
+
+def _rest(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    joint: int,
+    direction: np.ndarray,
+    target: np.ndarray,
+    path: Path,
+) -> None:
+    """Let it come to rest, kept from tilting by a torque that is none where its mass is above the line."""
+    body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
+    mass = float(model.body_subtreemass[body])
+    height = max(float(data.subtree_com[body][2] - data.xipos[body][2] + 1.0), 0.1)
+    stiffness = 20.0 * mass * float(np.linalg.norm(model.opt.gravity)) * height
+    damping = 2.0 * math.sqrt(stiffness * mass * height**2)
+    drag = mass * 2.0
+    start = data.xquat[body].copy()
+    steps = math.ceil(LONGEST_S / model.opt.timestep)
+    for step in range(steps):
+        off = np.empty(3)
+        mujoco.mju_subQuat(off, target, data.xquat[body])  # in the body's axes
+        turn = data.xmat[body].reshape(3, 3)
+        along = turn.T @ direction
+        torque = along * (stiffness * (off @ along) - damping * (data.qvel[dof + 3 : dof + 6] @ along))
+        data.qfrc_applied[dof : dof + 3] = -drag * data.qvel[dof : dof + 3]
+        data.qfrc_applied[dof + 3 : dof + 6] = torque
+        mujoco.mj_step(model, data)
+        if not np.isfinite(data.qpos).all():
+            raise InputError(f"{path}: its physics fails while it settles on the floor")
+        if step * model.opt.timestep > 0.3 and np.abs(data.qvel).max() < AT_REST:
+            break
+    mujoco.mj_forward(model, data)
+    turned = np.empty(3)
+    mujoco.mju_subQuat(turned, data.xquat[body], start)
+    if math.degrees(float(np.linalg.norm(turned))) > LARGEST_LEAN_DEG:
+        raise InputError(
+            f"{path}: falls over while it settles, by {math.degrees(float(np.linalg.norm(turned))):.3g} deg, about "
+            "another line than the one that is balanced; give a keyframe in which it stands"
+        )
+
+
+def _support(
+    model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.ndarray, path: Path
+) -> tuple[np.ndarray, np.ndarray]:
+    """The middle of what it stands on, (3,) [m], and along it, (3,)."""
+    tree = _of_tree(model, joint)
+    points, loads = [], []
+    for i in range(data.ncon):
+        contact = data.contact[i]
+        bodies = model.geom_bodyid[[contact.geom1, contact.geom2]]
+        force = np.zeros(6)
+        mujoco.mj_contactForce(model, data, i, force)
+        if tree[bodies].any() and not tree[bodies].all() and force[0] > 0.0:
+            points.append(contact.pos.copy())
+            loads.append(force[0])
+    if not points:
+        raise InputError(f"{path}: does not come to rest on anything")
+    at = np.array(points)
+    middle = np.average(at, axis=0, weights=loads)
+    ends = at[np.argmax(at @ direction)] - at[np.argmin(at @ direction)]
+    ends[2] = 0.0
+    length = float(np.linalg.norm(ends))
+    if length > LONG_M and float(ends @ direction) > math.cos(math.radians(LARGEST_LEAN_DEG)) * length:
+        direction = ends / length
+    width = float(np.ptp(at @ np.cross(direction, UP)))
+    height = float(data.subtree_com[int(model.jnt_bodyid[joint])][2] - middle[2])
+    if math.degrees(math.atan2(0.5 * width, max(height, 1e-9))) > STANDS_DEG:
+        raise InputError(
+            f"{path}: stands by itself: what it stands on is {width:.3g} m wide across the axis; a pair balances what "
+            "stands on a line or a point (another --axis?)"
+        )
+    return middle, direction
+
+
+def _turn(
+    model: mujoco.MjModel, data: mujoco.MjData, joint: int, point: np.ndarray, direction: np.ndarray, lean: float
+) -> None:
+    """Turn it back about the line by the angle that its mass leans, at rest."""
+    address = int(model.jnt_qposadr[joint])
+    quaternion = np.empty(4)
+    mujoco.mju_axisAngle2Quat(quaternion, direction, -lean)
+    moved, turned = np.empty(3), np.empty(4)
+    mujoco.mju_rotVecQuat(moved, data.qpos[address : address + 3] - point, quaternion)
+    mujoco.mju_mulQuat(turned, quaternion, data.qpos[address + 3 : address + 7])
+    data.qpos[address : address + 3], data.qpos[address + 3 : address + 7] = point + moved, turned
+    data.qvel[:] = 0.0
+    mujoco.mj_forward(model, data)

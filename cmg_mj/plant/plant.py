@@ -1,0 +1,418 @@
+"""The rig: a compiled model with its names resolved once, and the reduced model's parameters read off it."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property, partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import mujoco
+import numpy as np
+from pydantic import ValidationError
+
+from cmg_mj.controllers.backlash import ARCMIN_A_DEGREE
+from cmg_mj.controllers.controller import CONTROLLER_OPTIONS, Controller
+from cmg_mj.controllers.laws import Law, StateFeedback
+from cmg_mj.controllers.multi_axis import AxesController, Turning
+from cmg_mj.controllers.processor import Processor, WithProcessor
+from cmg_mj.elementwise import Scalar
+from cmg_mj.errors import InputError, nearest
+from cmg_mj.inputs.bundled import find
+from cmg_mj.inputs.messages import complaint
+from cmg_mj.observers import Observer, make_observer
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.plant.axis import Axis, find_axis, held_cubes, read_reduced
+from cmg_mj.plant.checks import starts
+from cmg_mj.plant.coupling import turning
+from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
+from cmg_mj.plant.mjcf import compile_model, load_rig, parse
+from cmg_mj.plant.mujoco_state import control_callback, quiet
+from cmg_mj.plant.parts import KEYFRAME, Cube, axes_in
+from cmg_mj.plant.step_limit import largest_step
+from cmg_mj.plant.tilt_line import HingeLine
+from cmg_mj.plant.variations import at_speed, place_accelerometers, turn, vary
+from cmg_mj.scenario.plant_parameters import RigFacts
+from cmg_mj.scenario.plant_settings import FINEST_STEP_S, PlantSettings
+from cmg_mj.scenario.time_grid import fitting_step
+from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.ideal import Ideals
+from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.sensors.tilt import RadialTilt
+
+JOINT_KINDS = {
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name for name in ("hinge", "slide", "ball", "free")
+}
+
+
+class Plant:
+    """A compiled rig with its names resolved.
+
+    Attributes:
+        settings: What it was made from.
+        model: The compiled model, without what is only seen. Do not change it: the plant may be shared.
+        axes: What it tilts about, each with its cubes, sensors and reduced model. That is read off the file as it is
+            but for the flywheels' speed, which the controller knows: without bias or friction, which it does not.
+        hints: What on the model is not what the reduced model takes it for, in clauses.
+        yaw: Address of q_a, or None if the thrust bearing is locked.
+        largest_step: The largest physics step that is accurate enough [s].
+        backlash: Between the servos' motors and the gimbals [rad].
+    """
+
+    def __init__(
+        self,
+        settings: PlantSettings,
+        path: Path,
+        period_s: float | None = None,
+        of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+    ) -> None:
+        self.path = path
+        locked = settings.locked_axes
+        self.model, self.hints = load_rig(path, lock=settings.lock_thrust_bearing, locked_axes=locked)
+        self._as_filed = self.model
+        self.key = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, KEYFRAME))
+        names = [self.model.joint(i).name for i in range(self.model.njnt)]
+        self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in names else None
+        sites = [self.model.site(i).name for i in range(self.model.nsite)]
+        axes = [name for name in axes_in([*names, *sites]) if name not in locked]
+        self._axes_as_filed = tuple(find_axis(self.model, self.key, name) for name in axes)
+        self._held = tuple(cube for name in locked for cube in held_cubes(self.model, self.key, name))
+        self._take(settings, period_s, of_axes)
+
+    def changed(
+        self,
+        settings: PlantSettings,
+        period_s: float | None = None,
+        of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+    ) -> Plant:
+        """The same rig with other settings, without compiling its file again.
+
+        Args:
+            settings: They name the same model file, and lock the thrust bearing and axes alike.
+            period_s: Where they leave the physics step open, what whole steps must fill [s].
+            of_axes: What axes have of their own.
+
+        Returns:
+            Another plant.
+
+        Raises:
+            InputError: With these settings the physics fails.
+        """
+        other = copy.copy(self)
+        for made in ("drawn_model", "turning"):
+            other.__dict__.pop(made, None)
+        other._take(settings, period_s, of_axes)
+        return other
+
+    def _take(self, settings: PlantSettings, period_s: float | None, of_axes: Mapping[str, PlantSettings]) -> None:
+        """Change the model as the settings say, and fit the physics step."""
+        self.settings, self._of_axes = settings, of_axes
+        self.backlash = math.radians(settings.gimbal_backlash_arcmin / ARCMIN_A_DEGREE)
+        self.model = copy.copy(self._as_filed)
+        axes = []
+        for axis in self._axes_as_filed:
+            own = of_axes.get(axis.name, settings)
+            changed = replace(
+                axis,
+                bias=math.radians(own.equilibrium_bias_deg),
+                initial_tilt=math.radians(own.initial_tilt_deg),
+                radial_tilt=place_accelerometers(self.model, own, axis, self.path),
+            )
+            if settings.flywheel_speed_rad_s is not None:
+                cubes = at_speed(self.model, self.key, axis.cubes, settings.flywheel_speed_rad_s, self.path)
+                changed = replace(changed, cubes=cubes)
+                changed = replace(changed, reduced=read_reduced(self._as_filed, self.key, changed))
+            axes.append(changed)
+        self.axes = tuple(axes)
+        held = self._held
+        if settings.flywheel_speed_rad_s is not None:
+            held = at_speed(self.model, self.key, held, settings.flywheel_speed_rad_s, self.path)
+        if settings.turn_rate_rad_s:
+            turn(self.model, self.key, settings.turn_rate_rad_s, self.path)
+        filed = float(self.model.opt.timestep)
+        vary(self.model, settings, self.path, self.axes, held)
+        shaken = (
+            max(abs(cube.speed) for axis in self.axes for cube in axis.cubes)
+            if settings.flywheel_imbalance_kg_m
+            else 0.0
+        )
+        self.largest_step = largest_step(self.model, self.key, filed, shaken)
+        if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
+            raise InputError(
+                f"{self._blamed}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
+                f"{FINEST_STEP_S:g} s; soften it, or set plant.timestep_s"
+            )
+        self.model.opt.timestep = fitting_step(settings, self.largest_step, period_s)
+        if not starts(self.model, self.new_data()):
+            raise InputError(
+                f"{self._blamed}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "
+                "damping and servos must be of sizes that go together"
+            )
+
+    @property
+    def _blamed(self) -> str:
+        """What is wrong if the physics is: the settings that change it, if there are, or else the file."""
+        changes = [f"plant.{name} = {value:g}" for name, value in self.settings.changes_of_physics().items()]
+        return ", ".join(changes) or str(self.path)
+
+    @cached_property
+    def drawn_model(self) -> mujoco.MjModel:
+        """The model with all that is only seen: the same bodies and joints, and geoms that physics does without."""
+        with control_callback(None), quiet():  # compiling a model runs it
+            spec = parse(self.path)
+            if self.settings.lock_thrust_bearing:
+                lock_thrust_bearing(spec, self.path)
+            model = compile_model(spec, self.path)
+            if self.settings.locked_axes:
+                lock_axes(spec, model, self.settings.locked_axes, self.path)
+                model = compile_model(spec, self.path)
+        for axis in self._axes_as_filed:
+            place_accelerometers(model, self._of_axes.get(axis.name, self.settings), axis, self.path)
+        return model
+
+    # --- several axes ---------------------------------------------------------------------------------------
+
+    def along(self, axis: str) -> Plant:
+        """The rig as one of its axes sees it: with that axis alone.
+
+        Args:
+            axis: Its name.
+
+        Returns:
+            The rig, whose `reduced`, `cubes`, `ideal`, `controller`, ... are that axis'.
+
+        Raises:
+            InputError: There is no such axis.
+        """
+        found = [own for own in self.axes if own.name == axis]
+        if not found:
+            raise InputError(f"{self.path}: no axis {axis!r}; {nearest(axis, self.axis_names)}")
+        other = copy.copy(self)
+        other.axes = tuple(found)
+        return other
+
+    @property
+    def axis_names(self) -> list[str]:
+        """Names of the axes; of a rig's only one it may be empty."""
+        return [axis.name for axis in self.axes]
+
+    @cached_property
+    def turning(self) -> Turning:
+        """What a turn about the vertical couples."""
+        return turning(self._as_filed, self.key, self.axes)
+
+    def lean(self, qpos: Any) -> Scalar:
+        """The tilt from the keyframe of the axis that is farthest from it [rad]."""
+        if len(self.axes) == 1:
+            return self.axis.line.lean(qpos)
+        leans = np.array([axis.line.lean(qpos) for axis in self.axes])
+        farthest = np.argmax(np.where(np.isnan(leans), np.inf, np.abs(leans)), axis=0)
+        lean = np.take_along_axis(leans, farthest[None], axis=0)[0]
+        return lean if lean.ndim else float(lean)
+
+    # --- the only axis, or the first -----------------------------------------------------------------------
+
+    @property
+    def axis(self) -> Axis:
+        """The rig's axis, or the first of several."""
+        return self.axes[0]
+
+    @property
+    def reduced(self) -> ReducedModel:
+        """The reduced model of the axis."""
+        return self.axis.reduced
+
+    @property
+    def cubes(self) -> tuple[Cube, ...]:
+        """Addresses of the modules of the axis."""
+        return self.axis.cubes
+
+    @property
+    def radial_tilt(self) -> RadialTilt:
+        """The tilt estimate for the accelerometers of the axis."""
+        return self.axis.radial_tilt
+
+    @property
+    def frame(self) -> int:
+        """The body that carries the sensors of the axis."""
+        return self.axis.frame
+
+    @property
+    def bias(self) -> float:
+        """Of the axis: e [rad]."""
+        return self.axis.bias
+
+    @property
+    def tilt(self) -> int:
+        """Address of q_b in qpos, and of its rate in qvel: of a rig that consists of hinges, the papers' among them."""
+        return self._hinge.angle
+
+    @property
+    def tilt_zero(self) -> float:
+        """q_b at which the radial line is upright [rad]."""
+        return self._hinge.zero
+
+    @property
+    def _hinge(self) -> HingeLine:
+        line = self.axis.line
+        if not isinstance(line, HingeLine) or line.angle != line.dof:
+            raise InputError(f"{self.path}: tilts about no hinge of its own at one address; use plant.axis.line")
+        return line
+
+    def ideal(self, sensordata: Any, qvel: Any) -> Any:
+        """What perfect sensors show: of the axis (see `Axis.ideal`), or `Ideals` of several."""
+        if len(self.axes) == 1:
+            return self.axis.ideal(sensordata, qvel)
+        upward = sensordata[self.axis.gyro + 1]
+        return Ideals([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
+
+    def gimbal_angle(self, qpos: Any) -> Scalar:
+        """True x3 of the axis: see `Axis.gimbal_angle`."""
+        return self.axis.gimbal_angle(qpos)
+
+    def apparent_bias(self, accelerometer: Accelerometer) -> float:
+        """What an observer of the bias should find: see `Axis.apparent_bias`."""
+        return self.axis.apparent_bias(accelerometer, self.gravity)
+
+    # --- running -------------------------------------------------------------------------------------------
+
+    def controller(
+        self,
+        observer: Observer | str = "homogeneous",
+        *,
+        law: Law | None = None,
+        sensors: Sensors | None = None,
+        tilt: RadialTilt | None = None,
+        backlash: Scalar | None = None,
+        processor: Processor | None = None,
+        **options: Any,
+    ) -> Any:
+        """A fresh controller for this rig.
+
+        Args:
+            observer: An observer, or its name (or package.module:Class).
+            law: The law; by default Table 2's gains at 200 Hz.
+            sensors: The sensors; by default those of the datasheets.
+            tilt: The tilt estimate; by default that for this rig's accelerometers.
+            backlash: Between the servos' motors and the gimbals; by default this rig's [rad].
+            processor: What takes the decisions in the controller's place, if anything does.
+            **options: Options of `Controller`, such as seed, feedback and companions; whatever else is given is a
+                parameter of the observer, if that is given by name.
+
+        Returns:
+            The controller, a `Controller`; of a rig of several axes an `AxesController` of one an axis, all made alike,
+            whose gimbals also turn against what a turn about the vertical couples.
+
+        Raises:
+            InputError: The observer does not exist or refuses a parameter, or a rate does not fit the physics step.
+        """
+        if len(self.axes) > 1:
+            if processor is not None:
+                raise InputError(f"{self.path}: tilts about several axes; a board or other processor takes one")
+            alike = {"law": law, "sensors": sensors, "tilt": tilt, "backlash": backlash, **options}
+            rigs = [self.along(name) for name in self.axis_names]
+            return AxesController(
+                [rig.controller(observer, **alike, axis=i) for i, rig in enumerate(rigs)], self.turning
+            )
+        law = law or StateFeedback(dt=0.005)
+        sensors = sensors or Sensors()
+        parameters = {name: options.pop(name) for name in options.keys() - CONTROLLER_OPTIONS}
+        if isinstance(observer, str):
+            noise = self.facts.noise(sensors)
+            observer = make_observer(observer, law.dt, self.reduced, noise, **parameters)
+        elif parameters:
+            name = next(iter(parameters))
+            known = {"law", "sensors", "tilt", "backlash", "processor", *CONTROLLER_OPTIONS}
+            raise InputError(f"controller({name}=...): no such option; {nearest(name, known)}")
+        make = Controller if processor is None else partial(WithProcessor, processor)
+        return make(
+            observer,
+            law,
+            tilt or self.radial_tilt,
+            sensors,
+            directions=self.axis.directions,
+            gimbal_zero=[cube.gimbal_zero for cube in self.cubes],
+            timestep=self.model.opt.timestep,
+            backlash=self.backlash if backlash is None else backlash,
+            **options,
+        )
+
+    @property
+    def timestep(self) -> float:
+        """The physics step [s]."""
+        return float(self.model.opt.timestep)
+
+    @property
+    def gravity(self) -> float:
+        """[m/s^2]."""
+        return float(np.linalg.norm(self.model.opt.gravity))
+
+    @property
+    def facts(self) -> RigFacts:
+        """What a scenario's controller and observers are made from."""
+        cubes = tuple(cube.name for cube in self.cubes)
+        return RigFacts(
+            self.path, cubes, self.reduced, self.radial_tilt, self.gravity, self.largest_step, tuple(self.hints)
+        )
+
+    def initialise(self, data: mujoco.MjData) -> None:
+        """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""
+        mujoco.mj_resetDataKeyframe(self.model, data, self.key)
+        for axis in self.axes:
+            axis.line.tilt(data, -axis.bias + axis.initial_tilt)
+        with control_callback(None):  # the first control tick is the first step's
+            mujoco.mj_forward(self.model, data)
+
+    def new_data(self) -> mujoco.MjData:
+        """Fresh simulation data at the scenario's initial state."""
+        data = mujoco.MjData(self.model)
+        self.initialise(data)
+        return data
+
+    @cached_property
+    def joint_names(self) -> list[str]:
+        """Names of the joints in the order of qpos."""
+        return [self.model.joint(i).name for i in range(self.model.njnt)]
+
+    @cached_property
+    def joint_kinds(self) -> tuple[str, ...]:
+        """Of each joint `hinge`, `slide`, `ball` or `free`; none if all are hinges."""
+        kinds = tuple(JOINT_KINDS[int(kind)] for kind in self.model.jnt_type)
+        return () if set(kinds) == {"hinge"} else kinds
+
+
+@quiet()
+def load_plant(
+    settings: PlantSettings | None = None,
+    beside: Path | None = None,
+    period_s: float | None = None,
+    of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+    **fields: object,
+) -> Plant:
+    """Load a rig.
+
+    Args:
+        settings: Its settings; or give them as keyword arguments.
+        beside: A folder that a relative model path may start from.
+        period_s: Where the settings leave the physics step open, what whole steps must fill, say a control period [s].
+        of_axes: What axes of several have of their own: equilibrium bias, initial tilt, places of the accelerometers.
+        **fields: Fields of `PlantSettings`.
+
+    Returns:
+        The compiled plant.
+
+    Raises:
+        InputError: A field is unknown or not allowed; the file does not exist, does not compile, or lacks a joint,
+            actuator, sensor or keyframe.
+    """
+    if settings is None:
+        try:
+            settings = PlantSettings(**fields)  # type: ignore[arg-type]
+        except ValidationError as error:
+            raise InputError(f"plant.{complaint(PlantSettings, error.errors()[0], fields)}") from error
+    with control_callback(None):  # compiling a model runs it
+        return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside), period_s, of_axes)

@@ -1,0 +1,242 @@
+"""How a rig differs from its model file: integrator and step, friction, servos, wheels, the equilibrium bias."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from cmg_mj.errors import InputError
+from cmg_mj.plant.axis import Axis
+from cmg_mj.plant.parts import KEYFRAME, Cube
+from cmg_mj.plant.tilt_line import HingeLine
+from cmg_mj.scenario.plant_settings import PlantSettings
+from cmg_mj.sensors.tilt import RadialTilt
+
+_INTEGRATORS = {
+    "RK4": int(mujoco.mjtIntegrator.mjINT_RK4),
+    "Euler": int(mujoco.mjtIntegrator.mjINT_EULER),
+    "implicit": int(mujoco.mjtIntegrator.mjINT_IMPLICIT),
+    "implicitfast": int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST),
+    "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
+}
+
+YAW_SERVO = "yaw_servo"
+
+
+def vary(
+    model: mujoco.MjModel,
+    settings: PlantSettings,
+    path: Path,
+    axes: Sequence[Axis],
+    held: Sequence[Cube] = (),
+) -> None:
+    """Change a compiled model as its settings say.
+
+    Args:
+        model: The model, as its file has it.
+        settings: What is to differ; what is left out stays.
+        path: The file, for messages.
+        axes: What the rig tilts about.
+        held: Modules of axes that are locked.
+
+    Raises:
+        InputError: The body that tilts has no mass of its own to move or no joint for friction, or a servo is none that
+            has what is to differ.
+    """
+    model.opt.integrator = _INTEGRATORS[settings.integrator]
+    # A plant that diverges must say so, not start again from its reference pose.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    cubes = [*(cube for axis in axes for cube in axis.cubes), *held]
+    gimbals = [cube.gimbal_dof for cube in cubes]
+    friction = settings.tilt_friction_n_m is not None or settings.tilt_damping_n_m_s is not None
+    tilts = [_hinge(axis, path) for axis in axes] if friction else []
+    for field, joints, value in (
+        (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),
+        (model.dof_frictionloss, gimbals, settings.gimbal_friction_n_m),
+        (model.dof_damping, gimbals, settings.gimbal_damping_n_m_s),
+        (model.dof_frictionloss, tilts, settings.tilt_friction_n_m),
+        (model.dof_damping, tilts, settings.tilt_damping_n_m_s),
+    ):
+        if value is not None:
+            field[joints] = value
+    _vary_servos(model, settings, path, cubes)
+    shifts = [bias_shift(model, axis, axis.bias, path) for axis in axes if axis.bias]
+    for axis, shift in zip([axis for axis in axes if axis.bias], shifts, strict=True):
+        model.body_ipos[axis.frame] += shift
+    if settings.flywheel_imbalance_kg_m:
+        for cube in cubes:
+            body = int(model.dof_bodyid[cube.flywheel_dof])
+            model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
+    mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
+
+
+def at_speed(model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: float, path: Path) -> tuple[Cube, ...]:
+    """Let the flywheels turn at another speed from the start, each in its own direction.
+
+    Args:
+        model: The model, whose keyframe is changed.
+        key: The keyframe.
+        cubes: The modules as the file has them.
+        speed: [rad/s].
+        path: The model's file, for messages.
+
+    Returns:
+        The modules at that speed.
+
+    Raises:
+        InputError: A motor takes no such command.
+    """
+    found = []
+    for cube in cubes:
+        signed = math.copysign(speed, cube.speed)
+        low, high = model.actuator_ctrlrange[cube.motor]
+        if model.actuator_ctrllimited[cube.motor] and not low <= signed <= high:
+            raise InputError(
+                f"plant.flywheel_speed_rad_s = {speed:g}: {path}: actuator '{cube.name}/flywheel_motor' takes only "
+                f"{low:g} to {high:g} rad/s (ctrlrange)"
+            )
+        model.key_qvel[key, cube.flywheel_dof] = model.key_ctrl[key, cube.motor] = signed
+        found.append(replace(cube, speed=signed))
+    return tuple(found)
+
+
+def turn(model: mujoco.MjModel, key: int, rate: float, path: Path) -> None:
+    """Let the rig turn about the vertical from the start.
+
+    Args:
+        model: The model, whose keyframe is changed.
+        key: The keyframe.
+        rate: [rad/s].
+        path: The model's file, for messages.
+
+    Raises:
+        InputError: There is no drive that holds the rate, or it takes no such command.
+    """
+    said = f"plant.turn_rate_rad_s = {rate:g}: {path}"
+    joint, servo = (
+        int(mujoco.mj_name2id(model, kind, name))
+        for kind, name in ((mujoco.mjtObj.mjOBJ_JOINT, "yaw"), (mujoco.mjtObj.mjOBJ_ACTUATOR, YAW_SERVO))
+    )
+    if joint < 0 or servo < 0 or int(model.actuator_trnid[servo, 0]) != joint:
+        raise InputError(f"{said} has no actuator {YAW_SERVO!r} that drives a joint 'yaw', which alone holds a rate")
+    low, high = model.actuator_ctrlrange[servo]
+    if model.actuator_ctrllimited[servo] and not low <= rate <= high:
+        raise InputError(f"{said}: actuator {YAW_SERVO!r} takes only {low:g} to {high:g} rad/s (ctrlrange)")
+    model.key_qvel[key, model.jnt_dofadr[joint]] = model.key_ctrl[key, servo] = rate
+
+
+def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> RadialTilt:
+    """Move the accelerometers of an axis along the radial line.
+
+    Args:
+        model: The model, as its file has it.
+        settings: Their distances from the tilt axis; what is left out stays.
+        axis: The axis, as its file has it.
+        path: The model's file, for messages.
+
+    Returns:
+        The tilt estimate for their new places.
+
+    Raises:
+        InputError: The outer one is no farther out than the inner one.
+    """
+    as_filed = axis.radial_tilt
+    given = {
+        "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
+        "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
+    }
+    if all(to is None for to, _ in given.values()):
+        return as_filed
+    inner, outer = (was if to is None else to for to, was in given.values())
+    if not inner < outer:
+        changed = ", ".join(f"plant.{name}_m = {to:g}" for name, (to, _) in given.items() if to is not None)
+        raise InputError(
+            f"{changed}: the inner accelerometer must lie nearer to the tilt axis than the outer one, and they are "
+            f"{inner:g} and {outer:g} m away ({path})"
+        )
+    for name, (to, was) in given.items():
+        if to is not None:
+            sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, axis.prefix + name)
+            site = int(model.sensor_objid[sensor])
+            arm = model.site_pos[site] - axis.point
+            model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (to / was - 1.0)
+            model.site_sameframe[site] = 0  # should it have stood where the body's frame does
+    return RadialTilt(inner, outer)
+
+
+def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, cubes: Sequence[Cube]) -> None:
+    """Give the gimbals' servos another stiffness and damping: torque = kp (setpoint - angle) - kv rate."""
+    given = {
+        "servo_stiffness_n_m_rad": settings.servo_stiffness_n_m_rad,
+        "servo_damping_n_m_s_rad": settings.servo_damping_n_m_s_rad,
+    }
+    names = [name for name, value in given.items() if value is not None]
+    if not names:
+        return
+    stiffness, damping = given.values()
+    for cube in cubes:
+        servo = cube.servo
+        gain, bias = model.actuator_gainprm[servo], model.actuator_biasprm[servo]
+        # A position loop whose setpoint is the integral of its command: what <intvelocity> makes.
+        is_loop = (
+            model.actuator_dyntype[servo] == mujoco.mjtDyn.mjDYN_INTEGRATOR
+            and model.actuator_gaintype[servo] == mujoco.mjtGain.mjGAIN_FIXED
+            and model.actuator_biastype[servo] == mujoco.mjtBias.mjBIAS_AFFINE
+            and gain[0] == -bias[1]
+        )
+        if not is_loop:
+            raise InputError(
+                f"plant.{names[0]}: {path}: actuator '{cube.name}/gimbal_servo' is no position loop whose setpoint is "
+                "the integral of its command (<intvelocity>), which alone has this stiffness and damping"
+            )
+        per_gear = 1.0 / float(model.actuator_gear[servo, 0]) ** 2  # they are those at the joint
+        if stiffness is not None:
+            gain[0], bias[1] = stiffness * per_gear, -stiffness * per_gear
+        if damping is not None:
+            bias[2] = -damping * per_gear
+
+
+def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np.ndarray:
+    """How far the frame's centre of mass moves so that the whole rig's turns about the line by e.
+
+    The first moment of all that tilts is turned, not lengthened: gravity's torque keeps its amplitude.
+
+    Args:
+        model: The model, as its file has it.
+        axis: The axis, on whose frame all of the shift is.
+        bias: e [rad].
+        path: The model's file, for messages.
+
+    Returns:
+        The shift in the frame's axes, (3,) [m].
+
+    Raises:
+        InputError: The frame has no mass of its own.
+    """
+    frame, all_that_tilts = axis.frame, int(model.jnt_bodyid[axis.line.joint])
+    if model.body_mass[frame] <= 0.0:
+        raise InputError(
+            f"plant.equilibrium_bias_deg: {path}: the body {model.body(frame).name!r}, which tilts, needs a mass of "
+            "its own to move (give the model's compiler fusestatic=\"true\", so that the cubes' halves become part of "
+            "it)"
+        )
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, KEYFRAME))
+    mujoco.mj_forward(model, data)
+    to_frame = data.xmat[frame].reshape(3, 3).T
+    centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point
+    radial = centre - (centre @ axis.direction) * axis.direction
+    turned = math.cos(bias) * radial + math.sin(bias) * np.cross(axis.direction, radial)
+    return model.body_subtreemass[all_that_tilts] / model.body_mass[frame] * (turned - radial)
+
+
+def _hinge(axis: Axis, path: Path) -> int:
+    """The degree of freedom that friction of the tilt acts on."""
+    if not isinstance(axis.line, HingeLine):
+        raise InputError(f"plant.tilt_friction_n_m, plant.tilt_damping_n_m_s: {path} tilts about no hinge")
+    return axis.line.dof

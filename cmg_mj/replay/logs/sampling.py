@@ -1,0 +1,254 @@
+"""Rows at whatever times -> parts sampled evenly. Whatever is done is said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from cmg_mj.errors import InputError
+from cmg_mj.replay.logs.resampling import FEWEST, bridge, resample
+from cmg_mj.replay.logs.table import MOST_ROWS
+from cmg_mj.replay.logs.timestamps import A_GAP, EVEN, is_even, resolution_of, rounded
+
+BRIDGED = 5
+"""By default, so many missing rows in a gap are bridged."""
+FEW_REPEATED = 0.05
+"""More rows than this share with the stamp of the row before are a mistake, fewer are left out."""
+SAME_TIME = 1e-6
+"""Rows so small a part of the usual step apart are of the same time."""
+SLOWEST_HZ, FASTEST_HZ = 0.1, 1e6
+
+
+@dataclass(frozen=True)
+class Part:
+    """Rows without a gap, evenly sampled.
+
+    Attributes:
+        time: (n,) [s].
+        values: Name -> (n,).
+        stamps: The rows' own times, (m,) [s].
+        placed: Where those rows are in `time`; elsewhere than their stamps say if these are rounded, (m,) [s].
+    """
+
+    time: np.ndarray
+    values: Mapping[str, np.ndarray]
+    stamps: np.ndarray
+    placed: np.ndarray
+
+    @property
+    def step(self) -> float:
+        """Between samples [s]."""
+        return float(self.time[1] - self.time[0])
+
+    def when(self, stamps: np.ndarray) -> np.ndarray:
+        """Times in this part of what other rows' stamps say, beyond its ends too, (k,) [s]."""
+        before, after = self.stamps[0] - self.placed[0], self.stamps[-1] - self.placed[-1]
+        inside = np.interp(stamps, self.stamps, self.placed)
+        return np.where(
+            stamps < self.stamps[0], stamps - before, np.where(stamps > self.stamps[-1], stamps - after, inside)
+        )
+
+
+@dataclass
+class Sampler:
+    """From rows to parts.
+
+    Attributes:
+        where: The file, for messages.
+        rate_hz: The rate of the rows, if they have no times; else that to resample to, or None for the rows' own.
+        max_gap_s: Longer gaps part the log; None for `BRIDGED` periods.
+        notes: What was done.
+        period: Between the file's own rows, once they have been read [s].
+    """
+
+    where: str
+    rate_hz: float | None
+    max_gap_s: float | None
+    notes: list[str]
+    period: float | None = None
+
+    def parts(
+        self, time: np.ndarray | None, measured: Mapping[str, np.ndarray], held: Sequence[str] = ()
+    ) -> tuple[float, list[Part]]:
+        """Cut out what is missing, and resample the rest if it is uneven.
+
+        Args:
+            time: Stamps, (n_rows,) [s]; None for rows that are even.
+            measured: Name -> values, (n_rows,), all of which a row must have.
+            held: Names of those that are held until the next row, such as a command.
+
+        Returns:
+            The sample period [s], and the parts.
+
+        Raises:
+            InputError: Times that run backward or stand still, nothing to work on, or an impossible rate.
+        """
+        n = len(next(iter(measured.values())))
+        if time is None:
+            if self.rate_hz is None:
+                raise InputError(f"{self.where}: no time: name its column, --columns time=..., or give --rate HZ")
+            time = np.arange(n) / self.rate_hz
+        present = np.isfinite(time) & np.logical_and.reduce([np.isfinite(values) for values in measured.values()])
+        if not present.any():
+            raise InputError(f"{self.where}: no row has a number in each of its columns")
+        if not present.all():
+            self.notes.append(_missing(present, time, measured))
+        time, kept = time[present], {name: values[present] for name, values in measured.items()}
+        time, kept = self._forward(time, kept)
+        if len(time) < FEWEST:
+            raise InputError(f"{self.where}: {_rows(len(time))} with all that is needed; at least {FEWEST}")
+        return self._on_a_grid(time, kept, held)
+
+    def _forward(self, time: np.ndarray, values: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Times that only grow."""
+        steps = np.diff(time)
+        if len(steps) and (steps <= 0.0).all() and (steps < 0.0).any():
+            self.notes.append("the time runs backward from the first row to the last: read from its end")
+            time, values = time[::-1], {name: column[::-1] for name, column in values.items()}
+            steps = np.diff(time)
+        if (steps < 0.0).any():
+            at = int(np.argmax(steps < 0.0))
+            raise InputError(
+                f"{self.where}: time goes back from {time[at]:.9g} s to {time[at + 1]:.9g} s, "
+                f"{'there alone' if (steps < 0.0).sum() == 1 else f'the first of {(steps < 0.0).sum()} times'}: "
+                "cut the log there, or leave time out and give --rate"
+            )
+        again = steps <= SAME_TIME * np.median(steps) if len(steps) else steps > 0.0
+        if len(again) and again.mean() > FEW_REPEATED:
+            raise InputError(
+                f"{self.where}: {again.sum():,} of {len(time):,} rows have the same time as the row before: the stamps "
+                "are too coarse; leave time out and give --rate"
+            )
+        if again.any():
+            first = time[1:][again][0]
+            self.notes.append(f"{_rows(again.sum())} with the time of the row before left out, first at {first:.6g} s")
+            kept = np.concatenate([[True], ~again])
+            time, values = time[kept], {name: column[kept] for name, column in values.items()}
+        return time, values
+
+    def _on_a_grid(
+        self, time: np.ndarray, values: Mapping[str, np.ndarray], held: Sequence[str]
+    ) -> tuple[float, list[Part]]:
+        steps = np.diff(time)
+        usual = float(np.median(steps))
+        period = float(steps[steps <= A_GAP * usual].mean())
+        if not 1.0 / FASTEST_HZ <= period <= 1.0 / SLOWEST_HZ:
+            raise InputError(
+                f"{self.where}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz; a log has "
+                f"{SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz: is the time's unit right? (--units time=ms)"
+            )
+        self.period = period = rounded(period)
+        longest = BRIDGED * period if self.max_gap_s is None else self.max_gap_s
+        ends = np.flatnonzero(steps > max(A_GAP * period, longest + period))
+        bounds = [0, *(ends + 1), len(time)]
+        stretches = [slice(a, b) for a, b in pairwise(bounds)]
+        resolution = resolution_of(time)
+        even = all(is_even(time[s], period, resolution) for s in stretches)
+        dt = period if self.rate_hz is None else 1.0 / self.rate_hz
+        resampled = not even or abs(dt - period) > 1e-6 * dt
+        self._say_how(time, steps[steps <= A_GAP * period], period, dt, even, resampled, resolution)
+        bridged = (steps > A_GAP * period) & (steps <= max(A_GAP * period, longest + period))
+        if bridged.any():
+            self.notes.append(_gaps("bridged by straight lines", time, steps, bridged, period))
+        if len(ends):
+            parted = np.zeros(len(steps), dtype=bool)
+            parted[ends] = True
+            self.notes.append(_gaps("not bridged: observers start anew after each", time, steps, parted, period))
+        total = sum((time[s][-1] - time[s][0]) / dt for s in stretches)
+        if total > MOST_ROWS:
+            raise InputError(f"{self.where}: {total:,.0f} samples at {1.0 / dt:g} Hz; at most {MOST_ROWS:,}")
+        parts = [
+            self._part(time[s], {name: column[s] for name, column in values.items()}, period, dt, resampled, held)
+            for s in stretches
+            if (time[s][-1] - time[s][0]) / dt >= FEWEST - 1.5
+        ]
+        if len(parts) < len(stretches):
+            self.notes.append(f"{len(stretches) - len(parts)} parts with fewer than {FEWEST} samples left out")
+        if not parts and not len(ends):
+            n, rate = int((time[-1] - time[0]) / dt + 1e-6) + 1, f"{time[-1] - time[0]:.4g} s at {1.0 / dt:g} Hz"
+            raise InputError(f"{self.where}: {rate} are {n} sample{'' if n == 1 else 's'}; at least {FEWEST}")
+        if not parts:
+            raise InputError(f"{self.where}: no part of {FEWEST} samples without a gap longer than {longest:.3g} s")
+        return dt, parts
+
+    def _say_how(
+        self,
+        time: np.ndarray,
+        steps: np.ndarray,
+        period: float,
+        dt: float,
+        even: bool,
+        resampled: bool,
+        resolution: float,
+    ) -> None:
+        span = f"{steps.min() * 1e3:.4g} to {steps.max() * 1e3:.4g} ms"
+        if resampled and even:
+            self.notes.append(f"{1.0 / period:.6g} Hz resampled to {1.0 / dt:.6g} Hz by cubic splines")
+        elif resampled:
+            off = float(np.std(steps)) * 1e3
+            self.notes.append(
+                f"uneven sampling: steps of {span}, {off:.2g} ms about their mean; resampled to {1.0 / dt:.6g} Hz by "
+                "cubic splines"
+            )
+        elif np.ptp(steps) > EVEN * period:
+            self.notes.append(
+                f"steps of {span}: to the stamps' {resolution * 1e3:.3g} ms that is even sampling at "
+                f"{1.0 / period:.6g} Hz, and taken as such"
+            )
+
+    def _part(
+        self,
+        time: np.ndarray,
+        values: Mapping[str, np.ndarray],
+        period: float,
+        dt: float,
+        resampled: bool,
+        held: Sequence[str],
+    ) -> Part:
+        if not resampled and len(time) == round((time[-1] - time[0]) / dt) + 1:
+            grid = time[0] + dt * np.arange(len(time))
+            return Part(grid, values, time, grid)
+        if not resampled:  # rows stay where they are, and those that are missing come between them
+            places = np.rint((time - time[0]) / dt).astype(int)
+            places = np.maximum.accumulate(places)
+            kept = np.concatenate([[True], np.diff(places) > 0])
+            time, places = time[kept], places[kept]
+            values = {name: column[kept] for name, column in values.items()}
+            own, grid = places * dt, dt * np.arange(places[-1] + 1)
+            filled = {name: bridge(grid, own, column, name in held) for name, column in values.items()}
+            return Part(time[0] + grid, filled, time, time[0] + own)
+        grid = dt * np.arange(int((time[-1] - time[0]) / dt + 1e-6) + 1)
+        own = time - time[0]
+        sampled = {name: resample(grid, own, column, A_GAP * period, name in held) for name, column in values.items()}
+        return Part(time[0] + grid, sampled, time, time)
+
+
+def _missing(present: np.ndarray, time: np.ndarray, measured: Mapping[str, np.ndarray]) -> str:
+    """Rows that lack something, in words."""
+    lacks = {name: int((~np.isfinite(values)).sum()) for name, values in measured.items()}
+    lacks["time"] = int((~np.isfinite(time)).sum())
+    named = ", ".join(f"{name} in {count:,}" for name, count in lacks.items() if count)
+    missing = np.flatnonzero(~present)
+    edges = np.flatnonzero(np.diff(missing) > 1)
+    runs = np.diff(np.concatenate([[0], edges + 1, [len(missing)]]))
+    return (
+        f"{_rows(len(missing))} of {len(present):,} without a number ({named}) left out: the first is row "
+        f"{missing[0] + 1}, the longest run {_rows(int(runs.max()))}"
+    )
+
+
+def _gaps(what: str, time: np.ndarray, steps: np.ndarray, which: np.ndarray, period: float) -> str:
+    """Gaps in words."""
+    longest = int(np.argmax(np.where(which, steps, 0.0)))
+    count = int(which.sum())
+    return (
+        f"{count:,} gap{'' if count == 1 else 's'} {what}; the longest is {steps[longest] * 1e3:.4g} ms "
+        f"at {time[longest]:.6g} s"
+    )
+
+
+def _rows(count: int) -> str:
+    return f"{count:,} row{'' if count == 1 else 's'}"

@@ -1,0 +1,144 @@
+"""Units by the end of a column's name, `pitch_deg`, `Gyro [deg/s]`, or told; all into SI and radians."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Literal
+
+from cmg_mj.errors import InputError, nearest
+from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY
+
+Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "time"]
+
+_DEG, _TURN = math.pi / 180.0, 2.0 * math.pi
+
+UNITS: dict[Quantity, dict[str, float]] = {
+    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": _DEG, "mdeg": 1e-3 * _DEG, "rev": _TURN},
+    "rate": {
+        "rad_s": 1.0,
+        "mrad_s": 1e-3,
+        "deg_s": _DEG,
+        "dps": _DEG,
+        "mdps": 1e-3 * _DEG,
+        "rpm": _TURN / 60.0,
+        "rev_s": _TURN,
+    },
+    "angular acceleration": {"rad_s2": 1.0, "deg_s2": _DEG},
+    "acceleration": {
+        "m_s2": 1.0,
+        "mm_s2": 1e-3,
+        "g": STANDARD_GRAVITY,
+        "mg": 1e-3 * STANDARD_GRAVITY,
+        "ug": 1e-6 * STANDARD_GRAVITY,
+    },
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+}
+"""Quantity -> unit -> its size in rad, rad/s, rad/s^2, m/s^2 or s. The first of each is that."""
+
+_SAME = {
+    "radian": "rad",
+    "radians": "rad",
+    "°": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "rads": "rad_s",
+    "rps": "rad_s",
+    "radps": "rad_s",
+    "rad_sec": "rad_s",
+    "degs": "deg_s",
+    "degps": "deg_s",
+    "deg_sec": "deg_s",
+    "°_s": "deg_s",
+    "°_s2": "deg_s2",
+    "rad_ss": "rad_s2",
+    "ms2": "m_s2",
+    "mps2": "m_s2",
+    "m_ss": "m_s2",
+    "mps": "m_s",
+    "sec": "s",
+    "secs": "s",
+    "second": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "millis": "ms",
+    "usec": "us",
+    "µs": "us",
+    "μs": "us",
+    "micros": "us",
+    "nsec": "ns",
+    "nanos": "ns",
+}
+"""Other spellings."""
+
+
+def _plain(text: str) -> str:
+    """`Deg/s^2`, `deg.s-2` and `deg_s2` alike."""
+    text = text.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
+    text = re.sub(r"[\s./*·]+", "_", text).replace("_s-1", "_s").replace("_s-2", "_s2").strip("_")
+    return _SAME.get(text, text)
+
+
+def unit(quantity: Quantity, text: str, where: str) -> str:
+    """A unit as a user writes it.
+
+    Args:
+        quantity: What is measured.
+        text: `deg`, `deg/s`, `rad_s`.
+        where: The option, for the message.
+
+    Returns:
+        Its name in `UNITS`.
+
+    Raises:
+        InputError: It is none of this quantity's.
+    """
+    found = _plain(text)
+    if found not in UNITS[quantity]:
+        raise InputError(f"{where}: {text!r} is no unit of {_an(quantity)}; {nearest(found, UNITS[quantity])}")
+    return found
+
+
+def unit_of_name(quantity: Quantity, name: str) -> str | None:
+    """The unit that a column's name ends in, after `_`, a space, or in brackets; None if it ends in none.
+
+    A name that is a unit and nothing else, such as `ms`, is one too.
+    """
+    bracketed = re.search(r"[\[({]([^\[\](){}]+)[\])}]\s*$", name)
+    if bracketed:
+        found = _plain(bracketed[1])
+        return found if found in UNITS[quantity] else None
+    whole = _plain(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name))
+    parts = whole.split("_")
+    for start in range(len(parts)):  # the longest first: deg_s before s
+        found = _plain("_".join(parts[start:]))
+        if found in UNITS[quantity]:
+            return found
+    return None
+
+
+def in_si(quantity: Quantity, unit: str) -> float:
+    """The size of a unit in rad, rad/s, rad/s^2, m/s^2 or s."""
+    return UNITS[quantity][unit]
+
+
+def unit_of_factor(quantity: Quantity, unit: str, factor: float, near: tuple[float, float]) -> str | None:
+    """The unit that makes numbers said to be in another one so many times as large.
+
+    Args:
+        quantity: What is measured.
+        unit: The unit they were said to be in.
+        factor: By what they must be multiplied to be right.
+        near: By how much that may miss, as a factor.
+
+    Returns:
+        The nearest; None if there is none, or it is the same.
+    """
+    size = in_si(quantity, unit)
+    misses = {name: factor * size / other for name, other in UNITS[quantity].items() if other != size}
+    fits = {name: abs(math.log(miss)) for name, miss in misses.items() if near[0] <= miss <= near[1]}
+    return min(fits, key=fits.__getitem__) if fits else None
+
+
+def _an(quantity: str) -> str:
+    return f"an {quantity}" if quantity[0] in "aeiou" else f"a {quantity}"

@@ -1,0 +1,46 @@
+"""What every estimate of the rate is judged beside: zero, a cheap gyro on the same motion, and two floors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmg_mj.results.error_bounds import FLOORS
+from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.sensors.sampled import AN_AXIS, normals
+
+ZERO, MEMS_GYRO = "zero", "mems_gyro"
+RATES = (ZERO, MEMS_GYRO)
+"""Those that say what the rate is."""
+REFERENCES = (*RATES, *FLOORS)
+"""The names of all, in the order of every table."""
+
+STREAM = 3
+"""The gyro's noise: streams 0 to 2 are those of the sensors that the controller reads."""
+
+
+class References:
+    """Those that say a rate, at work. They see the true rate and close no loop.
+
+    Args:
+        gyro: The gyro.
+        dt: Control period [s].
+        seed: Seed of the sensors' noise.
+        worlds: The number of one world, or the numbers of many: the gyro's noise depends on (seed, number) alone.
+        axis: The number of the axis: each has a gyro of its own.
+    """
+
+    def __init__(self, gyro: MemsGyro, dt: float, seed: int, worlds: int | Sequence[int], axis: int = 0) -> None:
+        self._read = gyro.meter(dt, normals(seed, worlds, STREAM + AN_AXIS * axis, gyro.channels))
+
+    def rates(self, x2: np.ndarray) -> dict[str, np.ndarray]:
+        """What each says at the next ticks.
+
+        Args:
+            x2: True tilt rate, (n_rows, n_worlds) [rad/s].
+
+        Returns:
+            Name -> rate, (n_rows, n_worlds) [rad/s].
+        """
+        return {ZERO: np.zeros_like(x2), MEMS_GYRO: self._read(x2)}

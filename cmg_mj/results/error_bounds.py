@@ -1,0 +1,170 @@
+"""Two floors under every estimate of the rate: what y1 alone allows, and what y1 with its acceleration does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from cmg_mj.sensors.tilt import TiltNoise
+
+FLOOR_Y1, FLOOR_ACCELERATION = "floor_y1", "floor_accel"
+FLOORS = (FLOOR_Y1, FLOOR_ACCELERATION)
+"""Their names, in the order of every table."""
+
+MEMORY_S = 0.5
+"""How far back the filters of y1 look that are tried for its floor [s]."""
+SINGLE, WIDER = 4, 1.3
+"""Their newest samples have a tap each; older ones share one, and every share is so much wider than the one before.
+A tap a sample takes 0.3 % off the floor, half a second more of memory 1 % (docs/studies/gyro_free.py --taps)."""
+PIECE = 16
+"""Worlds whose sums are taken together: so many stay in a processor's cache."""
+ROWS_A_TAP = 10
+"""So many samples a tap, or there is no fit."""
+
+
+@lru_cache(maxsize=256)
+def acceleration_floor(noise: TiltNoise, dt: float) -> float:
+    """The least RMS error of any filter of y1 and its acceleration that must do for whatever motion there is.
+
+    The acceleration runs straight between samples, and nothing else is known of the motion. Then only the noise is
+    left of the error: with (v, n) the noise of y1 and of the acceleration, v = c n + v', it obeys, driven by each
+    sample's n, which is white (it is not behind the part's low-pass: there this is no floor),
+
+        x1+ = x1 + dt x2 - dt^2 (2 n + n+)/6,  x2+ = x2 - dt (n + n+)/2,  y1 = x1 + c n + v',
+
+    and the stationary Kalman filter of it is the best there is. Not only of the linear ones, if the noise is Gaussian.
+
+    Args:
+        noise: Of one sample.
+        dt: Sample period [s].
+
+    Returns:
+        After each measurement, once the filter has settled [rad/s].
+    """
+    if not (noise.tilt and noise.acceleration):
+        return 0.0
+    # In units of the tilt's noise and of the sample period: nothing is very large or small.
+    a, c = noise.acceleration * dt * dt / noise.tilt, noise.correlation
+    F = np.array([[1.0, 1.0, -a / 3.0], [0.0, 1.0, -a / 2.0], [0.0, 0.0, 0.0]])  # of x1, x2, n
+    driven = np.array([[-a / 6.0], [-a / 2.0], [1.0]])
+    C, R = np.array([[1.0, 0.0, c]]), np.array([[1.0 - c * c]])
+    P = solve_discrete_are(F.T, C.T, driven @ driven.T, R)
+    after = P - P @ C.T @ np.linalg.solve(C @ P @ C.T + R, C @ P)
+    return math.sqrt(max(after[1, 1], 0.0)) * noise.tilt / dt
+
+
+class TiltFloor:
+    """The best causal linear filter of y1 alone, found afterwards: by least squares to the true rate itself.
+
+    Without a model y1 bounds nothing unless it is told what motions there are. This filter is told more than any
+    observer can know: what the rate was, in the very world that is judged. No time-invariant linear filter of y1 with
+    its taps, started at rest, has a smaller error there, however it is tuned. The whole run and the push windows
+    have a filter each. One filter for all of 20 worlds has an error 1 % larger over the whole run of push_recovery,
+    and 6 % in the push window: so much is fitted to the one world's noise.
+
+    Args:
+        dt: Sample period [s].
+        n_worlds: How many worlds.
+    """
+
+    def __init__(self, dt: float, n_worlds: int) -> None:
+        self.edges = _edges(max(1, round(MEMORY_S / dt)))
+        self._taps = len(self.edges) - 1
+        # Of the taps' inputs and the true rate: sums of all products, in the whole run and in the push windows.
+        self._products = np.zeros((2, n_worlds, self._taps + 1, self._taps + 1))
+        self._counts = np.zeros((2, n_worlds))
+        self._past: np.ndarray | None = None
+
+    def add(self, y1: np.ndarray, x2: np.ndarray, counted: np.ndarray, pushed: np.ndarray) -> None:
+        """Take the next ticks.
+
+        Args:
+            y1: Measured tilt, (n_rows, n_worlds) [rad].
+            x2: True tilt rate, (n_rows, n_worlds) [rad/s].
+            counted: Which of these count, (n_rows, n_worlds).
+            pushed: Which count in the push windows, (n_rows, n_worlds).
+        """
+        if self._past is None:  # it stood still before
+            self._past = np.repeat(y1[:1].T, self.edges[-1] - 1, axis=1)
+        whole = np.concatenate([self._past, y1.T], axis=1)
+        self._past = whole[:, len(y1) :].copy()
+        masks = [(mask, mask.any(axis=1), mask.all()) for mask in (counted, pushed)]
+        for first in range(0, len(whole), PIECE):
+            worlds = slice(first, first + PIECE)
+            inputs = self._inputs(whole[worlds], x2[:, worlds])
+            for part, (mask, rows, everywhere) in enumerate(masks):
+                if not rows.any():
+                    continue
+                kept = inputs if everywhere else np.where(mask[rows, worlds].T[:, None], inputs[:, :, rows], 0.0)
+                # Not by @: BLAS would take every core for it, and keep them busy for a while.
+                self._products[part, worlds] += np.einsum("wir,wjr->wij", kept, kept)
+        for part, (mask, *_) in enumerate(masks):
+            self._counts[part] += mask.sum(axis=0)
+
+    def _inputs(self, y1: np.ndarray, x2: np.ndarray) -> np.ndarray:
+        """What goes into the taps, and the rate below: (n_worlds, taps + 1, n_rows)."""
+        n_rows = len(x2)
+        sums = np.cumsum(y1, axis=1)
+        sums = np.concatenate([np.zeros_like(sums[:, :1]), sums], axis=1)
+        last = sums.shape[1] - n_rows
+        inputs = np.empty((len(y1), self._taps + 1, n_rows))
+        for tap, (newer, older) in enumerate(pairwise(self.edges)):
+            np.subtract(sums[:, last - newer :][:, :n_rows], sums[:, last - older :][:, :n_rows], inputs[:, tap])
+        inputs[:, -1] = x2.T
+        return inputs
+
+    def errors(self, world: int) -> tuple[float | None, float | None]:
+        """What is left of the rate in one world.
+
+        Args:
+            world: Its index.
+
+        Returns:
+            RMS error in the whole run and in the push windows [rad/s]; None where there are too few samples for a fit.
+        """
+        whole, pushed = (self._error(products[world], counts[world]) for products, counts in self._sums)
+        return whole, pushed
+
+    @property
+    def _sums(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        return zip(self._products, self._counts, strict=True)
+
+    def _error(self, products: np.ndarray, count: float) -> float | None:
+        if count < ROWS_A_TAP * self._taps or not np.isfinite(products).all():
+            return None
+        taps = np.linalg.lstsq(products[:-1, :-1], products[:-1, -1], rcond=1e-13)[0]
+        left = np.append(taps, -1.0)
+        return math.sqrt(max(left @ products @ left, 0.0) / count)
+
+
+class Floors:
+    """Both floors of a run.
+
+    Args:
+        noises: Of one sample of y1 and its acceleration, a world each.
+        dt: Sample period [s].
+    """
+
+    def __init__(self, noises: Sequence[TiltNoise], dt: float) -> None:
+        self._y1 = TiltFloor(dt, len(noises))
+        self._acceleration = [acceleration_floor(noise, dt) for noise in noises]
+        self.add = self._y1.add
+
+    def errors(self, world: int) -> dict[str, tuple[float | None, float | None]]:
+        """Of each floor the RMS error in the whole run and in the push windows of one world [rad/s]."""
+        of_both = self._acceleration[world]
+        return {FLOOR_Y1: self._y1.errors(world), FLOOR_ACCELERATION: (of_both, of_both)}
+
+
+def _edges(memory: int) -> list[int]:
+    """Between which samples back each tap lies: the newest have one each."""
+    edges, width = list(range(min(SINGLE, memory) + 1)), 1.0
+    while edges[-1] < memory:
+        width *= WIDER
+        edges.append(min(memory, edges[-1] + round(width)))
+    return edges

@@ -1,0 +1,224 @@
+"""A run folder, claimed from before a run until its result is in it."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from cmg_mj.errors import InputError, raised
+from cmg_mj.results.run_folder.lock import Busy, Lock
+from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, users_files
+from cmg_mj.results.run_folder.swap import ASIDE, recover, stage, swap_in
+
+Writers = Mapping[str, Callable[[Path], None]]
+"""Name of a file -> what writes it to the path given."""
+
+
+class Taken(InputError):
+    """A folder that is there, but not for this run: another writes to it, or a user's file would be written over."""
+
+
+class RunFolder:
+    """A folder that one run writes to, and meanwhile no other.
+
+    What a user has in it stays as it is. What cmg_mj has written there before is replaced whole, when the new result is
+    whole.
+
+    Attributes:
+        path: The folder, as the user named it.
+    """
+
+    def __init__(self, path: Path, names: Iterable[str] = ()) -> None:
+        """Claim the folder, make it if need be, and take away what killed runs have left there.
+
+        Args:
+            path: The folder.
+            names: What will be written, as far as it is known.
+
+        Raises:
+            Taken: Another run writes to it, or one of the names is that of a file that cmg_mj has not written.
+            InputError: It cannot be made or written.
+        """
+        self.path = path
+        self._lock: Lock | None = None
+        self._made: list[Path] = []
+        try:
+            self._made = [folder for folder in (path, *path.parents) if not folder.exists()]
+            path.mkdir(parents=True, exist_ok=True)
+            self._folder = path.resolve()
+            self._lock = Lock(self._folder / HIDDEN / "lock")
+            recover(self._folder, self._lock)
+            self._refuse(names)
+        except Busy:
+            self.release()
+            raise Taken(f"--out {path}: another run is writing to it") from None
+        except OSError as error:
+            self.release()
+            raise InputError(f"--out {path}: cannot be written: {error.strerror}") from error
+        except BaseException:
+            self.release()
+            raise
+
+    def _refuse(self, names: Iterable[str]) -> None:
+        """Refuse to write over what is not cmg_mj's."""
+        theirs = sorted(set(users_files(self._folder)) & set(names))
+        if theirs:
+            are = "is" if len(theirs) == 1 else "are"
+            raise Taken(
+                f"--out {self.path}: {', '.join(theirs)} there {are} not as cmg-mj wrote it, and would be lost: move "
+                "it, or name another folder"
+            )
+
+    def write(self, files: Writers, *, complete: bool = True, all_or_none: bool = False) -> Path:
+        """Write a result: every file that can be written, and then complain of those that cannot.
+
+        Args:
+            files: What to write.
+            complete: Whether the run came to its end.
+            all_or_none: Whether nothing is kept when a file cannot be written.
+
+        Returns:
+            Where it is: the folder; or one in it, if this result is not complete and that in the folder is, or if a
+            user's file would be written over.
+
+        Raises:
+            InputError: A file cannot be written. The others are, unless it is all or none.
+        """
+        wrong: dict[str, BaseException] = {}
+        try:
+            new = stage(self._folder)
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
+        for name, write in files.items():
+            try:
+                write(new / name)
+            except BaseException as error:  # such as a title that no file can hold
+                (new / name).unlink(missing_ok=True)
+                wrong[name] = error
+                if not isinstance(error, Exception):  # Ctrl-C, for the second time
+                    break
+        if wrong and all_or_none:
+            shutil.rmtree(new, ignore_errors=True)
+            place = self.path
+        else:
+            place = self._place(new, complete=complete and not wrong)  # what is done is kept
+        for error in wrong.values():
+            if not isinstance(error, Exception):
+                raise error
+        if wrong:
+            raise InputError("; ".join(_complaint(place / name, error) for name, error in wrong.items()))
+        return place
+
+    def _place(self, new: Path, *, complete: bool) -> Path:
+        """Have what was written take its place."""
+        manifest = Manifest.of(new, complete)
+        try:
+            if not manifest.files:
+                return self.path
+            manifest.write(new)
+            if self._has_room_for(manifest):
+                assert self._lock is not None
+                swap_in(new, self._folder, self._lock)
+                return self.path
+            return self._set_aside(new, manifest)
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be written: {error.strerror or error}") from error
+        finally:
+            shutil.rmtree(new, ignore_errors=True)  # unless it has been moved to its place
+
+    def _has_room_for(self, manifest: Manifest) -> bool:
+        """Whether nothing would be lost: no complete result for one that is not, and nothing of the user's."""
+        loses = not manifest.complete and Manifest.read(self._folder).stands(self._folder)
+        return not loses and not set(manifest.files) & set(users_files(self._folder))
+
+    def _set_aside(self, new: Path, manifest: Manifest) -> Path:
+        """Put what may not take the folder's place into a folder in it."""
+        for number in itertools.count(1):
+            name = ASIDE if number == 1 else f"{ASIDE}-{number}"
+            with suppress(Taken), RunFolder(self.path / name) as aside:
+                if aside._has_room_for(manifest):
+                    assert aside._lock is not None
+                    swap_in(new, aside._folder, aside._lock)
+                    return aside.path
+        raise AssertionError("count() does not end")
+
+    def release(self) -> None:
+        """Let others have it. A folder that was made for nothing is taken away."""
+        if self._lock is not None:
+            with suppress(OSError):
+                self._lock.release()
+            self._lock = None
+        with suppress(OSError):  # what holds something stays
+            for folder in (self.path / HIDDEN, *self._made):
+                if folder.exists():
+                    folder.rmdir()
+
+    def __enter__(self) -> RunFolder:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.release()
+
+
+def _complaint(path: Path, error: BaseException) -> str:
+    return f"{path}: cannot be written: {getattr(error, 'strerror', None) or raised(error)}"
+
+
+@contextmanager
+def claimed(folder: RunFolder | Path) -> Iterator[RunFolder]:
+    """A folder that may have been claimed already."""
+    if isinstance(folder, RunFolder):
+        yield folder
+    else:
+        with RunFolder(folder) as now:
+            yield now
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file that ends in one line's end."""
+    path.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+
+
+def unused_folder(
+    parent: Path, name: str, names: Iterable[str], asked_toml: str, asked: str = "scenario.toml"
+) -> RunFolder:
+    """Claim a folder that no other run has written: the name itself, or with a number behind it.
+
+    The same run again goes to the same folder.
+
+    Args:
+        parent: Where the folders are.
+        name: The name wanted.
+        names: What will be written.
+        asked_toml: What is asked for, as the folder will say it.
+        asked: The file that says it.
+
+    Returns:
+        The folder.
+
+    Raises:
+        InputError: It cannot be made or written.
+    """
+    for number in itertools.count(1):
+        folder = parent / (name if number == 1 else f"{name}-{number}")
+        if not os.path.lexists(folder) or _is_unused(folder) or _is_of(folder / asked, asked_toml):
+            with suppress(Taken):
+                return RunFolder(folder, names)
+    raise AssertionError("count() does not end")
+
+
+def _is_unused(folder: Path) -> bool:
+    """Whether there is nothing in a folder, but perhaps what a killed run has left."""
+    return folder.is_dir() and all(path.name == HIDDEN for path in folder.iterdir())
+
+
+def _is_of(path: Path, asked_toml: str) -> bool:
+    """Whether cmg_mj has written the result of what this file asks for there."""
+    try:
+        return Manifest.read(path.parent).has(path) and path.read_text(encoding="utf-8") == asked_toml
+    except (OSError, ValueError):
+        return False

@@ -1,0 +1,203 @@
+"""A new result takes the place of the old one in its folder, whole.
+
+The new result is written to `.cmg-mj/new` in the folder. Then the user's files are linked into it, it becomes a folder
+beside the one it replaces, and the two change names: one system call, before which there is the old result and after
+which there is the new one. Where that cannot be done, `.cmg-mj/new` is renamed to `.cmg-mj/ready`, from when on it
+counts, and its files are moved one by one; if that is interrupted, `recover` moves the rest.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+import shutil
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+from cmg_mj.results.run_folder.lock import Busy, Lock
+from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, remove_result, users_files
+
+ASIDE = "incomplete"
+"""Where in a folder goes what may not take the place of the result there."""
+
+
+def stage(folder: Path) -> Path:
+    """Make the folder where a new result is written before it takes its place."""
+    new = folder / HIDDEN / "new"
+    (new / HIDDEN).mkdir(parents=True)
+    (new / HIDDEN / "staged").touch()  # as long as this is there, nothing of a user's is but links
+    return new
+
+
+def swap_in(new: Path, folder: Path, lock: Lock) -> None:
+    """Have a new result take the place of what cmg_mj has written into a folder before.
+
+    Args:
+        new: The result with its manifest, in a folder that `stage` has made, on the same disk.
+        folder: Where to; nothing of the user's there has one of the result's names.
+        lock: That of the folder.
+
+    Raises:
+        OSError: It cannot.
+    """
+    try:
+        if not _swap_folders(new, folder, lock):
+            new.rename(folder / HIDDEN / "ready")
+            _move_in(folder)
+    except BaseException:  # a full disk, or Ctrl-C: what has begun is finished
+        recover(folder, lock)
+        raise
+    recover(folder, lock)
+
+
+def recover(folder: Path, lock: Lock) -> None:
+    """Finish or take away what a process that has ended left behind; `lock`, held, shows that it has ended."""
+    beside = _beside(folder)
+    if beside.is_dir() and _is_dead(beside, lock):
+        if (beside / HIDDEN / "staged").exists():
+            shutil.rmtree(beside)
+        else:
+            _clear(beside, folder)
+    (folder / HIDDEN / "staged").unlink(missing_ok=True)
+    if (folder / HIDDEN / "ready").is_dir():
+        _move_in(folder)
+    if (folder / HIDDEN / "new").is_dir():
+        shutil.rmtree(folder / HIDDEN / "new")
+    for aside in _asides(folder):
+        with suppress(Busy, OSError):
+            theirs = Lock(aside / HIDDEN / "lock")
+            try:
+                recover(aside, theirs)
+            finally:
+                theirs.release()
+
+
+def _beside(folder: Path) -> Path:
+    return folder.parent / f".{folder.name}{HIDDEN}"
+
+
+def _asides(folder: Path) -> list[Path]:
+    return [path for path in folder.glob(f"{ASIDE}*") if (path / HIDDEN).is_dir()]
+
+
+def _superseded(folder: Path, by: Manifest) -> list[Path]:
+    """What was set aside and goes when a complete result comes, if nobody writes to it just now."""
+    return [path for path in _asides(folder) if by.complete and not (path / HIDDEN / "lock").exists()]
+
+
+def _is_dead(beside: Path, lock: Lock) -> bool:
+    """Whether it is cmg_mj's, and of a process that has ended."""
+    if not (beside / HIDDEN).is_dir():
+        return not any(beside.iterdir())
+    if lock.is_the_file(beside / HIDDEN / "lock"):
+        return True
+    try:
+        Lock(beside / HIDDEN / "lock").release()
+    except Busy:
+        return False
+    return True
+
+
+def _swap_folders(new: Path, folder: Path, lock: Lock) -> bool:
+    """Swap whole folders; False, and nothing is changed, where that cannot be done."""
+    going = [path.name for path in _superseded(folder, Manifest.read(new)) if not users_files(path)]
+    kept = [name for name in users_files(folder) if name not in going]
+    if _stands_in(folder) or any((folder / name).is_dir() and not (folder / name).is_symlink() for name in kept):
+        return False
+    beside = _beside(folder)
+    try:
+        os.link(lock.path, new / HIDDEN / "lock")
+        for name in kept:
+            os.link(folder / name, new / name, follow_symlinks=False)
+        shutil.copystat(folder, new)
+        os.utime(new)
+        if (new.stat().st_uid, new.stat().st_gid) != (folder.stat().st_uid, folder.stat().st_gid):
+            return False
+        new.rename(beside)
+    except (OSError, NotImplementedError):  # no links on this disk, no place beside the folder
+        return False
+    try:
+        _exchange(beside, folder)
+    except OSError:  # a mount point, or the system cannot
+        beside.rename(new)
+        return False
+    return True
+
+
+def _stands_in(folder: Path) -> bool:
+    """Whether the current folder is this one or in it: whoever stands there would stand in the old one."""
+    try:
+        here = Path.cwd().resolve()
+    except OSError:  # it has been taken away
+        return False
+    return folder == here or folder in here.parents
+
+
+def _exchange(one: Path, other: Path) -> None:
+    """Have two folders change names, at once."""
+    a, b = os.fsencode(one), os.fsencode(other)
+    number = errno.ENOSYS
+    with suppress(AttributeError, TypeError):  # a system, or a C library, that does not know of it
+        libc = ctypes.CDLL(None, use_errno=True)
+        if sys.platform == "darwin":
+            failed = libc.renamex_np(a, b, 2)  # RENAME_SWAP
+        else:
+            failed = libc.renameat2(-100, a, -100, b, 2)  # AT_FDCWD, RENAME_EXCHANGE
+        number = ctypes.get_errno() if failed else 0
+    if number:
+        raise OSError(number, os.strerror(number), str(other))
+
+
+def _clear(old: Path, folder: Path) -> None:
+    """Take away the folder whose place another has taken. What a user has put there meanwhile goes to the new one."""
+    mine = Manifest.read(old)
+    for path in sorted(old.iterdir()):
+        there = folder / path.name
+        if path.name == HIDDEN:
+            continue
+        if mine.has(path) or _is_link(path, there):
+            path.unlink()
+        elif path in _asides(old) and not users_files(path):
+            remove_result(path)
+        elif not os.path.lexists(there):
+            path.rename(there)
+        else:
+            path.rename(_unused(there))
+    shutil.rmtree(old / HIDDEN, ignore_errors=True)
+    with suppress(OSError):  # if there is something again, it stays
+        old.rmdir()
+
+
+def _is_link(one: Path, other: Path) -> bool:
+    try:
+        return os.path.samestat(one.lstat(), other.lstat())
+    except FileNotFoundError:
+        return False
+
+
+def _unused(path: Path) -> Path:
+    """A name beside a file that is taken."""
+    number = 1
+    while os.path.lexists(path.with_name(f"{path.name}.{number}")):
+        number += 1
+    return path.with_name(f"{path.name}.{number}")
+
+
+def _move_in(folder: Path) -> None:
+    """Move the files of `.cmg-mj/ready` into their folder, as many as are still to be moved; its manifest last."""
+    ready = folder / HIDDEN / "ready"
+    if (ready / HIDDEN / "files.json").exists():
+        old, new = Manifest.read(folder), Manifest.read(ready)
+        for name in old.files:
+            if name not in new.files and old.has(folder / name):
+                (folder / name).unlink()
+        for name in new.files:
+            free = not os.path.lexists(folder / name) or old.has(folder / name)
+            if free and (ready / name).exists():
+                (ready / name).replace(folder / name)
+        for aside in _superseded(folder, new):
+            remove_result(aside)
+        (ready / HIDDEN / "files.json").replace(folder / HIDDEN / "files.json")
+    shutil.rmtree(ready)

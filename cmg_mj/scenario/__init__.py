@@ -1,0 +1,1 @@
+"""Reads a scenario file, checks it, and holds it as one value."""

@@ -1,0 +1,140 @@
+"""What a scenario amounts to, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
+from cmg_mj.controllers.laws.protocol import needs
+from cmg_mj.scenario.design import Design
+from cmg_mj.scenario.disturbances import Push, Swing
+from cmg_mj.scenario.plant_parameters import RigFacts
+from cmg_mj.scenario.resolve import resolved
+from cmg_mj.scenario.schema import ControllerSettings, Scenario
+from cmg_mj.scenario.stability_check import closed_loop, hints
+from cmg_mj.scenario.time_grid import physics_step
+
+
+def description(name: str, scenario: Scenario, design: Design, rig: RigFacts, axis: str = "") -> str:
+    """What `cmg-mj check` prints: what a scenario amounts to.
+
+    Args:
+        name: What the user called it.
+        scenario: The scenario.
+        design: The law and the observers.
+        rig: What they were made for.
+        axis: The name of the axis, if it has one.
+
+    Returns:
+        Lines of text.
+    """
+    settings = scenario.plant
+    timestep = physics_step(scenario, rig.largest_step)
+    fields = resolved(scenario, design, rig.path, timestep)
+    steps = f"{round(scenario.duration_s / timestep)} physics steps of {timestep:g} s"
+    coarse = (
+        f"; figures are accurate up to {rig.largest_step:g} s" if timestep > rig.largest_step * (1.0 + 1e-9) else ""
+    )
+    observer = {key: value for key, value in fields["observer"].items() if key != "kind"}
+    compare = scenario.compare
+    rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
+    imperfections = scenario.sensors.accelerometer.imperfections
+    changes = settings.changes()
+    rows = [
+        ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
+        ("plant", f"{fields['plant']['model']}, cubes: {', '.join(rig.cubes)}"),
+        *([("", assignments(changes))] if changes else []),
+        ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
+        *_law_rows(scenario, design, rig, fields["controller"]),
+        ("observer", f"{scenario.observer.kind}  {assignments(observer)}".rstrip()),
+        *(
+            [("", "your own code, which was imported and tried on two samples")]
+            if ":" in scenario.observer.kind
+            else []
+        ),
+        ("companions", ", ".join(scenario.companion_names()) or "none"),
+        ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
+        *([("", f"accelerometer: {assignments(imperfections)}")] if imperfections else []),
+        *([("compare", f"{', '.join(compare.names())}; {compare.worlds} worlds")] if compare else []),
+        *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
+    ]
+    rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
+    return lines(
+        f"{name}{f', axis {axis}' if axis else ''}: valid",
+        [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))],
+    )
+
+
+def _about(torque: Push | Swing) -> str:
+    return "" if torque.axis is None else f" about {torque.axis}"
+
+
+def _law_rows(
+    scenario: Scenario, design: Design, rig: RigFacts, fields: Mapping[str, Any]
+) -> Iterator[tuple[str, str]]:
+    """What the law is, what it is fed, and of the papers' what it makes of the reduced model."""
+    controller, law = scenario.controller, design.law
+    at = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
+    fed = f"tilt rate from the {controller.feedback}, {controller.angles} angles"
+    if isinstance(law, StateFeedback):
+        loop = closed_loop(scenario, law, rig.reduced)
+        yield "law", f"K_e = {number(law.gains)} {at}"
+        yield "", fed
+        yield "", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"
+        yield "", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"
+        return
+    yield "law", f"{controller.kind} {at}"
+    own = {name: value for name, value in fields.items() if name not in ControllerSettings.model_fields}
+    if own:
+        yield "", assignments(own)
+    yield "", fed if needs(law) else "takes nothing of the observer, which is judged only"
+    if controller.kind not in LAWS:
+        yield "", "your own code, which was imported and tried on two samples"
+
+
+def rig_description(name: str, scenario: Scenario, design: Design, rig: RigFacts, axis: str = "") -> str:
+    """What `cmg-mj check` prints of a model file by itself.
+
+    Args:
+        name: What the user called it.
+        scenario: One with this model and all defaults.
+        design: What the defaults amount to.
+        rig: What the model amounts to.
+        axis: The name of the axis, if it has one.
+
+    Returns:
+        Lines of text.
+    """
+    about = f" --set push.0.axis={axis}" if axis else ""
+    reduced = rig.reduced
+    share = f", for one of {reduced.gimbals} gimbals" if reduced.gimbals > 1 else ""
+    rows = [
+        ("cubes", ", ".join(rig.cubes)),
+        ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
+        ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
+        ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
+        ("law", f"Table 2's gains, K_e = {number(TABLE_2_GAINS)}"),
+        *(("hint", hint) for hint in hints(scenario, design, rig)),
+        ("run it", f"cmg-mj run push_recovery --set plant.model={name}{about}"),
+    ]
+    return lines(f"{name}: a rig{f', axis {axis}' if axis else ''}", rows)
+
+
+def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:
+    """A title, and rows of a label and a text."""
+    return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows)])
+
+
+def assignments(values: Mapping[str, Any]) -> str:
+    """Parameters and their values, as `--set` takes them."""
+    return "  ".join(f"{name}={number(value)}" for name, value in values.items())
+
+
+def number(value: Any) -> str:
+    """A value as TOML writes it, to six digits."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(number(item) for item in value)}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

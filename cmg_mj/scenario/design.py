@@ -1,0 +1,141 @@
+"""What a scenario asks of the controller, made for one reduced model and tried: the law and the observers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmg_mj.controllers.dry_run import rehearse, rehearse_law
+from cmg_mj.controllers.integrator_trim import trim_of
+from cmg_mj.controllers.laws import LAWS, Law
+from cmg_mj.controllers.laws.protocol import NEEDS, needs
+from cmg_mj.controllers.laws.registry import OF_LAWS, law_class
+from cmg_mj.errors import InputError
+from cmg_mj.observers import Observer, make_observer, observer_class
+from cmg_mj.observers.protocol import extra_signals
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.observers.registry import OF_OBSERVERS
+from cmg_mj.scenario.loading import located, unknown_to_law
+from cmg_mj.scenario.plant_parameters import RigFacts
+from cmg_mj.scenario.schema import ControllerSettings, Scenario
+from cmg_mj.scenario.time_grid import check_times
+from cmg_mj.sensors.tilt import TiltNoise
+
+
+@dataclass(frozen=True)
+class Design:
+    """The law of a scenario, and its observers.
+
+    What a user has written is made anew whenever it is asked for: it may remember more than its state holds.
+
+    Attributes:
+        scenario: What it was made from.
+        rig: The rig it was made for.
+        law: The control law, to be looked at: what runs is `fresh_law`.
+    """
+
+    scenario: Scenario
+    rig: RigFacts
+    law: Law
+
+    @property
+    def given(self) -> tuple[float, ReducedModel, TiltNoise]:
+        """What every observer is given: the control period [s], the reduced model, the noise by the datasheet."""
+        return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors)
+
+    def fresh_law(self) -> Law:
+        """The law, fresh."""
+        controller = self.scenario.controller
+        return self.law if controller.kind in LAWS else controller.law(*self.given[1:])
+
+    def observer(self) -> Observer:
+        """The observer in the loop, fresh."""
+        return self.scenario.observer.make(*self.given)
+
+    def companions(self) -> dict[str, Observer]:
+        """Those that ride along, by name, fresh."""
+        return {name: make_observer(name, *self.given) for name in self.scenario.companion_names()}
+
+    def rehearse(self, worlds: int | None = None) -> None:
+        """Try the law and every observer once: one that cannot work is found before a run, not at its first sample.
+
+        Args:
+            worlds: Try it on arrays of so many worlds; None for floats.
+
+        Raises:
+            InputError: One raised an exception or returned something else than it must.
+        """
+        tried = [("observer.kind =", self.scenario.observer.kind, self.observer())]
+        tried += [("companions:", name, observer) for name, observer in self.companions().items()]
+        with np.errstate(all="ignore"):
+            for field, name, observer in tried:
+                try:
+                    rehearse(observer, worlds)
+                except InputError as error:
+                    raise InputError(f"{field} {name!r}: {error}") from error
+            try:
+                rehearse_law(self.fresh_law(), len(extra_signals(tried[0][2])), worlds)
+            except InputError as error:
+                raise InputError(f"controller.kind = {self.scenario.controller.kind!r}: {error}") from error
+
+
+def design(scenario: Scenario, rig: RigFacts) -> Design:
+    """Check what pydantic could not, construct the law and the observers, and try them once.
+
+    Args:
+        scenario: The scenario.
+        rig: Its rig.
+
+    Returns:
+        The design.
+
+    Raises:
+        InputError: Something in the scenario does not fit.
+    """
+    try:
+        check_times(scenario)
+        _check_observers(scenario)
+        controller = scenario.controller
+        _check_law(controller)
+        made = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
+        made.rehearse()
+        trim_of(controller.trim_s, made.law, extra_signals(made.observer()))
+    except InputError as error:
+        raise InputError(located(scenario._where, str(error))) from error
+    return made
+
+
+def _check_observers(scenario: Scenario) -> None:
+    """The observers exist, and the parameters of the one in the loop are of their types: no text for a number."""
+    named = [("companions", name) for name in scenario.companion_names()]
+    named += [("compare.observers", name) for name in (scenario.compare.names() if scenario.compare else ())]
+    for field, name in named:
+        try:
+            observer_class(name)
+        except InputError as error:
+            raise InputError(str(error).replace("observer.kind = ", f"{field}: ", 1)) from error
+    OF_OBSERVERS.check_types(scenario.observer.kind, scenario.observer.parameters)
+
+
+def _check_law(controller: ControllerSettings) -> None:
+    """The law exists, knows its parameters, which are of their types, and has a use for every field that is set."""
+    kind, parameters = controller.kind, controller.parameters
+    law = law_class(kind)
+    OF_LAWS.check_types(kind, parameters)
+    for wrong in unknown_to_law(kind, parameters):
+        raise InputError(wrong)
+    given = next((name for name in ("gains", "lqr") if getattr(controller, name) is not None), None)
+    if given and not OF_LAWS.may_take(kind, "gains"):
+        raise InputError(f"controller.{given}: {kind} takes no gains; leave it out")
+    try:
+        unused = () if needs(law) == NEEDS else ("feedback", "angles")
+    except InputError as error:
+        raise InputError(f"controller.kind = {kind!r}: {error}") from error
+    for name in unused:
+        value, usual = getattr(controller, name), ControllerSettings.model_fields[name].default
+        if value != usual:
+            raise InputError(
+                f"controller.{name} = {value!r}: {kind} takes nothing of the observer and has no use "
+                f"for this; leave it out, or set controller.{name}={usual}"
+            )

@@ -1,0 +1,108 @@
+"""Torques from outside: pushes, held for a while, and swings, sinusoids such as the legs' of a gait."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar
+from cmg_mj.inputs.field_types import STRICT, Duration, Instant
+
+AFTER_PUSH_S = 1.0
+"""What an estimate is worth shows from a push's start until so long after its end [s]: at other times the rig hardly
+moves, and an estimate of zero does well."""
+
+Window = tuple[float, float]
+"""Start, included, and end, excluded [s]."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class Push:
+    """A torque from outside.
+
+    Attributes:
+        start_s: When it begins [s].
+        duration_s: How long it lasts [s].
+        torque_n_m: Torque about the tilt axis [N m].
+        axis: Name of that axis, on a rig of several.
+    """
+
+    start_s: Instant
+    duration_s: Duration = 0.1
+    torque_n_m: float = 1.0
+    axis: str | None = None
+
+    @property
+    def end_s(self) -> float:
+        """When it ends [s]."""
+        return self.start_s + self.duration_s
+
+
+@dataclass(frozen=True, config=STRICT)
+class Swing:
+    """A sinusoidal torque from outside. It is held from sample to sample, at its value in the middle.
+
+    Attributes:
+        frequency_hz: Of the sinusoid [Hz].
+        amplitude_n_m: Of the torque about the tilt axis [N m].
+        phase_deg: At its start [deg].
+        start_s: When it begins [s].
+        duration_s: How long it lasts; left out, to the end [s].
+        axis: Name of the axis, on a rig of several.
+    """
+
+    frequency_hz: Annotated[float, Field(gt=0.0, le=20.0)]
+    amplitude_n_m: float = 0.5
+    phase_deg: float = 0.0
+    start_s: Instant = 0.0
+    duration_s: Duration | None = None
+    axis: str | None = None
+
+    def torque(self, time: float) -> float:
+        """At a time [N m]."""
+        since = time - self.start_s
+        if since < 0.0 or (self.duration_s is not None and since >= self.duration_s):
+            return 0.0
+        return self.amplitude_n_m * math.sin(2.0 * math.pi * self.frequency_hz * since + math.radians(self.phase_deg))
+
+
+def push_windows(pushes: Iterable[Push]) -> list[Window]:
+    """From each push's start to a second after its end; those that overlap or touch are one."""
+    windows: list[Window] = []
+    for start, end in sorted((push.start_s, push.end_s + AFTER_PUSH_S) for push in pushes):
+        if windows and start <= windows[-1][1]:
+            windows[-1] = windows[-1][0], max(end, windows[-1][1])
+        else:
+            windows.append((start, end))
+    return windows
+
+
+def inside(time: np.ndarray, windows: Sequence[Window]) -> np.ndarray:
+    """Which of these times [s] lie in any of the windows; the same shape."""
+    found = np.zeros(np.shape(time), dtype=bool)
+    for start, end in windows:
+        found |= (time > start - 1e-9) & (time < end - 1e-9)
+    return found
+
+
+def swung(torques: list[Scalar], swings: Sequence[Swing], axes: Sequence[str], time: float) -> list[Scalar]:
+    """Each axis' torque with that of the swings.
+
+    Args:
+        torques: Without them, one an axis [N m].
+        swings: The swings; one about an axis that the rig does not have, since it is locked, moves nothing.
+        axes: The axes' names.
+        time: When [s].
+
+    Returns:
+        The sums; the list itself if there is no swing.
+    """
+    if not swings:
+        return torques
+    added = [sum(swing.torque(time) for swing in swings if (swing.axis or axes[0]) == axis) for axis in axes]
+    return [torque + more for torque, more in zip(torques, added, strict=True)]

@@ -1,0 +1,39 @@
+"""A rig as numbers: all that the controller, the observers and the checks of a scenario take from its model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
+
+
+class RigFacts(NamedTuple):
+    """What a scenario's controller and observers are made from.
+
+    Attributes:
+        path: The model's file.
+        cubes: Names of its modules.
+        reduced: Its reduced model.
+        tilt: The tilt estimate for its accelerometers.
+        gravity: [m/s^2].
+        largest_step: The largest physics step that is accurate enough [s].
+        hints: What on it is not what the reduced model takes it for, in clauses.
+    """
+
+    path: Path
+    cubes: tuple[str, ...]
+    reduced: ReducedModel
+    tilt: RadialTilt
+    gravity: float
+    largest_step: float
+    hints: tuple[str, ...]
+
+    def noise(self, sensors: Sensors) -> TiltNoise:
+        """The noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""
+        gimbal = sensors.encoder.deviation / math.sqrt(self.reduced.gimbals)
+        return replace(self.tilt.noise(sensors.accelerometer.deviation, self.gravity), gimbal=gimbal)

@@ -1,0 +1,77 @@
+"""Which rig, and how it differs from its model file: what a scenario says of the plant, checked without MuJoCo."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Annotated, Literal
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
+
+FINEST_STEP_S = 1e-6
+"""The smallest physics step [s]."""
+Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
+
+
+@dataclass(frozen=True, config=STRICT)
+class PlantSettings:
+    """Which rig, and how it differs from its model file. Where a field is None, the file decides.
+
+    Attributes:
+        model: A bundled MJCF by name, or a path.
+        equilibrium_bias_deg: e: the centre of mass of all that tilts is turned about the pivot by this angle [deg].
+        initial_tilt_deg: x1(0), from the true equilibrium [deg].
+        timestep_s: Physics step [s]; left out, the largest that divides the control's and the sensors' periods, meets
+            the pushes' edges, follows the rig's fastest motion (`step_limit.py`) and is not above the model file's own.
+        integrator: MuJoCo's integrator. Fast flywheels need RK4.
+        lock_thrust_bearing: Take the yaw joint out.
+        locked_axes: Of several axes those whose hinges are taken out. Their cubes stay: wheels turning, gimbals held.
+        turn_rate_rad_s: At which the rig turns about the vertical from the start, held by its `yaw_servo` [rad/s].
+        gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
+        gimbal_friction_n_m: Dry friction of each gimbal [N m].
+        gimbal_damping_n_m_s: Viscous friction of each gimbal [N m s/rad].
+        gimbal_backlash_arcmin: Play between each gimbal and its servo's motor, held by friction [arcmin].
+        servo_stiffness_n_m_rad: Of each gimbal servo's position loop [N m/rad].
+        servo_damping_n_m_s_rad: Of each gimbal servo's position loop [N m s/rad].
+        accelerometer_inner_m: The inner accelerometer's distance from the tilt axis on the radial line [m]. The tilt
+            estimate knows it.
+        accelerometer_outer_m: The outer accelerometer's [m].
+        tilt_friction_n_m: Dry friction of the tilt joint [N m].
+        tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
+        flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
+        flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
+    """
+
+    model: str = "scissored_pair.xml"
+    equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 0.5
+    initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 1.0
+    timestep_s: Annotated[float, Field(ge=FINEST_STEP_S, le=0.1)] | None = None
+    integrator: Integrator = "RK4"
+    lock_thrust_bearing: bool = False
+    locked_axes: tuple[str, ...] = ()
+    turn_rate_rad_s: float = 0.0
+    gimbal_armature_kg_m2: NonNegative | None = None
+    gimbal_friction_n_m: NonNegative | None = None
+    gimbal_damping_n_m_s: NonNegative | None = None
+    gimbal_backlash_arcmin: Annotated[float, Field(ge=0.0, lt=5400.0)] = 0.0
+    servo_stiffness_n_m_rad: Positive | None = None
+    servo_damping_n_m_s_rad: NonNegative | None = None
+    accelerometer_inner_m: Positive | None = None
+    accelerometer_outer_m: Positive | None = None
+    tilt_friction_n_m: NonNegative | None = None
+    tilt_damping_n_m_s: NonNegative | None = None
+    flywheel_speed_rad_s: Positive | None = None
+    flywheel_imbalance_kg_m: float = 0.0
+
+    def changes(self) -> dict[str, float]:
+        """What is given of friction, damping, inertia, backlash, servos, wheels and places of the accelerometers."""
+        of = ("gimbal", "servo", "accelerometer", "tilt", "flywheel")
+        fields = [field for field in dataclasses.fields(self) if field.name.startswith(of)]
+        return {field.name: value for field in fields if (value := getattr(self, field.name)) != field.default}
+
+    def changes_of_physics(self) -> dict[str, float]:
+        """What of these moves masses and makes torques."""
+        others = ("accelerometer_inner_m", "accelerometer_outer_m", "gimbal_backlash_arcmin")
+        return {name: value for name, value in self.changes().items() if name not in others}

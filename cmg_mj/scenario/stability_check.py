@@ -1,0 +1,149 @@
+"""Whether the gains suit the rig: the control law on its reduced model, sampled and delayed as the scenario says."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
+from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
+from cmg_mj.scenario.design import Design
+from cmg_mj.scenario.plant_parameters import RigFacts
+from cmg_mj.scenario.schema import Scenario
+
+POOR_DAMPING = 0.4
+"""A mode with a smaller damping ratio overshoots by more than a quarter."""
+POOR_DISTANCE = 0.7
+"""The loop transfer's least distance from -1 of a robust loop: a maximum sensitivity of at most 1.4."""
+MOST_PERIODS_LATE = 200  # a loop with a longer delay is unstable long before
+
+
+class Loop(NamedTuple):
+    """The closed loop on the reduced model's linearisation (6), with the true state as its input.
+
+    Attributes:
+        poles: Of the sampled loop, as poles of a continuous one [1/s].
+        damping: The least damping ratio of its modes, those left out that have faded within the loop's own lag.
+        distance: The least distance of the loop transfer from -1; 1 or a little less for every LQR.
+        period: Of the slowest of the control and the sensors that it uses [s].
+        delay: The longest latency of these sensors [s].
+        suited: Whether the gains would do without sampling and delay.
+    """
+
+    poles: np.ndarray
+    damping: float
+    distance: float
+    period: float
+    delay: float
+    suited: bool
+
+    @property
+    def slowest(self) -> float:
+        """Real part of the slowest pole [1/s]."""
+        return float(np.max(np.real(self.poles)))
+
+    @property
+    def words(self) -> str:
+        """`stable`, `MARGINAL` or `UNSTABLE`."""
+        return "stable" if self.slowest < -MARGIN else "MARGINAL" if self.slowest < MARGIN else "UNSTABLE"
+
+    @property
+    def hint(self) -> str | None:
+        """What is wrong with the gains, if anything is."""
+        remedy = (
+            "a higher rate or less latency is needed" if self.suited else "[controller.lqr] solves for gains that suit"
+        )
+        late = f", {self.delay:g} s late" if self.delay else ""
+        where = f"on this rig's reduced model, sampled every {self.period:g} s{late}"
+        if self.slowest >= MARGIN:
+            return f"controller: the closed loop is unstable {where} (pole at {self.slowest:.3g} 1/s); {remedy}"
+        if self.damping < POOR_DAMPING:
+            return (
+                f"controller: the closed loop is poorly damped {where} (damping ratio {self.damping:.2f}, good is "
+                f"{POOR_DAMPING:g} or more); {remedy}"
+            )
+        if self.distance < POOR_DISTANCE:
+            return (
+                f"controller: the closed loop has little margin {where} (its transfer comes within {self.distance:.2f} "
+                f"of -1, good is {POOR_DISTANCE:g} or more); {remedy}"
+            )
+        return None
+
+
+def closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) -> Loop:
+    """The loop that a scenario's gains make.
+
+    Args:
+        scenario: The scenario: its rates, its latencies and which signals the law uses.
+        law: The law.
+        model: The rig's reduced model.
+
+    Returns:
+        The loop.
+    """
+    sensors = scenario.sensors
+    used = [sensors.accelerometer, sensors.encoder, *([sensors.fog] if scenario.controller.feedback == "fog" else [])]
+    period = max(law.dt, *(1.0 / sensor.rate_hz for sensor in used))
+    delay = max(sensor.latency_s for sensor in used)
+    K = np.array([law.gains])
+    late = min(math.floor(delay / period + 1e-9), MOST_PERIODS_LATE)  # whole periods, and the rest of one
+    rest = max(delay - late * period, 0.0) if late < MOST_PERIODS_LATE else 0.0
+    before, after = _held(model, rest), _held(model, period - rest)
+    A = after[0] @ before[0]
+    newer, older = after[1], after[0] @ before[1]  # what u of `late` periods ago does, and the one before it
+    n, waiting = len(A), late + 1
+    F = np.zeros((n + waiting, n + waiting))
+    F[:n, :n] = A
+    F[n, :n] = -K
+    F[n + 1 :, n:-1] = np.eye(waiting - 1)
+    F[:n, n + late] += older[:, 0]
+    if late:
+        F[:n, n + late - 1] += newer[:, 0]
+    else:
+        F[:n, :n] -= newer @ K
+    z = np.linalg.eigvals(F)
+    poles = np.log(np.where(z == 0.0, np.finfo(float).tiny, z).astype(complex)) / period
+    around = np.exp(1j * np.geomspace(1e-4, math.pi, 2000))
+    distance = _distance(K, A, newer + older / around[:, None, None], around, around**-late)
+    swinging = poles[(-poles.real * (period + delay) < 1.0) & (np.abs(poles) > MARGIN)]
+    damping = float(np.min(-swinging.real / np.abs(swinging), initial=1.0))
+    up = 1j * np.geomspace(1e-3, 1e4, 2000)
+    ideal = _distance(K, model.A_e, model.B_e, up, 1.0)
+    suited = ideal >= POOR_DISTANCE and is_hurwitz(closed_loop_poles(model, law.gains))
+    return Loop(poles, damping, distance, period, delay, suited)
+
+
+def _distance(K: np.ndarray, A: np.ndarray, B: np.ndarray, along: np.ndarray, delayed: Any) -> float:
+    """The least distance from -1 of K (s - A)^-1 B, (n_points,) values of s or z along the border of stability."""
+    transfer = K @ np.linalg.solve(
+        along[:, None, None] * np.eye(len(A)) - A, np.broadcast_to(B, (len(along), len(A), 1))
+    )
+    return float(np.min(np.abs(1.0 + transfer[:, 0, 0] * delayed)))
+
+
+def hints(scenario: Scenario, design: Design, rig: RigFacts) -> list[str]:
+    """What is no mistake and yet likely to make a rig fall.
+
+    Args:
+        scenario: The scenario.
+        design: The law and the observers.
+        rig: What they were made for.
+
+    Returns:
+        Clauses.
+    """
+    law = design.law
+    loop = closed_loop(scenario, law, rig.reduced).hint if isinstance(law, StateFeedback) else None
+    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *([loop] if loop else [])]
+
+
+def _held(model: ReducedModel, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """The linearisation (6) with the integrator after a time with the command held: x+ = A x + B u."""
+    n = len(model.A_e)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n:] = model.A_e, model.B_e
+    whole = expm(whole * time)
+    return whole[:n, :n], whole[:n, n:]

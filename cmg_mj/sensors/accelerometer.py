@@ -1,0 +1,216 @@
+"""The two accelerometers of the tilt, with all that a cheap part and its mounting do to them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar, clip, digitise
+from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Positive, Rate
+from cmg_mj.sensors.ideal import Ideal
+from cmg_mj.sensors.low_pass import low_pass, noise_gain
+
+STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
+INSIDE_HZ = 1000.0
+"""The part's own sampling, at which its low-pass works (MPU-6050: the accelerometer's output rate)."""
+NARROWEST_HZ = 1.0
+"""No part has a narrower low-pass, and one needs as many samples to settle [Hz]."""
+CROSSWISE = [1, 0, 3, 2]
+"""Each channel's other axis of the same part."""
+
+Share = Annotated[float, Field(gt=-1.0, lt=1.0)]
+Angle = Annotated[float, Field(gt=-45.0, lt=45.0)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Accelerometer:
+    """A pair of accelerometers of the MPU-6050 class (InvenSense PS-MPU-6000A: 400 ug/rtHz, +-2 g, 16384 counts/g).
+
+    Its zero-g offset is tens of mg before calibration; the default is what calibration leaves, zero. An offset
+    on the tangential axes acts like the equilibrium bias e. What else a part and its mounting do is off by default; the
+    datasheet allows a scale error of 3 % and a cross-axis sensitivity of 2 % before calibration.
+
+    What happens to a reading, in this order: misalignment, cross-axis, scale, offset, noise (white, then 1/f), range,
+    low-pass, resolution. What the low-pass overshoots is cut off at the range once more.
+
+    Attributes:
+        rate_hz: Samples a second.
+        noise_density_ug_rthz: White noise, one-sided density; one sample's sigma is density * sqrt(rate/2).
+        bias_mg: Offsets of the tangential axes of the inner and the outer accelerometer [mg].
+        range_g: Readings saturate here [g].
+        counts_per_g: Resolution; 0 for none.
+        latency_s: From sampling to delivery [s].
+        scale_error: The slope less one of both axes, of the inner and the outer accelerometer.
+        misalignment_deg: How far the inner and the outer accelerometer are turned in the tilting plane, positive as a
+            positive tilt [deg].
+        cross_axis: The share of its other axis that each axis shows, of the inner and the outer accelerometer.
+        skew_s: How much older the outer's sample is than the inner's [s]; at most one sample period.
+        bias_instability_ug: Floor of the Allan deviation that each axis' 1/f noise has [ug].
+        bandwidth_hz: Of the part's second-order low-pass, which works at 1 kHz [Hz]; 0 for none. (The MPU-6050 can be
+            set to 5, 10, 21, 44, 94 or 184 Hz.)
+    """
+
+    rate_hz: Rate = 200.0
+    noise_density_ug_rthz: NonNegative = 400.0
+    bias_mg: tuple[float, float] = (0.0, 0.0)
+    range_g: Positive = 2.0
+    counts_per_g: NonNegative = 16384.0
+    latency_s: Instant = 0.0
+    scale_error: tuple[Share, Share] = (0.0, 0.0)
+    misalignment_deg: tuple[Angle, Angle] = (0.0, 0.0)
+    cross_axis: tuple[Share, Share] = (0.0, 0.0)
+    skew_s: NonNegative = 0.0
+    bias_instability_ug: NonNegative = 0.0
+    bandwidth_hz: Annotated[float, Field(ge=0.0, lt=INSIDE_HZ / 2.0)] = 0.0
+
+    channels = 4
+
+    @field_validator("skew_s")
+    @classmethod
+    def _within_a_period(cls, skew_s: float, info: ValidationInfo) -> float:
+        rate = info.data.get("rate_hz")
+        if rate and skew_s > (1.0 + 1e-9) / rate:
+            raise ValueError(f"{skew_s:g} s: at most one sample period, {1.0 / rate:g} s at rate_hz = {rate:g}")
+        return skew_s
+
+    @field_validator("bandwidth_hz")
+    @classmethod
+    def _rate_divides(cls, bandwidth_hz: float, info: ValidationInfo) -> float:
+        if 0.0 < bandwidth_hz < NARROWEST_HZ:
+            raise ValueError(f"{bandwidth_hz:g} Hz: at least {NARROWEST_HZ:g} Hz, or 0 for no low-pass")
+        rate = info.data.get("rate_hz")
+        if bandwidth_hz and rate and abs(round(INSIDE_HZ / rate) * rate - INSIDE_HZ) > 1e-6:
+            raise ValueError(
+                f"a part with a low-pass samples at {INSIDE_HZ:g} Hz, which rate_hz = {rate:g} must divide"
+            )
+        return bandwidth_hz
+
+    @property
+    def raw_rate_hz(self) -> float:
+        """Samples a second that the part takes: more than it delivers if it filters them."""
+        return INSIDE_HZ if self.bandwidth_hz else self.rate_hz
+
+    @property
+    def raw_sigma(self) -> float:
+        """Standard deviation of the white noise of one sample that the part takes [m/s^2]."""
+        return self.noise_density_ug_rthz * 1e-6 * STANDARD_GRAVITY * math.sqrt(self.raw_rate_hz / 2.0)
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the white noise of one sample that is delivered [m/s^2]."""
+        if not self.bandwidth_hz:
+            return self.raw_sigma
+        return self.raw_sigma * math.sqrt(noise_gain(self.bandwidth_hz, INSIDE_HZ))
+
+    @property
+    def deviation(self) -> float:
+        """Of one sample from the mean, with what the resolution adds: what a filter is told [m/s^2]."""
+        step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
+        return math.hypot(self.sigma, step / math.sqrt(12.0))
+
+    @property
+    def bias(self) -> tuple[float, float]:
+        """Offsets of the tangential axes of the inner and the outer accelerometer [m/s^2]."""
+        inner, outer = (bias * 1e-3 * STANDARD_GRAVITY for bias in self.bias_mg)
+        return inner, outer
+
+    @property
+    def floor(self) -> float:
+        """Of the Allan deviation of each axis' 1/f noise [m/s^2]."""
+        return self.bias_instability_ug * 1e-6 * STANDARD_GRAVITY
+
+    @property
+    def imperfections(self) -> dict[str, Any]:
+        """What is switched on beyond noise, range and resolution: field -> its value."""
+        names = [field.name for field in dataclasses.fields(self)]
+        of = ["bias_mg", *names[names.index("scale_error") :]]
+        return {name: value for name in of if (value := getattr(self, name)) not in (0.0, (0.0, 0.0))}
+
+    def constant_errors(self) -> Callable[[Any], Any]:
+        """A function: true specific forces (inner x, z, outer x, z) -> what parts without noise show [m/s^2].
+
+        Floats become a tuple of four floats, an array (4, n_worlds) one of the same shape.
+        """
+        own, other = [], []  # weights of a channel's own axis and of the other one
+        parts = zip(self.scale_error, self.misalignment_deg, self.cross_axis, strict=True)
+        for scale, misalignment, cross in parts:
+            c, s = math.cos(math.radians(misalignment)), math.sin(math.radians(misalignment))
+            own += [(1.0 + scale) * (c + cross * s), (1.0 + scale) * (c - cross * s)]
+            other += [(1.0 + scale) * (cross * c - s), (1.0 + scale) * (cross * c + s)]
+        inner, outer = self.bias
+        offsets = [inner, 0.0, outer, 0.0]
+        if own == [1.0] * 4 and other == [0.0] * 4:
+            column = np.array(np.broadcast_arrays(*offsets)).reshape(4, -1)
+
+            def shifted(forces: Any) -> Any:
+                if isinstance(forces, np.ndarray):
+                    return forces + column
+                ix, iz, ox, oz = forces
+                return ix + inner, iz, ox + outer, oz
+
+            return shifted
+        by_own, by_other, by_one = (
+            np.array(np.broadcast_arrays(*weights)).reshape(4, -1) for weights in (own, other, offsets)
+        )
+
+        def distorted(forces: Any) -> Any:
+            if isinstance(forces, np.ndarray):
+                return by_own * forces + by_other * forces[CROSSWISE] + by_one
+            crossed = [forces[i] for i in CROSSWISE]
+            return tuple(a * x + b * z + c for a, x, b, z, c in zip(own, forces, other, crossed, offsets, strict=True))
+
+        return distorted
+
+    def meter(self, drift: Callable[[], Any] | None = None) -> Callable[[Ideal, Sequence[Scalar]], Any]:
+        """The parts at work: to be called once for every sample that they take (`raw_rate_hz`).
+
+        Args:
+            drift: What the 1/f noise adds to the next sample, four numbers or an array (4, n_worlds) [m/s^2].
+
+        Returns:
+            A function (ideal reading, standard normals) -> reading: inner x, z, outer x, z [m/s^2]. It remembers its
+            low-pass, which starts settled.
+        """
+        sigma = self.raw_sigma
+        limit = self.range_g * STANDARD_GRAVITY
+        step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
+        erring = self.constant_errors()
+        filters: list[Callable[[Scalar], Scalar]] = []
+
+        def filtered(number: int, x: Scalar) -> Scalar:
+            x = clip(x, -limit, limit)
+            if len(filters) <= number:
+                filters.append(low_pass(self.bandwidth_hz, INSIDE_HZ, x))
+            return filters[number](x)
+
+        def measure(ideal: Ideal, normal: Sequence[Scalar]) -> Any:
+            forces = erring(ideal.accelerations)
+            wander = drift() if drift else None
+            if isinstance(forces, np.ndarray):
+                raw = forces + sigma * np.asarray(normal)
+                if wander is not None:
+                    raw = raw + wander
+                if self.bandwidth_hz:
+                    raw = filtered(0, raw)
+                return digitise(raw, limit, step)
+            n0, n1, n2, n3 = normal
+            ix, iz, ox, oz = forces
+            a, b, c, d = ix + sigma * n0, iz + sigma * n1, ox + sigma * n2, oz + sigma * n3
+            if wander is not None:
+                a, b, c, d = (reading + more for reading, more in zip((a, b, c, d), wander, strict=True))
+            if self.bandwidth_hz:
+                a, b, c, d = (filtered(i, reading) for i, reading in enumerate((a, b, c, d)))
+            return (
+                digitise(a, limit, step),
+                digitise(b, limit, step),
+                digitise(c, limit, step),
+                digitise(d, limit, step),
+            )
+
+        return measure

@@ -1,0 +1,471 @@
+"""A scenario made ready to run."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from cmg_mj.codegen.board import Board, on_a_board
+from cmg_mj.controllers.controller import Controller
+from cmg_mj.controllers.laws import Law
+from cmg_mj.controllers.multi_axis import AxesController
+from cmg_mj.controllers.processor import Processor
+from cmg_mj.errors import InputError, nearest
+from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.overrides import assign
+from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.results.result import Driver, Result
+from cmg_mj.results.trajectory import whole_file
+from cmg_mj.scenario.design import Design, design
+from cmg_mj.scenario.differences import differences
+from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.loading import as_fields, base_of, located, of_axis, parse_scenario
+from cmg_mj.scenario.resolve import resolved, with_axes
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.scenario.stability_check import hints
+from cmg_mj.scenario.time_grid import check_steps, common_period
+from cmg_mj.simulation.pool import differs, pooled, structure
+from cmg_mj.simulation.simulate import simulate
+from cmg_mj.simulation.stacked import stacked
+
+ON_THE_BOARD = "Run on the emulated board (docs/board.md), whose numbers are not quite the host's."
+ANOTHER_WORLD = "World {world}: its noise is not that of world 0."
+"""Above a scenario that does not rerun to the same numbers by itself."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Experiment:
+    """A scenario made ready to run: its plant is loaded, everything in it has been constructed once and fits.
+
+    Attributes:
+        scenario: What it was made from.
+        plant: The rig.
+        design: The law and the observers; of several axes the first one's.
+        axes: One an axis, if the rig has several, or if the scenario says of an axis what it has of its own.
+    """
+
+    scenario: Scenario
+    plant: Plant
+    design: Design
+    axes: tuple[Experiment, ...] = ()
+
+    @property
+    def law(self) -> Law:
+        """The control law."""
+        return self.design.law
+
+    @property
+    def observer_title(self) -> str:
+        """The observer in the loop; of several axes with observers of their own, each with its axis."""
+        kinds = [own.scenario.observer.kind for own in self.parts]
+        if len(set(kinds)) == 1:
+            return kinds[0]
+        return ", ".join(f"{own.plant.axis.name} {kind}" for own, kind in zip(self.parts, kinds, strict=True))
+
+    @property
+    def observer_names(self) -> list[str]:
+        """The observer in the loop, then the companions; of several axes the first one's."""
+        if self.axes:
+            return self.axes[0].observer_names
+        return [self.scenario.observer.kind, *self.scenario.companion_names()]
+
+    def controller(self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, **others: Any) -> Any:
+        """A fresh controller.
+
+        Args:
+            worlds: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
+            processor: What takes its decisions in its place.
+            **others: `observer`, `law`, `sensors`, `tilt` and `backlash` instead of the scenario's.
+
+        Returns:
+            The controller; of several axes an `AxesController`.
+
+        Raises:
+            InputError: A processor is to take the decisions of several axes.
+        """
+        if self.axes:
+            if processor is not None:
+                self.only_axis("a board or other processor")
+                others["processor"] = processor
+            return self._of_axes([own.controller(worlds, **others, axis=i) for i, own in enumerate(self.axes)])
+        settings = self.scenario.controller
+        given: dict[str, Any] = {"sensors": self.scenario.sensors} | others
+        given.setdefault("law", self.design.fresh_law())
+        return self.plant.controller(
+            given.pop("observer", None) or self.design.observer(),
+            **given,
+            seed=self.scenario.seed,
+            worlds=worlds,
+            feedback=settings.feedback,
+            angles=settings.angles,
+            trim_s=settings.trim_s,
+            companions=self.design.companions(),
+            processor=processor,
+        )
+
+    def _of_axes(self, controllers: Sequence[Controller]) -> Any:
+        """The controllers of the axes as one."""
+        if len(controllers) == 1:
+            return controllers[0]
+        against = self.scenario.controller.against_turning
+        return AxesController(controllers, self.plant.turning if against else None, self.scenario.sensors.mems_gyro)
+
+    def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
+        """Run one world. Options are those of `simulate`."""
+        if driver == "board":
+            self.only_axis("the board")
+            with on_a_board(self.controller()) as board:
+                return self.run_on(board, world, **options)
+        return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
+
+    def run_on(self, processor: Processor, world: int = 0, **options: Any) -> Result:
+        """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
+        result = self.simulate(self.plant, self.controller(int(world), processor), **options)
+        return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
+
+    def run_many(
+        self,
+        worlds: int | Sequence[int],
+        plants: Sequence[Plant] | None = None,
+        vary: Mapping[str, Sequence[Any] | np.ndarray] | None = None,
+        **options: Any,
+    ) -> Result:
+        """Run many worlds at once.
+
+        Args:
+            worlds: How many, or their numbers: world i has the same noise wherever it stands.
+            plants: A plant a world, if they differ.
+            vary: The same by settings: a field -> its value in each world, such as {"equilibrium_bias_deg": [0.0, 0.5],
+                "push.0.torque_n_m": [1.0, 2.0]}. Only numbers that worlds of one batch may differ in: see `pool.py`.
+            **options: Those of `simulate`.
+
+        Returns:
+            The result of all worlds.
+
+        Raises:
+            InputError: There is no world, or the plants do not fit the worlds or each other.
+        """
+        numbers = [int(number) for number in (range(worlds) if isinstance(worlds, int) else worlds)]
+        if vary is not None and plants is not None:
+            raise InputError("run_many: give plants or vary, not both")
+        if vary is not None:
+            return run_together(self.varied(vary), numbers, **options)
+        rigs = [self.plant] * len(numbers) if plants is None else list(plants)
+        _require_alike([self.plant, *rigs], len(rigs), len(numbers))
+        controllers = [own.controller(numbers, **_of_the_rigs(rigs, i)) for i, own in enumerate(self.parts)]
+        return self.simulate(rigs, self._of_axes(controllers), **options)
+
+    @property
+    def parts(self) -> tuple[Experiment, ...]:
+        """One an axis."""
+        return self.axes or (self,)
+
+    def varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
+        """The scenario with other settings in each world; worlds with equal settings share one.
+
+        Args:
+            vary: Field -> its value in each world. A field is named as with `--set`; one of [plant] by itself too.
+
+        Returns:
+            An experiment a world.
+
+        Raises:
+            InputError: There is no such field, a value is not allowed, or the lists differ in length.
+        """
+        lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in vary.values()]
+        if not lists or any(isinstance(values, str) or not isinstance(values, Sequence) for values in lists):
+            raise InputError('vary: must be lists of values by field, such as {"equilibrium_bias_deg": [0.0, 0.5]}')
+        if len({len(values) for values in lists}) > 1:
+            raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world")
+        ours = {field.name for field in dataclasses.fields(self.scenario.plant)}
+        for name in vary:
+            if "." not in name and name not in ours and name not in Scenario.model_fields:
+                raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, ours)}")
+        names = [f"plant.{name}" if name in ours else name for name in vary]
+        made: dict[str, Experiment] = {}  # by what a value looks like: a wrong one may not be hashable
+        experiments = []
+        for row in zip(*lists, strict=True):
+            if repr(row) not in made:
+                made[repr(row)] = self.with_values(dict(zip(names, row, strict=True)))
+            experiments.append(made[repr(row)])
+        return experiments
+
+    def with_values(self, values: Mapping[str, Any]) -> Experiment:
+        """The same with other values of some fields.
+
+        Args:
+            values: By field, named as with `--set`.
+
+        Returns:
+            Another experiment; a model file that stays the same is not compiled again.
+
+        Raises:
+            InputError: There is no such field, or a value is not allowed.
+        """
+        fields = as_fields(self.scenario)
+        for name, value in values.items():
+            assign(fields, name, value, f"vary: {name!r}")
+        settings = ", ".join(f"{name}={value}" for name, value in values.items())
+        scenario = parse_scenario(fields, f"{self.scenario._where} with {settings}".strip())
+        return prepare(scenario, load_rig(scenario, self.plant))
+
+    def simulate(
+        self,
+        plant: Plant | Sequence[Plant],
+        controller: Controller,
+        pushes: Sequence[Push] | None = None,
+        **options: Any,
+    ) -> Result:
+        """Run a controller on one rig or several, for the scenario's time and judged by its settings.
+
+        Args:
+            plant: The rig, or one a world.
+            controller: A fresh one.
+            pushes: Instead of the scenario's.
+            **options: Those of `simulate`.
+
+        Returns:
+            The result.
+        """
+        scenario = self.scenario
+        return simulate(
+            plant,
+            controller,
+            scenario.duration_s,
+            observers={name: own.observer_names for name, own in zip(self.plant.axis_names, self.parts, strict=True)},
+            pushes=scenario.push if pushes is None else pushes,
+            swings=scenario.swing,
+            settings=scenario.metrics,
+            **options,
+        )
+
+    def only_axis(self, what: str) -> None:
+        """What takes one axis refuses a rig of several.
+
+        Args:
+            what: It.
+
+        Raises:
+            InputError: The rig has several.
+        """
+        if len(self.axes) > 1:
+            names = self.plant.axis_names
+            raise InputError(
+                f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one; lock the "
+                f'others, as with --set plant.locked_axes=["{names[-1]}"]'
+            )
+
+    @property
+    def hints(self) -> list[str]:
+        """What is no mistake and yet likely to make the rig fall, in clauses."""
+        if not self.axes:
+            return hints(self.scenario, self.design, self.plant.facts)
+        return [f"{own.plant.axis.name}: {hint}" for own in self.axes for hint in own.hints]
+
+    def rehearse(self, worlds: int | None = None) -> None:
+        """Try every observer once, on floats or on arrays of so many worlds: see `Design.rehearse`."""
+        for own in self.parts:
+            own.design.rehearse(worlds)
+
+    def resolved(self) -> dict[str, Any]:
+        """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
+        fields = resolved(self.scenario, self.design, self.plant.path, self.plant.timestep)
+        return with_axes(fields, self.scenario, {own.plant.axis.name: own.resolved() for own in self.axes})
+
+    @functools.cached_property
+    def differences(self) -> dict[str, Any]:
+        """What differs from the bundled scenario it is based on: `section.field` -> its value.
+
+        Title, seed and observer are left out; a scenario of the user's own differs from none.
+        """
+        base = base_of(self.scenario)
+        if base is None:
+            return {}
+        law = self.scenario.controller.kind
+        own = {} if law == base.controller.kind else {"controller.kind": law}
+        other = base.with_observer(self.scenario.observer.kind).with_law(law)
+        if other.model_dump(mode="json") == self.scenario.model_dump(mode="json"):
+            return own
+        try:
+            bundled = prepare(other)
+        except InputError:  # it does not suit this observer
+            bundled = prepare(base)
+        return own | differences(bundled.resolved(), self.resolved())
+
+    def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
+        """The resolved scenario: running it again gives the same run; its head says if that needs options."""
+        said = [(ON_THE_BOARD, "--driver board")] if driver == "board" else []
+        said += [(ANOTHER_WORLD.format(world=world), f"--world {world}")] if world else []
+        lines = [" ".join([*(why for why, _ in said), "To the same numbers it runs with"])]
+        lines += [" ".join(["    cmg-mj run scenario.toml", *(option for _, option in said)])]
+        head = "".join(f"# {line}\n" for line in lines) + "\n" if said else ""
+        return head + tomli_w.dumps(self.resolved())
+
+    def save(self, path: Path, driver: Driver = "native", world: int = 0) -> None:
+        """Write it as TOML."""
+        with whole_file(path) as temporary:
+            temporary.write_text(self.as_toml(driver, world), encoding="utf-8")
+
+
+def run_together(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Any) -> Result:
+    """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
+
+    Args:
+        experiments: One a world.
+        worlds: Their numbers: world i has the same noise in every experiment.
+        **options: Those of `simulate`.
+
+    Returns:
+        The result of all worlds, each as if it had run alone, bit for bit.
+
+    Raises:
+        InputError: They differ in something that worlds of one batch have in common.
+    """
+    first = experiments[0] if experiments else None
+    if first is None or len(experiments) != len(worlds):
+        raise InputError(
+            f"run_many: {len(worlds)} worlds and {len(experiments)} plants; give at least one, and as many of each"
+        )
+    _require_alike([each.plant for each in experiments], len(experiments), len(worlds))
+    common = _structure(first)
+    for other in {id(each): each for each in experiments}.values():
+        field = differs(common, _structure(other))
+        if field:
+            raise InputError(f"run_many: {field} differs, which worlds of one batch must have in common")
+    rigs, controller, pushes = of_one_batch(experiments, worlds)
+    return first.simulate(rigs, controller, pushes, **options)
+
+
+def of_one_batch(
+    experiments: Sequence[Experiment], worlds: Sequence[int], **others: Any
+) -> tuple[list[Plant], Controller, Sequence[Push]]:
+    """What a batch of different experiments is run with: a rig a world, a controller and the pushes of all worlds.
+
+    Args:
+        experiments: One a world.
+        worlds: Their numbers.
+        **others: What the controller has instead of the first experiment's: see `Experiment.controller`.
+
+    Returns:
+        For `Experiment.simulate`.
+    """
+    rigs = [each.plant for each in experiments]
+    first = experiments[0]
+    controllers, pushes = [], ()
+    for i, own in enumerate(first.parts):
+        parts = [each.parts[i] for each in experiments]
+        law, sensors, pushes = pooled(
+            [(each.design.fresh_law(), each.scenario.sensors, tuple(each.scenario.push)) for each in parts]
+        )
+        given = {"law": law, "sensors": sensors} | _of_the_rigs(rigs, i) | others
+        controllers.append(own.controller(worlds, **given))
+    return rigs, first._of_axes(controllers), pushes
+
+
+def _structure(experiment: Experiment) -> dict[str, str]:
+    """What worlds that run together have in common, of every axis."""
+    if not experiment.axes:
+        return structure(experiment.scenario, experiment.design)
+    parts = [(own.plant.axis.name, _structure(own)) for own in experiment.axes]
+    return {f"axes.{name}.{field}": value for name, found in parts for field, value in found.items()}
+
+
+def _of_the_rigs(rigs: Sequence[Plant], axis: int) -> dict[str, Any]:
+    """What a controller of many worlds has of an axis of their rigs."""
+    tilts = stacked([rig.axes[axis].radial_tilt for rig in rigs])
+    return {"tilt": tilts, "backlash": stacked([rig.backlash for rig in rigs]), "axis": axis}
+
+
+def _require_alike(rigs: Sequence[Plant], plants: int, worlds: int) -> None:
+    """What the plants of one batch must have in common."""
+    if not plants or plants != worlds:
+        raise InputError(f"run_many: {worlds} worlds and {plants} plants; give at least one, and as many of each")
+    different = set(rigs)
+    integrators = {int(rig.model.opt.integrator) for rig in different}
+    alike = {(rig.model.opt.timestep, *rig.joint_names, rig.joint_kinds) for rig in different}
+    if len(alike) > 1 or len(integrators) > 1:
+        raise InputError(
+            "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"
+        )
+
+
+def load_rig(scenario: Scenario, like: Plant | None = None) -> Plant:
+    """Load a scenario's rig.
+
+    Args:
+        scenario: The scenario.
+        like: A rig that may be of the same file, which then is not compiled again.
+
+    Raises:
+        InputError: `load_plant` refuses it; the scenario is named.
+    """
+    try:
+        period = common_period(scenario) if scenario.plant.timestep_s is None else None
+        settings = scenario.plant
+        of_axes = {name: of_axis(scenario, name).plant for name in scenario.axes}
+        same = ("model", "lock_thrust_bearing", "locked_axes")
+        if like is not None and all(getattr(like.settings, name) == getattr(settings, name) for name in same):
+            plant = like.changed(settings, period, of_axes)
+            check_steps(scenario, plant.timestep)
+            return plant
+        plant = load_plant(settings, period_s=period, of_axes=of_axes)
+        check_steps(scenario, plant.timestep)
+        if plant.path.resolve().parent != folder("models").resolve():
+            _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
+        return plant
+    except InputError as error:
+        raise InputError(located(scenario._where, str(error))) from error
+
+
+def prepare(scenario: Scenario, plant: Plant | None = None) -> Experiment:
+    """Load the plant, construct everything and try the observers once, so that what does not fit is found before a run.
+
+    Args:
+        scenario: The scenario.
+        plant: Its rig, if it has been loaded already.
+
+    Returns:
+        The experiment.
+
+    Raises:
+        InputError: Something in the scenario does not fit.
+    """
+    plant = load_rig(scenario) if plant is None else plant
+    try:
+        check_axes(scenario, plant)
+    except InputError as error:
+        raise InputError(located(scenario._where, str(error))) from error
+    if len(plant.axes) == 1 and not scenario.axes:
+        return Experiment(scenario, plant, design(scenario, plant.facts))
+    rigs = [(of_axis(scenario, name), plant.along(name)) for name in plant.axis_names]
+    axes = tuple(Experiment(own, rig, design(own, rig.facts)) for own, rig in rigs)
+    return Experiment(scenario, plant, axes[0].design, axes)
+
+
+def check_axes(scenario: Scenario, plant: Plant) -> None:
+    """Whatever names an axis names one of the rig's; on a rig of several every push does.
+
+    Raises:
+        InputError: It does not.
+    """
+    known = [*plant.axis_names, *plant.settings.locked_axes]
+    for name in scenario.axes:
+        if known == [""]:
+            raise InputError(f"axes.{name}: the rig has one axis, without a name; what it has stands in [plant], ...")
+        if name not in known:
+            raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
+    torques = [(f"push.{i}.axis", push.axis) for i, push in enumerate(scenario.push)]
+    torques += [(f"swing.{i}.axis", swing.axis) for i, swing in enumerate(scenario.swing)]
+    for field, axis in torques:
+        if axis is None and len(known) > 1:
+            raise InputError(f"{field}: the rig has several axes: which of {', '.join(known)}?")
+        if axis is not None and known == [""]:
+            raise InputError(f"{field} = {axis!r}: the rig has one axis, without a name; leave it out")
+        if axis is not None and axis not in known:
+            raise InputError(f"{field} = {axis!r}: the rig has no such axis; {nearest(axis, known)}")

@@ -1,0 +1,196 @@
+"""Ticks on their way to the metrics and, if kept, to the trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.controllers.controller import Tick
+from cmg_mj.elementwise import Scalar
+from cmg_mj.plant.plant import Plant
+from cmg_mj.results.baselines import References
+from cmg_mj.results.metrics import Metrics
+from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
+
+TICKS_A_PIECE = 256
+"""So many ticks wait until they are made into columns together, which is much cheaper than one by one."""
+
+
+class Piece(NamedTuple):
+    """Ticks as columns, (n_ticks, n_worlds) each."""
+
+    x1: np.ndarray
+    x2: np.ndarray
+    x3: np.ndarray
+    y1: np.ndarray
+    fog: np.ndarray
+    u: np.ndarray
+    estimates: list[dict[str, np.ndarray]]
+    """Of the observer in the loop and each companion, signal by signal."""
+    columns: list[np.ndarray]
+    """The trajectory's after its time, in its order."""
+    ended: np.ndarray | None
+    """Which worlds have ended; None for one world."""
+
+
+class Rows:
+    """Collects the ticks of one or many worlds.
+
+    Args:
+        plants: The rigs, one a world.
+        observers: The observer in the loop, then the companions.
+        extras: What each of them estimates beyond x.
+        metrics: Takes every piece.
+        references: What the estimates are judged beside.
+        dt: Control period [s].
+        keep: Whether to keep the pieces for a trajectory.
+        single: Whether the ticks hold floats (one world) or arrays (n_worlds,).
+        joints: Whether to keep the joints.
+    """
+
+    def __init__(
+        self,
+        plants: Sequence[Plant],
+        observers: Sequence[str],
+        extras: Sequence[Sequence[str]],
+        metrics: Metrics,
+        references: References,
+        dt: float,
+        *,
+        keep: bool,
+        single: bool,
+        joints: bool = True,
+    ) -> None:
+        self._axis = plants[0].axis
+        self._bias = np.array([plant.bias for plant in plants])
+        names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
+        self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), names, kinds)
+        self._joints = joints
+        self._estimated = [(*ESTIMATES, *names) for names in extras]
+        self._metrics = metrics
+        self._references = references
+        self._dt = dt
+        self._keep = keep
+        self._single = single
+        self._waiting: list[tuple] = []
+        self._pieces: list[list[np.ndarray]] = []
+
+    def add(
+        self, q: Sequence[Scalar], v: Sequence[Scalar], tick: Tick, torque: Scalar, running: np.ndarray | None
+    ) -> None:
+        """Take one tick.
+
+        Args:
+            q: Joint angles at the tick [rad].
+            v: Joint rates at the tick [rad/s].
+            tick: What the controller measured and decided.
+            torque: The push, a float, or (n_worlds,) [N m].
+            running: Which worlds have not ended, (n_worlds,); None for one world.
+        """
+        self._waiting.append((q, v, tick, torque, running))
+        if len(self._waiting) >= TICKS_A_PIECE:
+            self.flush()
+
+    def flush(self) -> None:
+        """Make the waiting ticks into columns: to the metrics, and to the trajectory if it is kept."""
+        if not self._waiting:
+            return
+        piece = self._piece(self._waiting)
+        self._waiting = []
+        x1, x2, x3, y1, fog, u, estimates, columns, ended = piece
+        self._metrics.update(x1, x2, x3, u, fog, estimates, self._references.rates(x2), y1)
+        if self._keep:
+            if ended is not None:
+                columns = [np.where(ended, np.nan, column) for column in columns]
+            self._pieces.append(columns)
+
+    def _piece(self, waiting: Sequence[tuple]) -> Piece:
+        qs, vs, ticks, torques, runnings = zip(*waiting, strict=True)
+        q, v = self._columns(qs), self._columns(vs)
+        *signals, estimates = zip(*ticks, strict=True)
+        y1, y2, acceleration, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
+        push = np.broadcast_to(self._columns([(torque,) for torque in torques])[0], u.shape)
+        estimated = [self._columns(estimate) for estimate in zip(*estimates, strict=True)]
+        x1 = self._axis.line.lean(q) + self._bias
+        x2 = self._axis.line.rate(v)
+        x3 = self._axis.gimbal_angle(q)
+        ended = None if self._single else ~np.array(runnings)
+        if ended is not None:
+            x1 = np.where(ended, np.nan, x1)
+        named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
+        columns = [
+            x1,
+            x2,
+            x3,
+            y1,
+            y2,
+            acceleration,
+            fog,
+            u,
+            x_e,
+            push,
+            *(part for parts in estimated for part in parts),
+            *(q if self._joints else ()),
+            *(v if self._joints else ()),
+        ]
+        return Piece(x1, x2, x3, y1, fog, u, named, columns, ended)
+
+    def _columns(self, ticks: Sequence) -> np.ndarray:
+        """(n_ticks, n_signals[, n_worlds]) -> (n_signals, n_ticks, n_worlds)."""
+        if self._single:  # fromiter: np.array takes five times as long over nested sequences of floats
+            flat = np.fromiter(chain.from_iterable(ticks), dtype=float)
+            return flat.reshape(len(ticks), -1).T[:, :, None]
+        return np.swapaxes(np.array(ticks), 0, 1)
+
+    def trajectory(self) -> Trajectory | None:
+        """All that was kept."""
+        return self._joined(self._pieces, 0) if self._keep else None
+
+    def since(self, tick: int) -> Trajectory:
+        """The ticks from one on, of one world whose trajectory is kept, as far as the run has come.
+
+        Those that wait go on waiting: whoever looks on changes no number.
+        """
+        first = min(tick // TICKS_A_PIECE, len(self._pieces))
+        pieces = self._pieces[first:]
+        if self._waiting:
+            pieces = [*pieces, self._piece(self._waiting).columns]
+        return self._joined(pieces, TICKS_A_PIECE * first).from_tick(tick - TICKS_A_PIECE * first)
+
+    def _joined(self, pieces: Sequence[list[np.ndarray]], first: int) -> Trajectory:
+        """Pieces as one trajectory, whose first tick has this number."""
+        columns = {}
+        names = self._layout.columns()
+        for i, name in enumerate(names):
+            whole = np.concatenate([piece[i] for piece in pieces]) if pieces else np.zeros((0, len(self._bias)))
+            columns[name] = whole[:, 0] if self._single else whole
+        n_ticks = len(columns[names[0]])
+        return Trajectory({"time_s": np.arange(first, first + n_ticks) * self._dt, **columns}, layout=self._layout)
+
+
+class RowsOfAxes:
+    """The rows of a rig of several axes.
+
+    Args:
+        rows: Those of each axis, by its name; the first have the joints.
+    """
+
+    def __init__(self, rows: Mapping[str, Rows]) -> None:
+        self.rows = rows
+
+    def trajectory(self) -> Trajectory | None:
+        """All that was kept."""
+        return self._joined({name: rows.trajectory() for name, rows in self.rows.items()})
+
+    def since(self, tick: int) -> Trajectory:
+        """The ticks from one on: see `Rows.since`."""
+        found = self._joined({name: rows.since(tick) for name, rows in self.rows.items()})
+        assert found is not None
+        return found
+
+    def _joined(self, trajectories: Mapping[str, Trajectory | None]) -> Trajectory | None:
+        kept = {name: trajectory for name, trajectory in trajectories.items() if trajectory is not None}
+        return Trajectory.joined(kept) if kept else None

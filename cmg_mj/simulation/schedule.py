@@ -1,0 +1,52 @@
+"""The moments of a run at which something is due, and the torques from outside between them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+
+from cmg_mj.elementwise import Scalar, where
+from cmg_mj.scenario.disturbances import Push, Swing, swung
+from cmg_mj.sensors.timing import whole_steps
+
+
+def moments(
+    steps: int,
+    beat: int,
+    pushes: Sequence[Push],
+    timestep: float,
+    axes: Sequence[str] = ("",),
+) -> Iterator[tuple[int, int, list[Scalar]]]:
+    """The moments at which the loop must look: (step, steps until the next, each axis' torque, one or a world's each).
+
+    A push about an axis that the rig does not have, since it is locked, moves nothing.
+    """
+    changes: dict[int, list[Scalar]] = {0: [0.0] * len(axes), steps: [0.0] * len(axes)}
+    for push in pushes:
+        for time, torque in ((push.start_s, push.torque_n_m), (push.end_s, -push.torque_n_m)):
+            step = whole_steps(time, timestep, "push", f"{time:g} s")
+            change = changes.setdefault(step, [0.0] * len(axes))
+            about = push.axis or axes[0]
+            if about in axes:
+                change[axes.index(about)] += torque
+    edges = sorted(step for step in changes if step <= steps)
+    torques: list[Scalar] = [0.0] * len(axes)
+    for start, end in itertools.pairwise(edges):
+        torques = [torque + change for torque, change in zip(torques, changes[start], strict=True)]
+        held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in torques]
+        first = min(-(-start // beat) * beat, end)  # the first beat not before the push's edge
+        if first > start:
+            yield start, first - start, held
+        last = max(end // beat * beat, first)
+        for step in range(first, last, beat):
+            yield step, beat, held
+        if last < end:
+            yield last, end - last, held
+
+
+def swinging(
+    looks: Iterable[tuple[int, int, list[Scalar]]], swings: Sequence[Swing], timestep: float, axes: Sequence[str]
+) -> Iterator[tuple[int, int, list[Scalar]]]:
+    """The moments with the swings' torques in their middle."""
+    for step, count, held in looks:
+        yield step, count, swung(held, swings, axes, (step + 0.5 * count) * timestep)

@@ -1,0 +1,1 @@
+"""Runs many experiments and compares them: comparisons, sweeps, tuning, push limits, benchmarks."""

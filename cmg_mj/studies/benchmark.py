@@ -1,0 +1,261 @@
+"""How fast the closed loop is, against bare MuJoCo in the same run, and what an observer's update costs."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from rich import box
+from rich.table import Table
+
+from cmg_mj.observers import Measurement, Observer
+from cmg_mj.results.result import Result
+from cmg_mj.scenario.loading import parse_scenario
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
+
+CONTROL_RATES_HZ = (200.0, 1000.0)
+REPEATS = 7
+ONE_WORLD_S = 6.0
+MANY_WORLDS_S = 1.0
+UPDATES = 400
+"""So many updates of an observer are timed at once, along a recorded run."""
+
+
+def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float], None]) -> dict[str, Any]:
+    """Time every observer at every control rate.
+
+    All sensors sample at the control rate. Closed loop and bare stepping alternate; each repeat gives one
+    ratio, and the median ratio is reported, because the speed of a shared machine drifts.
+
+    Args:
+        observers: Names of the observers.
+        worlds: Worlds of the batch.
+        on_progress: Called with the share done.
+
+    Returns:
+        The figures, as `--json` prints them.
+
+    Raises:
+        InputError: An observer does not exist.
+    """
+    cases = [(observer, rate) for observer in observers for rate in CONTROL_RATES_HZ]
+    experiments = [
+        (prepare(_scenario(observer, rate, ONE_WORLD_S)), prepare(_scenario(observer, rate, MANY_WORLDS_S)))
+        for observer, rate in cases
+    ]
+    rows = []
+    load = _load()
+    for i, ((observer, rate), (one, many)) in enumerate(zip(cases, experiments, strict=True)):
+        single = [(_bare_one(one), _closed_one(one)) for _ in range(REPEATS)]
+        on_progress((i + 0.5) / len(cases))
+        batch = [(_bare_many(many, worlds), _closed_many(many, worlds)) for _ in range(REPEATS)]
+        on_progress((i + 1.0) / len(cases))
+        on_floats, on_arrays = update_us(one, None), update_us(many, worlds)
+        rows.append(
+            {
+                "observer": observer,
+                "control_rate_hz": rate,
+                "timestep_ms": 1e3 * one.plant.timestep,
+                "bare_ms": _median_ms(bare.wall for bare, _ in single),
+                "closed_loop_ms": _median_ms(closed.wall for _, closed in single),
+                "closed_loop_over_bare": statistics.median(closed.wall / bare.wall for bare, closed in single),
+                "batch_ms": _median_ms(bare.wall for bare, _ in batch),
+                "closed_loop_batch_ms": _median_ms(closed.wall for _, closed in batch),
+                "closed_loop_share_of_batch": statistics.median(bare.wall / closed.wall for bare, closed in batch),
+                "closed_loop_batch_cpu_ms": _median_ms(closed.cpu for _, closed in batch),
+                "update_us": on_floats,
+                "update_of_batch_us": on_arrays,
+            }
+        )
+    return {
+        "worlds": worlds,
+        "processors": os.cpu_count(),
+        "load_before": load,
+        "mujoco": mujoco.__version__,
+        "figures": rows,
+    }
+
+
+def bench_table(figures: dict[str, Any]) -> Table:
+    """The table that `cmg-mj bench` prints."""
+    load = figures["load_before"]
+    busy = "" if load is None else f", {load:.1f} processes wanted one before"
+    table = Table(
+        title=f"{figures['processors']} processors{busy}; sensors at the control rate; ratios: medians of {REPEATS} "
+        "pairs; bare: MuJoCo alone with the same steps and forward passes",
+        box=box.SIMPLE_HEAD,
+        title_justify="left",
+    )
+    worlds = figures["worlds"]
+    columns = {
+        "control\n[Hz]": ("control_rate_hz", "{:g}"),
+        "step\n[ms]": ("timestep_ms", "{:g}"),
+        "1 s of one\nworld [ms]:\nbare": ("bare_ms", "{:.2f}"),
+        "\nclosed\nloop": ("closed_loop_ms", "{:.2f}"),
+        "\n\nratio": ("closed_loop_over_bare", "{:.2f}"),
+        f"1 s of one\nof {worlds} [ms]:\nbare Batch": ("batch_ms", "{:.2f}"),
+        "\nclosed\nloop ": ("closed_loop_batch_ms", "{:.2f}"),
+        "\n\nshare": ("closed_loop_share_of_batch", "{:.2f}"),
+        "\nof all\nthreads": ("closed_loop_batch_cpu_ms", "{:.2f}"),
+        "an update\n[us]: one\nworld": ("update_us", "{:.1f}"),
+        f"\n{worlds}\nworlds": ("update_of_batch_us", "{:.0f}"),
+    }
+    table.add_column("observer", vertical="bottom")
+    for heading in columns:
+        table.add_column(heading.strip(" "), justify="right", vertical="bottom")
+    for row in figures["figures"]:
+        table.add_row(row["observer"], *(_cell(row[key], pattern) for key, pattern in columns.values()))
+    return table
+
+
+def _median_ms(seconds: Iterable[float]) -> float:
+    return 1e3 * statistics.median(seconds)
+
+
+def _cell(value: float | None, pattern: str) -> str:
+    return "-" if value is None else pattern.format(value)
+
+
+def update_us(experiment: Experiment, worlds: int | None) -> float | None:
+    """Microseconds of one update of the observer, the median of some repeats along a recorded run.
+
+    Args:
+        experiment: Whose observer, and whose motion.
+        worlds: So many worlds at once, on arrays; None for one, on floats.
+
+    Returns:
+        The time [us]; None for an observer that raises, or a rig that falls at once.
+    """
+    result = _finished(experiment.run() if worlds is None else experiment.run_many(worlds))
+    assert result.trajectory is not None
+    columns = [result.trajectory[name][:UPDATES] for name in ("y1_rad", "y2_rad", "acceleration_rad_s2", "u_rad_s")]
+    if worlds is None:
+        columns = [column.tolist() for column in columns]
+    try:
+        return time_of_update(experiment.design.observer(), *columns)
+    except Exception:  # a user's observer may fail in any way; the figures of its run say how far it came
+        return None
+
+
+def time_of_update(
+    observer: Observer, y1: Sequence[Any], y2: Sequence[Any], acceleration: Sequence[Any], u: Sequence[Any]
+) -> float:
+    """Microseconds of one update along given signals, the median of some repeats.
+
+    Args:
+        observer: The observer.
+        y1: Measured tilt, (n_ticks,) floats or (n_ticks, n_worlds) [rad].
+        y2: Measured gimbal angle, the same [rad].
+        acceleration: Measured angular acceleration of the tilt, the same [rad/s^2].
+        u: Gimbal rate, the same [rad/s].
+
+    Returns:
+        The time [us].
+    """
+    samples = [(Measurement(*y), held) for *y, held in zip(y1, y2, acceleration, u, strict=True)]
+    times = []
+    with np.errstate(all="ignore"):  # worlds that have fallen are NaN
+        for _ in range(REPEATS):
+            state = observer.init(samples[0][0])
+            start = time.perf_counter()
+            for y, held in samples:
+                state, _ = observer.step(state, y, held)
+            times.append((time.perf_counter() - start) / len(samples) * 1e6)
+    return statistics.median(times)
+
+
+def _scenario(observer: str, rate: float, duration_s: float) -> Scenario:
+    sensors = {kind: {"rate_hz": rate} for kind in ("accelerometer", "encoder", "fog")}
+    return parse_scenario(
+        {
+            "duration_s": duration_s,
+            "plant": {"equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.2},
+            "controller": {"rate_hz": rate},
+            "observer": {"kind": observer},
+            "sensors": sensors,
+            # An observer that cannot hold the rig must not end the measurement.
+            "metrics": {"fall_angle_deg": 89.0},
+        }
+    )
+
+
+class _Cost(NamedTuple):
+    """What a simulated world-second takes [s]."""
+
+    wall: float
+    cpu: float
+    """Processor time of all threads."""
+
+
+def _timed(work: Callable[[], float], worlds: int) -> _Cost:
+    """Time work that returns how many seconds it has simulated of so many worlds."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    seconds = work()
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    return _Cost(wall / (seconds * worlds), cpu / (seconds * worlds))
+
+
+def _bare_one(experiment: Experiment) -> _Cost:
+    """MuJoCo alone on one world: a forward pass where sensors are read, then steps."""
+    model, data = experiment.plant.model, experiment.plant.new_data()
+    looks, steps = _looks(experiment)
+
+    def work() -> float:
+        for _ in range(looks):
+            mujoco.mj_forward(model, data)
+            mujoco.mj_step(model, data, steps)
+        return looks * steps * model.opt.timestep
+
+    return _timed(work, 1)
+
+
+def _bare_many(experiment: Experiment, worlds: int) -> _Cost:
+    """MuJoCo's Batch alone: the same."""
+    model, data = experiment.plant.model, experiment.plant.new_data()
+    looks, steps = _looks(experiment)
+    batch = Batch(model, worlds)
+    for field in ("qpos", "qvel", "act", "ctrl"):
+        batch.bind(field)[:] = getattr(data, field)
+
+    def work() -> float:
+        for _ in range(looks):
+            batch.forward()
+            batch.step(nstep=steps)
+        return looks * steps * model.opt.timestep
+
+    return _timed(work, worlds)
+
+
+def _closed_one(experiment: Experiment) -> _Cost:
+    """A whole run, its trajectory and summary included."""
+    return _timed(lambda: _finished(experiment.run()).seconds, 1)
+
+
+def _closed_many(experiment: Experiment, worlds: int) -> _Cost:
+    """A batch run without trajectory."""
+    return _timed(lambda: _finished(experiment.run_many(worlds, keep_trajectory=False)).seconds, worlds)
+
+
+def _finished(result: Result) -> Result:
+    """The result, unless Ctrl-C has cut it short: that ends the measurement."""
+    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        raise KeyboardInterrupt
+    return result
+
+
+def _looks(experiment: Experiment) -> tuple[int, int]:
+    """How often a run looks at its sensors, and the physics steps in between."""
+    steps = experiment.controller().beat
+    return round(experiment.scenario.duration_s / (experiment.plant.timestep * steps)), steps
+
+
+def _load() -> float | None:
+    """How many processes wanted a processor in the last minute; None where the system does not say."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None

@@ -1,0 +1,1 @@
+"""Compares observers on the same plant, pushes and noise."""

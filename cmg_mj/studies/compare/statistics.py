@@ -1,0 +1,134 @@
+"""A comparison in numbers: means with their 95 % intervals, and differences to the best, world by world."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.per_world_table import as_table
+from cmg_mj.results.summary_keys import KEYS, finite
+from cmg_mj.studies.compare.comparison import Compared, spread_of
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+PUSH_ERROR, ERROR = "velocity_rms_error_push_rad_s", "velocity_rms_error_rad_s"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a comparison.
+
+    Attributes:
+        entry: An observer in the loop.
+        reference: What rode along there, if the row is not the observer's own.
+    """
+
+    entry: Compared
+    reference: str | None = None
+
+    @property
+    def name(self) -> str:
+        """What stands before the row."""
+        return self.reference or self.entry.kind
+
+    def values(self, key: str) -> np.ndarray:
+        """A figure of every world, (n_worlds,); NaN where a world did not stand to the end or has no such figure."""
+        result = self.entry.result
+        figures = result.summaries[0]["references"][self.reference] if self.reference else result.summaries[0]
+        return result.values(key, self.reference) if key in figures else np.full(len(result.outcomes), np.nan)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The means, as of `Compared.summary`; None for what a reference does not have, since it closes no loop."""
+        own = self.entry.summary
+        if self.reference is None:
+            return own
+        means = {key: _mean(self.values(key)) for key in own if key in KEYS}
+        return finite(
+            {
+                **dict.fromkeys(own),
+                "observer": self.reference,
+                "rides_along_in": self.entry.kind,
+                "seed": own["seed"],
+                "differs": own["differs"],
+                "worlds": own["worlds"],
+                **means,
+                "velocity_rms_error_std_rad_s": spread_of(self.values(ERROR)),
+            }
+        )
+
+
+def best(compared: Sequence[Compared], key: str) -> Compared | None:
+    """The observer with the best mean of a figure, among those that stood in the most worlds; None if none has one."""
+    most = max(entry.result.stood.sum() for entry in compared)
+    sign = -1.0 if KEYS[key].better == "more" else 1.0
+    means = [(_mean(Row(entry).values(key)), entry) for entry in compared if entry.result.stood.sum() == most]
+    known = [(sign * mean, entry) for mean, entry in means if mean is not None]
+    return min(known, key=lambda pair: pair[0])[1] if known else None
+
+
+def rows_of(compared: Sequence[Compared]) -> list[Row]:
+    """The rows of a comparison: every observer, then the references on the motion of the best of them.
+
+    The best is the one with the least error in the push window, or over the whole run if there is no push.
+    """
+    leader = best(compared, PUSH_ERROR) or best(compared, ERROR)
+    return [*map(Row, compared), *(Row(leader, name) for name in REFERENCES if leader)]
+
+
+def standings(compared: Sequence[Compared]) -> list[dict[str, Any]]:
+    """What `cmg-mj compare --json` prints.
+
+    Args:
+        compared: What was run.
+
+    Returns:
+        For each row its means; `intervals`: key -> ends of the mean's 95 % interval; `less_best`: key -> how much more
+        it is than that of the best observer in this figure, over the worlds in which both have it, with its interval.
+    """
+    rows = rows_of(compared)
+    keys = [key for entry in compared for key in entry.summary if key in KEYS and key in entry.result.summaries[0]]
+    keys = list(dict.fromkeys(keys))
+    leaders = {key: Row(leader) for key in keys if KEYS[key].better and (leader := best(compared, key))}
+    return [
+        finite(
+            row.summary
+            | {
+                "intervals": {key: _ends(row.values(key)) for key in keys},
+                "less_best": {key: _less(row, leader, key) for key, leader in leaders.items() if row != leader},
+            }
+        )
+        for row in rows
+    ]
+
+
+def worlds_table(compared: Sequence[Compared]) -> pa.Table:
+    """Every world of every row of a comparison, as `Result.table` has them."""
+    return as_table(world for row in rows_of(compared) for world in row.entry.result.rows(row.reference))
+
+
+def _mean(values: np.ndarray) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else None
+
+
+def _ends(values: np.ndarray) -> list[float] | None:
+    interval = known_interval(values)
+    return None if interval is None else [interval.low, interval.high]
+
+
+def _less(row: Row, leader: Row, key: str) -> dict[str, Any]:
+    """A figure less the best observer's, world by world."""
+    differences = row.values(key) - leader.values(key)
+    return {
+        "best": leader.name,
+        "worlds": int(np.isfinite(differences).sum()),
+        "mean": _mean(differences),
+        "interval": _ends(differences),
+    }

@@ -1,0 +1,100 @@
+"""A sweep from Python, in this process, on one object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from cmg_mj.errors import InputError
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.studies.sweeps.axes import parse_axis
+from cmg_mj.studies.sweeps.cells import Trials, cells_in_blocks
+from cmg_mj.studies.sweeps.checks import listed_names
+from cmg_mj.studies.sweeps.chunk import compute
+from cmg_mj.studies.sweeps.order import order_rows, order_table
+from cmg_mj.studies.sweeps.sobol import index_rows, index_table
+from cmg_mj.studies.sweeps.study import Design, Study, check_values
+from cmg_mj.studies.sweeps.trials import table_of
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+WORLDS = 20
+"""A cell, if nothing else is said."""
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What a sweep has found.
+
+    Attributes:
+        study: What was asked.
+        trials: A row a trial: its point, what is varied, observer, world, outcome, and the figures of its run.
+        cells: A row a point and observer: means with 95 % intervals, the share of falls with Wilson's interval, and the
+            paired difference to the best observer of the point.
+        order: A row a point: in how many worlds the named order of observers held; None without one.
+        indices: A row a figure, observer and field, of a design for Sobol indices; None of another.
+    """
+
+    study: Study
+    trials: pa.Table
+    cells: pa.Table
+    order: pa.Table | None = None
+    indices: pa.Table | None = None
+
+
+def sweep(
+    scenario: Scenario | str,
+    vary: Mapping[str, Any],
+    observers: Sequence[str] | None = None,
+    worlds: int = WORLDS,
+    sample: int | None = None,
+    sobol: int | None = None,
+    order: Sequence[str] = (),
+) -> Swept:
+    """Run a scenario in every cell: every point of what is varied with every observer.
+
+    Args:
+        scenario: The scenario, or its name.
+        vary: Field, named as with `--set` -> a list of values, or one, or text as `--vary` takes it, such as "-1:1:5".
+        observers: Those in the loop; by default the scenario's own.
+        worlds: Trials a cell: world i has the same noise in every cell.
+        sample: So many points of a quasi-random design of the ranges and lists, instead of every combination.
+        sobol: A design for Sobol indices instead, a power of two.
+        order: Observers, the best first: how often that holds is counted.
+
+    Returns:
+        The trials and cells, as tables.
+
+    Raises:
+        InputError: A field or its values are not written so or do not fit the design, or an observer cannot run.
+    """
+    if sample is not None and sobol is not None:
+        raise InputError("sample and sobol: one of them")
+    design: Design = "sample" if sample is not None else "sobol" if sobol is not None else "grid"
+    of = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    axes = tuple(parse_axis(field, said, f"vary: {field!r}") for field, said in vary.items())
+    n: Any = 0 if design == "grid" else sample if design == "sample" else sobol
+    names = (of.observer.kind,) if observers is None else listed_names(observers, "observers")
+    study = Study(of, axes, names, worlds, design, n, listed_names(order, "order"))
+    import pyarrow as pa
+
+    check_values(study)
+    table = all_trials(study)
+    trials = Trials(study, [table])
+    return Swept(
+        study,
+        table,
+        pa.concat_tables(cells_in_blocks(trials)),
+        order_table(study, order_rows(trials)) if study.order else None,
+        index_table(index_rows(trials)) if design == "sobol" else None,
+    )
+
+
+def all_trials(study: Study) -> pa.Table:
+    """Run a study in this process, keeping nothing on disk."""
+    import pyarrow as pa
+
+    return pa.concat_tables(table_of(study, compute(study, chunk)) for chunk in study.chunks)

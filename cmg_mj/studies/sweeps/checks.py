@@ -1,0 +1,112 @@
+"""What a study cannot be: its numbers, names and fields, whoever asks: the command line, a study file or Python."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.errors import InputError, nearest, shown
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.simulation.pool import UNUSED
+from cmg_mj.studies.sweeps.axes import Axis
+
+TOLD_OTHERWISE = {
+    "seed": "worlds differ in it already: --worlds says how many, --seed which",
+    "observer": "--observers names them",
+    "observer.kind": "--observers names them",
+    "companions": "a sweep runs without them; --observers puts each in the loop",
+    **dict.fromkeys(sorted(UNUSED), "no trial depends on it"),
+}
+"""Fields that a sweep does not vary, and why; all below them neither, but for an observer's own."""
+
+
+def listed_names(said: Any, what: str) -> tuple[Any, ...]:
+    """A list of names that Python gave, as a tuple.
+
+    Raises:
+        InputError: It is none.
+    """
+    if isinstance(said, str) or not isinstance(said, Iterable):
+        raise InputError(f"{what} = {shown(said)}: must be a list of observers' names, such as ['linear', 'ltv']")
+    return tuple(said)
+
+
+def check_axes(axes: Sequence[Axis], design: str) -> None:
+    """Something is varied, each field once, and so that it makes a difference; a range to be sampled is sampled."""
+    if not axes:
+        raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
+    fields = [field for axis in axes for field in axis.fields]
+    twice = next((field for i, field in enumerate(fields) if field in fields[:i]), None)
+    if twice is not None:
+        raise InputError(f"--vary {twice}: given twice")
+    for field in fields:
+        section = field.partition(".")[0]
+        why = TOLD_OTHERWISE.get(field) or (TOLD_OTHERWISE.get(section) if section != "observer" else None)
+        if why is not None:
+            raise InputError(f"--vary {field}: is not varied: {why}")
+    for axis in axes:
+        if axis.is_range and design == "grid":
+            raise InputError(
+                f"--vary {axis.field}: a range without a count is for --sample and --sobol; write first:last:count"
+            )
+
+
+def check_worlds(worlds: Any) -> None:
+    """There is one at least."""
+    if not _counts(worlds):
+        raise InputError(f"worlds = {shown(worlds)}: must be a whole number, 1 or more")
+
+
+def check_points(design: str, n: Any, axes: int) -> None:
+    """A design has points, one for indices as many as Saltelli's scheme wants; a grid's are counted by its values."""
+    if design == "grid":
+        if n != 0:
+            raise InputError(f"n = {shown(n)}: is for the designs sample and sobol; a grid is every combination")
+        return
+    if design == "sample" and not _counts(n):
+        raise InputError(f"--sample, n = {shown(n)}: must be a whole number of points, 1 or more")
+    if design == "sobol":
+        if not _counts(n) or n < 2 or n & (n - 1):
+            near = 2 ** max(1, round(math.log2(max(n, 2)))) if _is_whole(n) else 256
+            raise InputError(f"--sobol {shown(n)}: must be a power of two, such as {near}")
+        if axes < 2:
+            raise InputError(
+                "--sobol: indices part what several fields do; vary two or more (fields with + between count as one)"
+            )
+
+
+def check_observers(observers: Sequence[Any]) -> None:
+    """They exist, as far as can be told without importing them, and are there once."""
+    if not observers:
+        raise InputError("observers: there must be one at least")
+    for i, name in enumerate(observers):
+        if not isinstance(name, str):
+            raise InputError(f"observers: {shown(name)}: must be an observer's name")
+        if ":" not in name and name not in OBSERVERS:
+            known = nearest(name, OBSERVERS)
+            raise InputError(f"observers: {name!r}: no such observer; {known}, or your own as package.module:Class")
+        if name in observers[:i]:
+            raise InputError(f"observers: {name!r} is there twice")
+
+
+def check_order(order: Sequence[Any], observers: Sequence[str]) -> None:
+    """It orders observers that run here."""
+    said = f"--order {','.join(map(str, order))}"
+    if any(not isinstance(name, str) for name in order):
+        raise InputError(f"{said}: must be observers' names, the best first")
+    if len(order) < 2 or len(set(order)) < len(order):
+        raise InputError(f"{said}: write two observers or more, each once, the best first")
+    for name in order:
+        if name not in observers:
+            raise InputError(f"{said}: {name} does not run here; --observers are {', '.join(observers)}")
+
+
+def _counts(number: Any) -> bool:
+    return _is_whole(number) and number >= 1
+
+
+def _is_whole(number: Any) -> bool:
+    return isinstance(number, (int, np.integer)) and not isinstance(number, bool)

@@ -1,0 +1,173 @@
+"""One chunk computed: a row a trial."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from cmg_mj.errors import InputError, raised
+from cmg_mj.results.per_world_table import FIRST
+from cmg_mj.simulation.experiment import Experiment, prepare, run_together
+from cmg_mj.simulation.pool import structure
+from cmg_mj.studies.sweeps.points import Point, Points
+from cmg_mj.studies.sweeps.study import Chunk, Study
+
+if TYPE_CHECKING:
+    from cmg_mj.results.result import Result
+
+REFUSED = "refused"
+"""How a trial ends whose values do not fit each other: it never begins."""
+
+
+def compute(
+    study: Study,
+    chunk: Chunk,
+    on_progress: Callable[[float], None] | None = None,
+    *,
+    points: Points | Mapping[int, Point] | None = None,
+    threads: int = 0,
+) -> list[dict[str, Any]]:
+    """Run the trials of a chunk.
+
+    What fails is a row with its reason: values that do not fit, a rig whose physics fails, an observer that raises.
+
+    Args:
+        study: The sweep.
+        chunk: Which of its trials.
+        on_progress: Called after every tick with the share of the chunk that is done.
+        points: Those of the chunk by their numbers, which then are not made of the whole study's.
+        threads: On which its worlds are stepped; 0: as many as there are processors.
+
+    Returns:
+        A row a trial, in the chunk's order: its point's number, what is varied, and the figures of its run.
+    """
+    at = study.points if points is None else points
+    base = prepare(study.scenario.with_observer(chunk.observer).model_copy(update={"companions": []}))
+    found: dict[tuple[int, int], dict[str, Any]] = {}
+    pools: dict[str, list[tuple[int, int]]] = {}
+    experiments: dict[int, Experiment] = {}
+    pool_of: dict[int, str] = {}
+    refused: dict[int, str] = {}
+    for trial in chunk.trials:
+        number = trial[0]
+        if number in refused:
+            continue
+        if number not in experiments:
+            try:
+                experiments[number] = base.with_values(at[number])
+                pool_of[number] = _pool_of(experiments[number])
+            except InputError as error:
+                refused[number] = str(error)
+                continue
+        pools.setdefault(pool_of[number], []).append(trial)
+    for trials in pools.values():
+        done, share = len(found) / len(chunk.trials), len(trials) / len(chunk.trials) / study.scenario.duration_s
+        tick = partial(_inside, on_progress, done, share) if on_progress else None
+        rows = _run([experiments[number] for number, _ in trials], trials, tick, threads)
+        found |= zip(trials, rows, strict=True)
+    for trial in chunk.trials:
+        if trial[0] in refused:
+            found[trial] = _unfinished(REFUSED, refused[trial[0]])
+    return [
+        {"point": number, **_plain(at[number]), **_identity(study, chunk, world), **found[number, world]}
+        for number, world in chunk.trials
+    ]
+
+
+def given_up(study: Study, chunk: Chunk, reason: str) -> list[dict[str, Any]]:
+    """Rows of a chunk that could not be computed: the reason in each."""
+    return [
+        {
+            "point": number,
+            **_plain(study.points[number]),
+            **_identity(study, chunk, world),
+            **_unfinished("stopped", reason),
+        }
+        for number, world in chunk.trials
+    ]
+
+
+def _inside(on_progress: Callable[[float], None], done: float, share: float, time: float) -> None:
+    on_progress(done + share * time)
+
+
+def _run(
+    experiments: Sequence[Experiment],
+    trials: Sequence[tuple[int, int]],
+    tick: Callable[[float], None] | None,
+    threads: int,
+) -> list[dict[str, Any]]:
+    """Rows of trials that run in one batch; where one raises, those that it stopped run again, without it at last.
+
+    They are halved until each of them is through or has raised by itself, so that no row depends on another's.
+    """
+    rows: dict[int, dict[str, Any]] = {}
+    onward = _onward(tick) if tick else None
+    parts = [list(range(len(trials)))]
+    while parts:
+        part = parts.pop()
+        own = _run_once([experiments[i] for i in part], [trials[i][1] for i in part], onward, threads)
+        rows |= {i: row for i, row in zip(part, own, strict=True) if row is not None}
+        again = [i for i in part if i not in rows]
+        half = (len(again) + 1) // 2
+        parts += [some for some in (again[half:], again[:half]) if some]
+    return [rows[i] for i in range(len(trials))]
+
+
+def _run_once(
+    experiments: Sequence[Experiment],
+    worlds: Sequence[int],
+    tick: Callable[[float], None] | None,
+    threads: int,
+) -> list[dict[str, Any] | None]:
+    """Rows of one batch; None for a trial that may have been stopped by another one."""
+    try:
+        result: Result = run_together(experiments, worlds, keep_trajectory=False, on_progress=tick, threads=threads)
+    except Exception as error:  # a user's observer may fail in any way
+        alone = len(worlds) == 1
+        return [_unfinished("stopped", raised(error)) if alone else None for _ in worlds]
+    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        raise KeyboardInterrupt
+    taken = {"observer", "rides_along_in", "world", "seed"}
+    return [
+        None if outcome.with_others else {key: value for key, value in row.items() if key not in taken}
+        for outcome, row in zip(result.outcomes, result.rows(), strict=True)
+    ]
+
+
+def _onward(tick: Callable[[float], None]) -> Callable[[float], None]:
+    """The same, told of no time before the latest: what runs again is no step back."""
+    latest = 0.0
+
+    def told(time: float) -> None:
+        nonlocal latest
+        latest = max(latest, time)
+        tick(latest)
+
+    return told
+
+
+def _pool_of(experiment: Experiment) -> str:
+    """Worlds with the same can run in one batch."""
+    physics = experiment.plant.model.opt
+    return repr((structure(experiment.scenario, experiment.design), physics.timestep, int(physics.integrator)))
+
+
+def _identity(study: Study, chunk: Chunk, world: int) -> dict[str, Any]:
+    return {"observer": chunk.observer, "world": world, "seed": study.scenario.seed}
+
+
+def _unfinished(outcome: str, reason: str) -> dict[str, Any]:
+    return {"outcome": outcome, "stood": False, "end_time_s": 0.0, "reason": reason}
+
+
+def _plain(point: Point) -> Point:
+    """As a table can hold it: a list is its text."""
+    return {
+        field: value if isinstance(value, (int, float, str, bool)) else repr(value) for field, value in point.items()
+    }
+
+
+COLUMNS = [name for name in FIRST if name != "rides_along_in"]
+"""Of a trial, beside what is varied, before its figures."""

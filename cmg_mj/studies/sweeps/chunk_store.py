@@ -1,0 +1,221 @@
+"""A sweep run from its first chunk to its tables, or from where it was stopped."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import tomli_w
+
+from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.scenario.resolve import versions
+from cmg_mj.studies.sweeps.chunk import compute
+from cmg_mj.studies.sweeps.file import SECTIONS
+from cmg_mj.studies.sweeps.fingerprint import (
+    Mark,
+    as_read,
+    difference,
+    hash_of_models,
+    hash_of_study,
+    mark_in,
+    not_ours,
+    other_version,
+    resolved,
+    without_asides,
+)
+from cmg_mj.studies.sweeps.release_memory import give_back
+from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.trials import lasting, schema_of, table_of, write_table, write_tables
+
+STUDY, CHUNKS = "study.toml", "chunks"
+TRIALS = "trials.parquet"
+"""Files of a sweep's folder."""
+GOES_ON = "what is finished is kept, and the same command goes on from there"
+AGAIN = "delete it, and it is computed again"
+
+
+@dataclass(frozen=True)
+class Store:
+    """Where the chunks of a sweep are kept.
+
+    A chunk is finished when its file has its final name. What is in it depends on the study and its number alone.
+
+    Attributes:
+        folder: The sweep's folder.
+        study: The sweep.
+    """
+
+    folder: Path
+    study: Study
+
+    def open(self) -> int:
+        """Begin, or go on with what is there.
+
+        Returns:
+            How many trials are finished.
+
+        Raises:
+            InputError: The folder has another study or chunks of one, was computed with other versions and is not
+                finished, or cannot be written.
+        """
+        path = self.folder / STUDY
+        asked = as_read(self._resolved)
+        there = _require_same(path, asked) if path.exists() else None
+        marks = self._marks()
+        left = self.left()
+        if left:
+            made = {self.path(number): mark.versions for number, mark in marks.items()}
+            if there is not None and made:
+                made[path] = there["scenario"].get("versions")
+            _require_versions(made, self._ours.versions)
+        elif marks:  # with whatever versions it is finished, the study says so
+            asked["scenario"]["versions"] = dict(marks[0].versions)
+        try:
+            if there != asked:
+                _write(path, asked)
+        except OSError as error:
+            raise InputError(f"{self.folder}: cannot be written: {error.strerror or error}") from error
+        chunks = self.folder / CHUNKS
+        try:
+            chunks.mkdir(exist_ok=True)
+        except OSError as error:
+            why = "it is no folder" if chunks.exists() else error.strerror or error
+            raise InputError(f"{chunks}: cannot be written: {why}") from error
+        return self.study.trials - sum(self.study.chunks.size(number) for number in left)
+
+    @cached_property
+    def _resolved(self) -> dict[str, Any]:
+        return resolved(self.study)
+
+    @cached_property
+    def _ours(self) -> Mark:
+        """The mark of a chunk, but for its number; of the models as they are when the sweep is opened."""
+        return Mark(hash_of_study(self._resolved), hash_of_models(self.study), "", versions())
+
+    def _mark(self, number: int) -> Mark:
+        return replace(self._ours, chunk=f"{number + 1} of {len(self.study.chunks)}")
+
+    def _marks(self) -> dict[int, Mark]:
+        """Those of the finished chunks, all of which are the study's own."""
+        left = set(self.left())
+        marks = {}
+        for number in range(len(self.study.chunks)):
+            if number not in left:
+                with self._opened(number) as (_, mark):
+                    marks[number] = mark
+        return marks
+
+    @contextmanager
+    def _opened(self, number: int) -> Iterator[tuple[pq.ParquetFile, Mark]]:
+        """A finished chunk's file and mark.
+
+        Raises:
+            InputError: It cannot be read, or is not the study's own.
+        """
+        path = self.path(number)
+        try:
+            with pq.ParquetFile(path) as file:
+                mark = mark_in(file.schema_arrow.metadata)
+                why = not_ours(mark, self._mark(number))
+                if mark is None or why:
+                    raise InputError(f"{path}: {why}; {AGAIN}, or name another folder")
+                yield file, mark
+        except (OSError, pa.ArrowException) as error:
+            raise InputError(f"{path}: cannot be read: {' '.join(str(error).split())}; {AGAIN}") from error
+
+    def left(self) -> list[int]:
+        """Numbers of the chunks that are not finished."""
+        return [number for number in range(len(self.study.chunks)) if not self.path(number).exists()]
+
+    def path(self, number: int) -> Path:
+        """A chunk's file, which is there when it is finished."""
+        return self.folder / CHUNKS / f"{number:06d}.parquet"
+
+    def keep(self, number: int, table: pa.Table) -> None:
+        """Keep a chunk's trials: it is finished.
+
+        Raises:
+            RunStopped: They cannot be written, or may be of a model that has been edited meanwhile.
+        """
+        if hash_of_models(self.study) != self._ours.model:
+            model = self.study.scenario.plant.model
+            raise RunStopped(f"{model}: has changed since the sweep began; what is finished is of the file as it was")
+        try:
+            write_table(self.path(number), table.replace_schema_metadata(self._mark(number).as_metadata()))
+        except OSError as error:
+            raise RunStopped(f"{self.path(number)}: cannot be written: {error.strerror or error}; {GOES_ON}") from error
+
+    def tables(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """The trials of a finished sweep, chunk by chunk; all columns of them, or some.
+
+        Raises:
+            InputError: A chunk cannot be read, or is not the study's own.
+        """
+        names = None if columns is None else list(columns)
+        for number in range(len(self.study.chunks)):
+            with self._opened(number) as (file, _):
+                table = file.read(columns=names)
+            yield table
+
+
+def run(store: Store, on_progress: Callable[[float], None] | None = None) -> None:
+    """Run what is not finished.
+
+    Args:
+        store: The sweep's, opened.
+        on_progress: Called after every tick with the trials done; a KeyboardInterrupt it raises ends the sweep, what
+            is finished is kept.
+    """
+    study, chunks = store.study, store.study.chunks
+    left = store.left()
+    done = study.trials - sum(chunks.size(number) for number in left)
+    for number in left:
+        size = chunks.size(number)
+        tick = None if on_progress is None else partial(_inside, on_progress, done, size)
+        store.keep(number, table_of(study, compute(study, chunks[number], tick)))
+        give_back()
+        done += size
+        if on_progress:
+            on_progress(done)
+
+
+def _inside(on_progress: Callable[[float], None], done: int, size: int, share: float) -> None:
+    on_progress(done + share * size)
+
+
+def merged(store: Store, path: Path) -> None:
+    """Write all trials of a finished sweep as one file."""
+    write_tables(path, schema_of(store.study), store.tables())
+
+
+def _require_versions(made: Mapping[Path, Any], ours: Mapping[str, str]) -> None:
+    """What is missing is to be computed as what is there was."""
+    for path, there in made.items():
+        said = other_version(there if isinstance(there, Mapping) else {}, ours)
+        if said:
+            raise InputError(f"{path}: {said}; while trials are missing they must be the same: name another folder")
+
+
+def _write(path: Path, fields: Mapping[str, Any]) -> None:
+    with lasting(path) as file:
+        file.write(tomli_w.dumps(dict(fields)).encode())
+
+
+def _require_same(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
+    try:
+        there = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        there = {}
+    if any(not isinstance(there.get(section), dict) for section in SECTIONS):
+        raise InputError(f"{path}: is no study as cmg-mj writes it; name another folder")
+    said = difference(without_asides(there), without_asides(asked))
+    if said:
+        raise InputError(f"{path.parent}: holds another study: {said}; name another folder")
+    return there

@@ -1,0 +1,128 @@
+"""What a sweep costs beside its physics: processor time of the whole loop by that of MuJoCo's batch alone."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from mujoco.batch import Batch
+from rich import box
+from rich.table import Table
+
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.studies.sweeps.axes import parse_axis
+from cmg_mj.studies.sweeps.chunk import compute
+from cmg_mj.studies.sweeps.study import Study
+
+SCENARIO, DURATION_S = "push_recovery", 15.0
+WORLDS_A_RIG = 4
+RIGS = {
+    "plant.equilibrium_bias_deg": "-0.8:0.8",
+    "plant.gimbal_armature_kg_m2": "0:0.002",
+    "plant.gimbal_friction_n_m": "0:0.05",
+    "plant.tilt_friction_n_m": "0:0.02",
+    "sensors.accelerometer.noise_density_ug_rthz": "100:800",
+    "push.0.torque_n_m": "1:3",
+}
+"""What the rigs differ in."""
+
+
+def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float], None]) -> dict[str, Any]:
+    """Time a chunk of two sweeps for each observer: many worlds of one rig, and many rigs.
+
+    On one thread: a pool's threads that wait for work are processor time as well, which is nobody's.
+
+    Args:
+        observers: Names of the observers.
+        worlds: Trials of a chunk.
+        on_progress: Called with the share done.
+
+    Returns:
+        The figures, as `--json` prints them.
+
+    Raises:
+        InputError: An observer does not exist.
+    """
+    cases = [(name, observer) for observer in observers for name in ("worlds", "rigs")]
+    figures = []
+    for i, (name, observer) in enumerate(cases):
+        study = _of_worlds(observer, worlds) if name == "worlds" else _of_rigs(observer, worlds)
+        chunk = study.chunks[0]
+        with _clocked() as clock:
+            start = time.process_time()
+            rows = compute(study, chunk, lambda share, i=i: on_progress((i + share) / len(cases)), threads=1)
+            whole = time.process_time() - start
+        figures.append(
+            {
+                "observer": observer,
+                "rigs": len({number for number, _ in chunk.trials}),
+                "trials": len(rows),
+                "stood": sum(row["stood"] for row in rows),
+                "cpu_s": whole,
+                "batch_cpu_s": clock[0],
+                "cpu_over_batch": whole / clock[0],
+            }
+        )
+    return {"scenario": SCENARIO, "duration_s": DURATION_S, "figures": figures}
+
+
+def table(figures: dict[str, Any]) -> Table:
+    """The table that `cmg-mj bench --sweep` prints."""
+    found = Table(
+        title=f"{figures['scenario']}, {figures['duration_s']:g} s, on one thread: processor time of all by that "
+        "in MuJoCo's batch",
+        box=box.SIMPLE_HEAD,
+        title_justify="left",
+    )
+    found.add_column("observer", vertical="bottom")
+    for heading in ("rigs", "trials", "stood", "all [s]", "batch [s]", "ratio", "trials\na second"):
+        found.add_column(heading, justify="right", vertical="bottom")
+    for row in figures["figures"]:
+        counts = (str(row[key]) for key in ("rigs", "trials", "stood"))
+        rate = row["trials"] / row["cpu_s"]
+        seconds = (f"{row['cpu_s']:.1f}", f"{row['batch_cpu_s']:.1f}", f"{row['cpu_over_batch']:.3f}", f"{rate:.1f}")
+        found.add_row(row["observer"], *counts, *seconds)
+    return found
+
+
+def _scenario() -> Scenario:
+    return load_scenario(SCENARIO, [f"duration_s={DURATION_S}"])
+
+
+def _of_worlds(observer: str, worlds: int) -> Study:
+    scenario = _scenario()
+    return Study(scenario, (parse_axis("plant.equilibrium_bias_deg", "0.5", "rig"),), (observer,), worlds)
+
+
+def _of_rigs(observer: str, worlds: int) -> Study:
+    axes = tuple(parse_axis(field, said, field) for field, said in RIGS.items())
+    rigs = max(1, worlds // WORLDS_A_RIG)
+    return Study(_scenario(), axes, (observer,), WORLDS_A_RIG, "sample", rigs)
+
+
+@contextmanager
+def _clocked() -> Iterator[list[float]]:
+    """Count the processor time in a batch's calls, in one number [s]."""
+    spent = [0.0]
+    plain = {name: getattr(Batch, name) for name in ("step", "forward")}
+
+    def clocked(call: Callable[..., Any]) -> Callable[..., Any]:
+        def timed(*args: Any, **kwargs: Any) -> Any:
+            start = time.process_time()
+            try:
+                return call(*args, **kwargs)
+            finally:
+                spent[0] += time.process_time() - start
+
+        return timed
+
+    for name, call in plain.items():
+        setattr(Batch, name, clocked(call))
+    try:
+        yield spent
+    finally:
+        for name, call in plain.items():
+            setattr(Batch, name, call)

@@ -1,0 +1,158 @@
+"""Sobol indices of a sweep: which of the varied fields an observer's figures depend on. `indices.parquet`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cmg_mj.results.intervals import CONFIDENCE
+from cmg_mj.studies.sweeps.cells import COMPARED, Trials
+from cmg_mj.studies.sweeps.order import figures_of, log_ratio, pairs_of
+from cmg_mj.studies.sweeps.trials import as_table
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+RESAMPLES = 999
+FEWEST = 16
+"""Rows of a design by whose intervals anything is called decisive: those of fewer are too narrow."""
+LOST, LOG_RATIO = "lost_share", "log_ratio_of_"
+"""What is decomposed beside the figures: the share of worlds that fell or stopped, and, before a figure's name, the
+logarithm of two observers' ratio."""
+AT_ONCE = 2_000_000
+"""Values of resamples held together."""
+
+
+class Indices(NamedTuple):
+    """Shares of a variance, with the ends of their 95 % intervals; each (n_fields,).
+
+    Attributes:
+        first: What a field explains by itself.
+        first_low: Its interval's lower end.
+        first_high: Its interval's upper end.
+        total: What it explains with all that it acts together with.
+        total_low: Its interval's lower end.
+        total_high: Its interval's upper end.
+    """
+
+    first: np.ndarray
+    first_low: np.ndarray
+    first_high: np.ndarray
+    total: np.ndarray
+    total_low: np.ndarray
+    total_high: np.ndarray
+
+    @property
+    def decisive(self) -> np.ndarray:
+        """Where the total index's interval lies above that of every other field, (n_fields,)."""
+        others = np.array([np.delete(self.total_high, i).max(initial=-np.inf) for i in range(len(self.total))])
+        return (self.total_low > others) & (len(self.total) > 1)
+
+
+def indices(values: np.ndarray, n: int, seed: int) -> Indices:
+    """First-order and total indices of a function at the points of a design for them.
+
+    S_i = mean(f_B (f_AB_i - f_A)) / var, ST_i = mean((f_A - f_AB_i)^2) / (2 var) (`scipy.stats.sobol_indices`).
+    Intervals: percentiles of resampled rows of the design, by a seed so that they come out the same again.
+
+    Args:
+        values: At A, B, and A with each column in turn from B, (n (n_fields + 2),); finite, and not all the same.
+        n: Rows of the design.
+        seed: Of the resampling.
+
+    Returns:
+        The indices with their intervals.
+    """
+    blocks = values.reshape(-1, n)
+    first, total = _estimated(blocks, np.arange(n)[None])
+    rng = np.random.default_rng(seed)
+    size = max(1, AT_ONCE // len(values))
+    pieces = [min(size, RESAMPLES - done) for done in range(0, RESAMPLES, size)]
+    resampled = [_estimated(blocks, rng.integers(n, size=(piece, n))) for piece in pieces]
+    tail = (1.0 - CONFIDENCE) / 2.0
+    firsts, totals = (np.concatenate(part) for part in zip(*resampled, strict=True))
+    first_low, first_high = np.quantile(firsts, (tail, 1.0 - tail), axis=0)
+    total_low, total_high = np.quantile(totals, (tail, 1.0 - tail), axis=0)
+    return Indices(first[0], first_low, first_high, total[0], total_low, total_high)
+
+
+def _estimated(blocks: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First-order and total indices by some rows of the design, (n_resamples, n) -> (n_resamples, n_fields) each."""
+    from scipy.stats import sobol_indices  # half a second
+
+    taken = blocks[:, rows]
+    found = sobol_indices(func={"f_A": taken[0], "f_B": taken[1], "f_AB": taken[2:]}, n=rows.shape[1])
+    return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)
+
+
+def index_table(rows: Sequence[dict[str, Any]]) -> pa.Table:
+    """The rows of `index_rows` as a table."""
+    import pyarrow as pa
+
+    names = [(name, "string") for name in ("figure", "observer", "field")]
+    found = [(name, "float64") for name in Indices._fields]
+    return as_table(rows, pa.schema([*names, *found, ("decisive", "bool"), ("refused", "string")]))
+
+
+def index_rows(trials: Trials) -> list[dict[str, Any]]:
+    """A row a quantity, observer and field; without indices, and with the reason, where they cannot be had.
+
+    What is decomposed is the mean over a point's worlds, whose noise is the same at every point.
+    """
+    study = trials.study
+    fields = [axis.field for axis in study.axes]
+    rows = []
+    for figure, observer, values, outcome in _quantities(trials):
+        why = _refused(values, outcome, study.n)
+        found = None if why else indices(values.mean(axis=1), study.n, study.scenario.seed)
+        for i, field in enumerate(fields):
+            row: dict[str, Any] = {"figure": figure, "observer": observer, "field": field}
+            row |= {name: None if found is None else float(found[j][i]) for j, name in enumerate(Indices._fields)}
+            row["decisive"] = None if found is None else bool(found.decisive[i]) and study.n >= FEWEST
+            rows.append(row | {"refused": why})
+    return rows
+
+
+def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
+    """What is decomposed: its name, whose it is, the values and the outcomes, (n_points, n_worlds) each.
+
+    Every observer's figures; how often it did not stand; and by a named order the logarithm of the ratio of two errors.
+    """
+    observers = trials.study.observers
+    for key in COMPARED:
+        values = trials.figure(key)
+        if np.isfinite(values).any() or not trials.stood.any():  # not an error in the window of no push
+            for place, observer in enumerate(observers):
+                yield key, observer, values[:, place], trials.outcome[:, place]
+    for place, observer in enumerate(observers):
+        lost = ~trials.stood[:, place]
+        yield LOST, observer, lost.astype(float), np.full(lost.shape, "done", dtype=object)
+    for better, worse in pairs_of(trials.study.order):
+        both = [observers.index(better), observers.index(worse)]
+        outcome = np.where(trials.stood[:, both[0]], trials.outcome[:, both[1]], trials.outcome[:, both[0]])
+        for key in figures_of(trials):
+            yield f"{LOG_RATIO}{key}", f"{better} / {worse}", log_ratio(trials, key, better, worse), outcome
+
+
+def _refused(values: np.ndarray, outcome: np.ndarray, n: int) -> str | None:
+    """Why a quantity has no indices, with counts; of a design of n rows."""
+    means = values.mean(axis=1)
+    if np.isfinite(means).all():
+        if np.ptp(means) == 0.0:
+            return "the same at every point"
+        independent = 2 * n  # A and B, of which the variance is taken
+        if np.ptp(means[:independent]) > 0.0:
+            return None
+        others = int((means[independent:] != means[0]).sum())
+        return (
+            f"the same at all {independent} independent points of the design: no variance to share out "
+            f"(another value at {others} of the {len(means) - independent} made of them; take more rows)"
+        )
+    fell = int((outcome == "fell").sum())
+    stopped = int(((outcome != "done") & (outcome != "fell")).sum())
+    none = int((~np.isfinite(values) & (outcome == "done")).sum())
+    counts = [f"{n} {what}" for n, what in ((fell, "fell"), (stopped, "stopped"), (none, "have no such figure")) if n]
+    points = f"no value at {int((~np.isfinite(means)).sum())} of {len(means)} points"
+    return f"{points}: of {values.size} trials {', '.join(counts)}"

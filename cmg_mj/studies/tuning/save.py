@@ -1,0 +1,184 @@
+"""A study as figures, as a table, and as files."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.table import Table
+
+from cmg_mj.results.intervals import Interval
+from cmg_mj.results.run_folder import RunFolder, claimed, write_text
+from cmg_mj.simulation.experiment import prepare
+from cmg_mj.studies.tuning.on_simulations import windows_of
+from cmg_mj.studies.tuning.study import Level, Study, best_noise, tuned_scenario
+
+
+def figures_of(study: Study) -> dict[str, Any]:
+    """What `cmg-mj tune --json` prints."""
+    best = best_noise(study)
+    return {
+        "scenario": study.scenario.title,
+        "observer": study.kind,
+        "seed": study.scenario.seed,
+        "worlds_fitted": study.worlds,
+        "window_s": list(study.window),
+        "scored_s": [list(window) for window in windows_of(study.scenario)],
+        "given_parameters": plain(study.given),
+        "tuned": [number.name for number in study.numbers],
+        "idle": list(study.idle),
+        "levels": [level_figures(level) for level in study.levels],
+        "given_best_at_noise_density_ug_rthz": best.noise_ug_rthz,
+        **({"given_best_noise_is": best.where} if len(study.levels) > 1 else {}),
+    }
+
+
+def level_figures(level: Level) -> dict[str, Any]:
+    """One level's figures."""
+    return {
+        "noise_density_ug_rthz": level.noise_ug_rthz,
+        "parameters": plain(level.parameters),
+        "at_a_limit": list(level.edges),
+        "fit_rms_error_rad_s": _number(level.fit_rms),
+        "fit_given_rms_error_rad_s": _number(level.fit_given_rms),
+        "held_out_worlds": len(level.rms),
+        "held_out_rms_error_rad_s": _number(float(level.rms.mean())),
+        "held_out_given_rms_error_rad_s": _number(float(level.given_rms.mean())),
+        "held_out_fit": _number(level.fit),
+        "held_out_given_fit": _number(level.given_fit),
+        "held_out_ratio": _interval(level.ratio),
+        "verdict": level.verdict,
+        "zero_estimate_rms_error_rad_s": level.zero_rms,
+        "largest_tilt_acceleration_rad_s2": level.largest_acceleration,
+        "worlds_that_fell": level.fell,
+    }
+
+
+def plain(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters as JSON and TOML can hold them."""
+    return {name: _listed(value) for name, value in parameters.items() if value is not None}
+
+
+def _listed(value: Any) -> Any:
+    """Tuples as lists, and nothing that JSON or TOML cannot hold."""
+    if isinstance(value, tuple):
+        return [_listed(item) for item in value]
+    return value if isinstance(value, (bool, int, float, str)) else str(value)
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _interval(interval: Interval) -> list[float | None]:
+    return [_number(value) for value in interval]
+
+
+def tuning_table(study: Study) -> Table:
+    """The table that `cmg-mj tune` prints."""
+    scenario = study.scenario
+    title = f"{scenario.title or 'Tuning'}: {study.kind}, seed {scenario.seed}"
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0), caption=_caption(study))
+    table.caption_justify = "left"
+    table.add_column("noise\n[ug/rtHz]", justify="right", vertical="bottom")
+    for number in study.numbers:
+        table.add_column(f"{number.name}\ngiven {number.given:.4g}", justify="right", vertical="bottom")
+    for heading in (
+        "held out:\ntuned\n[rad/s]",
+        "\ngiven\n[rad/s]",
+        "\ngiven / tuned, 95 %",
+        "tuned is",
+    ):
+        table.add_column(heading, justify="right", vertical="bottom")
+    for level in study.levels:
+        signed = {n.name: math.copysign(level.sizes[n.name], n.given) for n in study.numbers}
+        sizes = (f"{size:.4g}{'*' if name in level.edges else ''}" for name, size in signed.items())
+        table.add_row(
+            f"{level.noise_ug_rthz:g}",
+            *sizes,
+            f"{level.rms.mean():.4f}",
+            f"{level.given_rms.mean():.4f}",
+            spread(level.ratio),
+            level.verdict,
+        )
+    return table
+
+
+def spread(ratio: Interval) -> str:
+    """To three decimals, or as many as show on which side of 1 an end lies."""
+    digits = 3
+    while digits < 6 and any(value != 1.0 and round(value, digits) == 1.0 for value in ratio[1:]):
+        digits += 1
+    mean, low, high = (f"{value:.{digits}f}" for value in ratio)
+    return f"{mean} ({low} to {high})"
+
+
+def _caption(study: Study) -> str:
+    """What the table does not say by itself."""
+    spans = ", ".join(f"{start:g} s to {end:g} s" for start, end in windows_of(study.scenario))
+    lines = [f"RMS of the estimated rate less the gyro's, {spans}, on worlds that were not fitted."]
+    if not study.scenario.push:
+        lines.append("There is no push: the window is the whole run, where an estimate of zero may do best.")
+    zero = [f"{level.zero_rms:.4f}" for level in study.levels]
+    lines.append(f"An estimate of zero: {' to '.join(dict.fromkeys([min(zero), max(zero)]))} rad/s.")
+    for level in study.levels:
+        worse = [name for name, fit in (("tuned", level.fit), ("given", level.given_fit)) if not fit > 0.0]
+        at = f"At {level.noise_ug_rthz:g} ug/rtHz the" if len(study.levels) > 1 else "The"
+        fits = f"fit there is {level.fit:.2f} tuned, {level.given_fit:.2f} given"
+        lines.append(f"{at} {fits}" + (f": worse than an estimate of zero, {' and '.join(worse)}." if worse else "."))
+    if study.idle:
+        lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.idle)}.")
+    if any(level.edges for level in study.levels):
+        lines.append("* at a limit of its range.")
+    fell = sum(level.fell for level in study.levels)
+    if fell:
+        lines.append(f"Left out: {fell} worlds that fell.")
+    if len(study.levels) > 1:
+        lines.append(_best(study))
+    return "\n".join(lines)
+
+
+def _best(study: Study) -> str:
+    """At which noise the given parameters are the best ones, in words."""
+    best = best_noise(study)
+    if best.noise_ug_rthz is None:
+        if best.where == "not bracketed":
+            return "The noises tried do not show at which one the given parameters are best."
+        return f"The given parameters are best at a noise {best.where} these, if at any."
+    if len(study.numbers) == 1:
+        return f"The given parameters are best at about {best.noise_ug_rthz:.0f} ug/rtHz."
+    return f"Of these noises the given parameters lose least at {best.noise_ug_rthz:g} ug/rtHz."
+
+
+def files_of_study(noises_ug_rthz: Sequence[float]) -> list[str]:
+    """Names of what a study writes: one noise makes scenario.toml, several make scenario-NOISE.toml."""
+    several = [f"scenario-{noise:g}.toml" for noise in noises_ug_rthz] if len(noises_ug_rthz) > 1 else ["scenario.toml"]
+    return ["tuned.json", *several]
+
+
+def save_study(folder: RunFolder | Path, study: Study, *, complete: bool = True) -> list[Path]:
+    """Write tuned.json and a scenario a sensor noise, which runs with the tuned observer.
+
+    Args:
+        folder: Where. What is there and was not written by cmg_mj stays.
+        study: What to write.
+        complete: Whether these are all noises that were asked for.
+
+    Returns:
+        The files.
+
+    Raises:
+        InputError: A file cannot be written.
+    """
+    names = files_of_study([level.noise_ug_rthz for level in study.levels])
+    writers = (
+        lambda path: write_text(path, json.dumps(figures_of(study), indent=2)),
+        *(prepare(tuned_scenario(study, level)).save for level in study.levels),
+    )
+    with claimed(folder) as it:
+        place = it.write(dict(zip(names, writers, strict=True)), complete=complete)
+    return [place / name for name in names]

@@ -1,0 +1,1 @@
+"""Shows runs: matplotlib plots, rerun recordings, MuJoCo Studio."""

@@ -1,0 +1,1 @@
+"""Draws figures with matplotlib, which only `run_plot.py` imports."""

@@ -1,0 +1,247 @@
+"""Plots. No other part of the package imports matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmg_mj.results.summary_keys import written
+from cmg_mj.results.trajectory import Trajectory, whole_file
+from cmg_mj.visualization.plots.colours import colour, colours, hexadecimal
+from cmg_mj.visualization.plots.figure_spec import Panel, Picture
+from cmg_mj.visualization.plots.map_plot import draw_map
+from cmg_mj.visualization.plots.readability import JUDGED_BY, axis_range, best, by_observer, shortened
+
+
+def pyplot() -> Any:
+    """Matplotlib's pyplot, drawing into files."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    return plt
+
+
+def draw(path: Path, picture: Picture) -> None:
+    """Draw a picture.
+
+    Args:
+        path: The PNG to write.
+        picture: What to draw.
+    """
+    plt = pyplot()
+    columns = picture.columns
+    rows = -(-len(picture.panels) // columns)
+    size = (9.0 if columns == 1 else 5.5 * columns, 0.8 + picture.panel_height * rows)
+    figure, grid = plt.subplots(
+        rows, columns, sharex="col" if picture.share_x else False, figsize=size, layout="constrained", squeeze=False
+    )
+    for i, axes in enumerate(grid.flat):
+        if i >= len(picture.panels):
+            axes.set_visible(False)
+            continue
+        panel = picture.panels[i]
+        _draw_panel(axes, panel)
+        lowest = i + columns >= len(picture.panels)
+        if lowest or not picture.share_x:
+            axes.set_xlabel(panel.x_label)
+            axes.tick_params(labelbottom=True)
+    figure.align_ylabels()
+    figure.suptitle(picture.title, x=0.01, ha="left", parse_math=False)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=100, format="png")
+    plt.close(figure)
+
+
+def _draw_panel(axes: Any, panel: Panel) -> None:
+    palette = colours(line.color for line in panel.lines if isinstance(line.color, str))
+    for line in panel.lines:
+        style = {"linewidth": line.width, "label": line.label or None}
+        if line.color is not None:
+            style["color"] = hexadecimal(palette[line.color]) if isinstance(line.color, str) else f"C{line.color}"
+        (drawn,) = axes.plot(line.x, line.y, line.style, markersize=4, **style)
+        if line.spread is not None:
+            below, above = np.broadcast_to(line.spread, (2, len(line.y)))
+            low, high = np.subtract(line.y, below), np.add(line.y, above)
+            if line.bars:
+                axes.vlines(line.x, low, high, color=drawn.get_color(), alpha=0.6, linewidth=line.width)
+            else:
+                axes.fill_between(line.x, low, high, color=drawn.get_color(), alpha=0.2, linewidth=0)
+    for start, end in panel.shaded:
+        axes.axvspan(start, end, color="C3", alpha=0.25, linewidth=0, zorder=0)
+    axes.set_xscale(panel.x_scale)
+    axes.set_yscale(panel.y_scale)
+    axes.set_ylabel(panel.y_label)
+    axes.set_title(panel.title, loc="left", fontsize="medium")
+    _mark(axes.xaxis, panel.x_ticks)
+    _mark(axes.yaxis, panel.y_ticks)
+    if panel.map is not None:
+        draw_map(axes, panel.map)
+        return
+    axes.grid(alpha=0.3)
+    marks_only = all(set(line.style) <= set("o.x+s") for line in panel.lines)
+    axes.margins(x=0.0 if panel.x_scale == "linear" and not marks_only and panel.x_ticks is None else 0.03)
+    if panel.y_range is not None:
+        axes.set_ylim(*panel.y_range)
+    if any(line.label for line in panel.lines):
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=4, frameon=False, borderpad=0)
+
+
+def _mark(axis: Any, ticks: Sequence[float] | None) -> None:
+    if ticks is not None:
+        axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+        axis.set_ticks([], minor=True)
+
+
+INK = "0.15"
+"""What is true, on paper."""
+MEASURED = hexadecimal(colour("gyro"))
+PAGE = (9.0, 12.7)
+"""A page [inch]."""
+PANEL_HEIGHT, SMALL_HEIGHT, SMALL_COLUMNS, SMALL_ROWS = 1.8, 1.3, 4, 3
+"""Of the panels, and of the small ones of observers for which there is no room in them."""
+
+
+def plot_run(
+    path: Path,
+    trajectory: Trajectory,
+    title: str,
+    summary: Mapping[str, Any],
+    *,
+    settle_band_deg: float,
+    rate_limit_rad_s: float,
+) -> None:
+    """Plot a run on one page: tilt, tilt rate, error of the estimates, gimbal angle, command.
+
+    The observer in the loop and the best of those riding along share the panels; each of the others has a small one.
+
+    Args:
+        path: The PNG to write.
+        trajectory: One world.
+        title: Above the plot.
+        summary: The run's numbers, by which the best are found.
+        settle_band_deg: Settled is a tilt within this much of zero [deg].
+        rate_limit_rad_s: Largest command [rad/s].
+    """
+    plt = pyplot()
+    summaries = by_observer(trajectory.observers, summary)
+    few = best(summaries, always=trajectory.observers[:1])
+    others = [name for name in trajectory.observers if name not in few]
+    columns = max(SMALL_COLUMNS, -(-len(others) // SMALL_ROWS))
+    small = [others[i : i + columns] for i in range(0, len(others), columns)]
+    heights = [PANEL_HEIGHT] * 5 + [SMALL_HEIGHT] * len(small)
+    figure = plt.figure(figsize=(PAGE[0], min(PAGE[1], 0.6 + sum(heights))), layout="constrained")
+    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
+    panels = [figure.add_subplot(grid[0, :])]
+    panels += [figure.add_subplot(grid[i, :], sharex=panels[0]) for i in range(1, 5)]
+    _draw_tilt(panels[0], trajectory, settle_band_deg)
+    palette = {name: hexadecimal(rgb) for name, rgb in colours(trajectory.observers).items()}
+    labels = shortened(trajectory.observers)
+    rates = _draw_estimates(panels[1], panels[2], trajectory, {name: palette[name] for name in few}, summaries)
+    _draw_actuators(panels[3], panels[4], trajectory, rate_limit_rad_s)
+    for i, row in enumerate(small, 5):
+        for j, name in enumerate(row):
+            axes = figure.add_subplot(grid[i, j], sharex=panels[0])
+            _draw_small(axes, trajectory, name, labels[name], palette[name], rates)
+            lowest = i == len(heights) - 1 or j >= len(small[-1])
+            axes.tick_params(labelbottom=lowest, labelleft=j == 0, labelsize="small")
+            if j == 0:
+                axes.set_ylabel("tilt rate\n[rad/s]", fontsize="small")
+            panels.append(axes)
+    t, pushed = trajectory["time_s"], trajectory["push_n_m"] != 0.0
+    for axes in panels:
+        if pushed.any():
+            label = "push" if axes is panels[0] else None
+            style = {"color": "C3", "alpha": 0.25, "linewidth": 0, "zorder": 0, "label": label}
+            axes.fill_between(t, 0, 1, where=pushed, transform=axes.get_xaxis_transform(), **style)
+        axes.grid(alpha=0.3)
+        axes.margins(x=0.0)
+    for axes in panels[:5]:
+        axes.tick_params(labelbottom=axes is panels[4])
+        legend = {"fontsize": "small", "ncols": 6, "frameon": False, "borderpad": 0, "columnspacing": 1.4}
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), **legend)
+    panels[4].set_xlabel("time [s]")
+    figure.align_ylabels(panels[:5])
+    figure.suptitle(title, x=0.01, ha="left", parse_math=False)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=110, format="png")
+    plt.close(figure)
+
+
+def _draw_tilt(axes: Any, trajectory: Trajectory, band: float) -> None:
+    t = trajectory["time_s"]
+    measured, true = np.degrees(trajectory["y1_rad"]), np.degrees(trajectory["x1_rad"])
+    axes.plot(t, measured, color=MEASURED, linewidth=0.6, alpha=0.7, label="measured $y_1$")
+    axes.plot(t, true, color=INK, linewidth=1.3, label="true $x_1$ (from equilibrium)")
+    _draw_bounds(axes, band, "settle band")
+    axes.set_ylabel("tilt [deg]")
+    fit(axes, [true], [measured, np.array([band, -band])])
+
+
+def _draw_estimates(
+    rates: Any,
+    errors: Any,
+    trajectory: Trajectory,
+    palette: Mapping[str, str],
+    summaries: Mapping[str, Mapping[str, Any]],
+) -> tuple[float, float] | None:
+    """Tilt rate and error of some observers; the range of the rates."""
+    t, true = trajectory["time_s"], trajectory["x2_rad_s"]
+    estimates = {name: trajectory[f"estimate/{name}/x2_rad_s"] for name in palette}
+    rates.plot(t, trajectory["fog_rad_s"], color=MEASURED, linewidth=0.6, label="gyro")
+    rates.plot(t, true, color=INK, linewidth=1.8, label="true $x_2$")
+    labels = shortened(trajectory.observers)
+    judged_by = next((key for key in JUDGED_BY if any(summaries[name].get(key) is not None for name in palette)), "")
+    if judged_by:
+        errors.plot([], [], " ", label="RMS in push windows:" if "push" in judged_by else "RMS:")
+    for name, color in palette.items():
+        label = labels[name].lstrip("_")  # matplotlib hides what begins with an underscore
+        style = {"color": color, "linewidth": 0.8}
+        rms = summaries[name].get(judged_by)
+        rates.plot(t, estimates[name], **style, label=f"{label} $\\hat x_2$")
+        errors.plot(
+            t, estimates[name] - true, **style, label=f"{label} {written(judged_by, rms)}" if judged_by else label
+        )
+    rates.set_ylabel("tilt rate\n[rad/s]")
+    errors.set_ylabel("error $\\hat x_2 - x_2$\n[rad/s]")
+    fit(errors, [true], [estimate - true for estimate in estimates.values()])
+    return fit(rates, [true], [*estimates.values()])
+
+
+def _draw_small(
+    axes: Any, trajectory: Trajectory, name: str, label: str, color: str, rates: tuple[float, float] | None
+) -> None:
+    """One observer's estimate on the axis of the others."""
+    t = trajectory["time_s"]
+    axes.plot(t, trajectory[f"estimate/{name}/x2_rad_s"], color=color, linewidth=0.5)
+    axes.plot(t, trajectory["x2_rad_s"], color=INK, linewidth=0.8)
+    axes.set_title(label, loc="left", fontsize="small", parse_math=False, pad=2.0)
+    if rates is not None:
+        axes.set_ylim(*rates)
+
+
+def _draw_actuators(gimbal: Any, command: Any, trajectory: Trajectory, limit: float) -> None:
+    t, u = trajectory["time_s"], trajectory["u_rad_s"]
+    gimbal.plot(t, np.degrees(trajectory["x3_rad"]), color=INK, linewidth=1.3, label="true $x_3$")
+    gimbal.set_ylabel("gimbal angle\n[deg]")
+    command.step(t, u, where="post", color=INK, linewidth=0.6, label="command $u$")
+    _draw_bounds(command, limit, "rate limit")
+    command.set_ylabel("gimbal rate\n[rad/s]")
+    fit(command, [u], [np.array([limit, -limit])])
+
+
+def _draw_bounds(axes: Any, bound: float, label: str) -> None:
+    for value, named in ((bound, label), (-bound, None)):
+        axes.axhline(value, color="0.5", linewidth=0.8, linestyle="--", label=named)
+
+
+def fit(axes: Any, sure: Sequence[np.ndarray], rather: Sequence[np.ndarray]) -> tuple[float, float] | None:
+    """Give an axis the range in which these can be read."""
+    found = axis_range(sure, rather)
+    if found is not None:
+        axes.set_ylim(*found)
+    return found

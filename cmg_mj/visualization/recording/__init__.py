@@ -1,0 +1,89 @@
+"""Trajectory -> .rrd, to be looked at in rerun. No other part of the package imports rerun."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cmg_mj.plant.plant import Plant
+from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.schema import MetricsSettings
+from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.recording.blueprint import default_blueprint
+from cmg_mj.visualization.recording.camera import Ball, ball
+from cmg_mj.visualization.recording.pages import log_results, log_scenario
+from cmg_mj.visualization.recording.run import Run
+from cmg_mj.visualization.recording.scene import log_rig, pose_samples
+from cmg_mj.visualization.recording.signals import (
+    Branch,
+    log_lane,
+    log_phases,
+    log_series,
+    numbered,
+    phase_steps,
+    series,
+)
+from cmg_mj.visualization.recording.stream import application_of, recorded
+
+__all__ = ["Run", "write_recording"]
+
+
+def write_recording(
+    path: Path,
+    plant: Plant,
+    runs: Sequence[Run],
+    *,
+    title: str = "",
+    pushes: Sequence[Push] = (),
+    settings: MetricsSettings | None = None,
+    rate_limit_rad_s: float | None = None,
+    scenario_toml: str = "",
+) -> None:
+    """Write one run, or several to be compared, as a rerun recording; whole or not at all.
+
+    Args:
+        path: The file, `recording.rrd`.
+        plant: The rig of all runs.
+        runs: The runs; each has a branch of its own, by its name.
+        title: The experiment's title.
+        pushes: Torques from outside, the same in all runs.
+        settings: What counts as settled.
+        rate_limit_rad_s: Largest gimbal rate, if it is to be shown [rad/s].
+        scenario_toml: The resolved scenario.
+
+    Raises:
+        ValueError: There is no run, or two have the same name.
+        InputError: The environment turns rerun off.
+        OSError: The file cannot be written.
+    """
+    names = [run.name for run in runs]
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"a recording needs runs of different names, not {names}")
+    settings = settings or MetricsSettings()
+    labels = shortened(names).values()
+    rigs = [plant if run.axis is None else plant.along(run.axis) for run in runs]
+    branches = [
+        Branch(
+            path=f"/{part}",
+            label=label,
+            series={row.path: row for row in series(run, rig, settings, rate_limit_rad_s)},
+            run=run,
+            rig=_around(run, rig),
+        )
+        for part, label, run, rig in zip(numbered(names), labels, runs, rigs, strict=True)
+    ]
+    title_line = f"{title or 'Run'}: {', '.join(labels)}"
+    with recorded(path, title_line, application_of(names, branches), default_blueprint(plant, branches)) as rec:
+        end = max(run.outcome.time_s for run in runs)
+        for branch, rig in zip(branches, rigs, strict=True):
+            felt = branch.run.felt(pushes)
+            log_rig(rec, branch.path, rig, branch.run, felt)
+            log_series(rec, branch)
+            log_lane(rec, branch.path)
+            log_phases(rec, branch.path, phase_steps(branch.run, felt, settings, end))
+        log_results(rec, runs, title, pushes, settings)
+        log_scenario(rec, scenario_toml)
+
+
+def _around(run: Run, plant: Plant) -> Ball:
+    return ball(plant, pose_samples(plant, run)[1])

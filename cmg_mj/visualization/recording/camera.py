@@ -1,0 +1,96 @@
+"""Where a rig is and how large, whatever its size: for the camera, and for what is drawn to its scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from cmg_mj.plant.plant import Plant
+
+SHOWN_GROUPS = 3
+"""Geoms and sites of groups 0 to 2 are drawn, as in MuJoCo's own viewers."""
+
+POSES = 25
+"""So many poses of a run are looked at."""
+
+FARTHEST = 2.0
+"""A rig that travels farther than so many of its radii is shown where it starts."""
+
+CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball that holds the rig.
+
+    Attributes:
+        centre: (3,) [m].
+        radius: [m].
+    """
+
+    centre: np.ndarray
+    radius: float
+
+
+def is_drawn(group: int, rgba: np.ndarray) -> bool:
+    """Whether MuJoCo would draw it."""
+    return group < SHOWN_GROUPS and bool(rgba[3] > 0.0)
+
+
+def geom_rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """A geom's colour: its own, or its material's if it has none of its own."""
+    own, material = model.geom_rgba[geom], model.geom_matid[geom]
+    return model.mat_rgba[material] if material >= 0 and np.all(own == (0.5, 0.5, 0.5, 1.0)) else own
+
+
+def ball(plant: Plant, qpos: np.ndarray) -> Ball:
+    """Find what a camera must see of a rig during a run.
+
+    Args:
+        plant: The rig.
+        qpos: Joint angles, (n, n_joints) [rad].
+
+    Returns:
+        All that is drawn of the moving bodies, and what stands still beside them: floors and walls do not count.
+    """
+    model = plant.drawn_model
+    data = mujoco.MjData(model)
+    drawn = [i for i in range(model.ngeom) if is_drawn(model.geom_group[i], geom_rgba(model, i))]
+    drawn = [i for i in drawn if model.geom_type[i] != int(mujoco.mjtGeom.mjGEOM_PLANE)]
+    moving = [i for i in drawn if model.geom_bodyid[i]]
+    still = [i for i in drawn if not model.geom_bodyid[i]]
+
+    def place(angles: np.ndarray) -> list[np.ndarray]:
+        data.qpos[:] = angles
+        mujoco.mj_kinematics(model, data)
+        return [_corners(model, data, i) for i in moving]
+
+    first = place(plant.new_data().qpos)
+    if not first:
+        mujoco.mj_comPos(model, data)
+        return Ball(data.subtree_com[0].copy(), float(model.stat.extent))
+    around_first = _around(first)
+    beside = [corners for corners in (_corners(model, data, i) for i in still) if _is_within(corners, around_first)]
+    poses = qpos[np.isfinite(qpos).all(axis=1)]
+    poses = poses[np.unique(np.linspace(0, max(len(poses) - 1, 0), POSES).astype(int))] if len(poses) else poses
+    during = _around([*first, *beside, *(corners for angles in poses for corners in place(angles))])
+    return during if during.radius < FARTHEST * around_first.radius else _around([*first, *beside])
+
+
+def _corners(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
+    """Corners of a geom's box in the world, (8, 3) [m]."""
+    centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+    return data.geom_xpos[geom] + (centre + half * CORNERS) @ data.geom_xmat[geom].reshape(3, 3).T
+
+
+def _around(points: list[np.ndarray]) -> Ball:
+    all_points = np.concatenate(points)
+    centre = (all_points.min(axis=0) + all_points.max(axis=0)) / 2.0
+    return Ball(centre, float(np.linalg.norm(all_points - centre, axis=1).max()))
+
+
+def _is_within(points: np.ndarray, rig: Ball) -> bool:
+    """Whether something is near enough to a rig to be a part of it."""
+    return bool(np.linalg.norm(points - rig.centre, axis=1).max() < FARTHEST * rig.radius)

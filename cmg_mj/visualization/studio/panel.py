@@ -1,0 +1,164 @@
+"""The panel in Studio's viewer: what is chosen, pushed and plotted. It runs on the viewer's thread."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+from mujoco.studio import messages, plugin
+from mujoco.studio.dear_imgui import dear_imgui as imgui
+from mujoco.studio.implot import implot
+
+from cmg_mj.visualization.studio.messages import Choose, PushNow, ShowAxis, Standing, StartAgain
+from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER
+
+TITLE = "Gyroscopic balance"
+PLOTTED_S = 6.0
+PLOT_HEIGHT = 122.0
+FEEDBACKS = {"observer": "the observer's", "fog": "the gyro's", "truth": "the true one"}
+
+logger = logging.getLogger(__name__)
+
+
+class Panel(plugin.ViewerPlugin):
+    """A window with everything that can be changed while the rig runs, and plots.
+
+    Attributes:
+        standing: Where things stand, as the simulation has said last.
+    """
+
+    def __init__(self) -> None:
+        self.standing = Standing()
+        self._curves: dict[str, list[float]] = {}
+        self._torque, self._duration = 1.0, 0.1
+        self._typed: dict[str, float] = {}
+        self._shown = True
+        self._broken = False
+
+    @messages.handler
+    def on_standing(self, event: Standing) -> None:
+        """Prepare what is drawn until the next one."""
+        self.standing = event
+        recent = event.ticks[event.ticks[:, 0] > event.time_s - PLOTTED_S]
+        recent = recent[:: max(1, len(recent) // 1200)]
+        names = ("time", "tilt", "rate", "estimate", "command", "push")
+        self._curves = {name: np.ascontiguousarray(recent[:, i]).tolist() for i, name in enumerate(names)}
+
+    @messages.handler
+    def on_build_gui(self, _: messages.BuildGuiEvent) -> None:
+        """Draw it. What goes wrong here ends the panel, not the viewer."""
+        if self._broken:
+            return
+        try:
+            if imgui.BeginMainMenuBar():
+                if imgui.BeginMenu("View"):
+                    if imgui.MenuItem(TITLE, "", self._shown):
+                        self._shown = not self._shown
+                    imgui.EndMenu()
+                imgui.EndMainMenuBar()
+            if self._shown:
+                self._build_window()
+        except Exception:
+            self._broken = True
+            logger.exception("the panel has failed and is gone; the simulation runs on")
+
+    def _build_window(self) -> None:
+        right = imgui.Vec2(imgui.GetIO().DisplaySize.x - 15.0, 45.0)
+        imgui.SetNextWindowPos(right, int(imgui.Cond.FirstUseEver), imgui.Vec2(1.0, 0.0))
+        imgui.SetNextWindowSize(imgui.Vec2(430.0, 770.0), int(imgui.Cond.FirstUseEver))
+        expanded, self._shown = imgui.Begin(TITLE, self._shown)
+        try:
+            if expanded:
+                self._build()
+        finally:
+            imgui.End()
+
+    def _build(self) -> None:
+        now = self.standing
+        imgui.TextWrapped(now.title)
+        imgui.TextUnformatted(f"t = {now.time_s:.3f} s")
+        if now.stopped:
+            imgui.TextWrapped(f"The controller has stopped: {now.stopped}")
+            if imgui.Button("Start it again"):
+                self._send(StartAgain())
+        if now.note:
+            imgui.TextWrapped(now.note)
+        if now.settings:
+            several = len(now.axes) > 1
+            if several:
+                axis = _chosen("axis shown and pushed", now.axis, {name: name for name in now.axes})
+                if axis is not None:
+                    self._send(ShowAxis(axis))
+            imgui.SeparatorText("Controller, on all axes" if several else "Controller")
+            self._build_choices(now)
+            imgui.SeparatorText("Disturbances")
+            self._build_disturbances(now)
+            imgui.SeparatorText(f"The last {PLOTTED_S:g} s")
+            self._build_plots(now)
+
+    def _build_choices(self, now: Standing) -> None:
+        observer = _chosen("observer", now.settings[OBSERVER], {name: name for name in now.observers})
+        if observer is not None:
+            self._choose({OBSERVER: observer})
+        law = _chosen("law", now.law, {name: name for name in now.laws})
+        if law is not None:
+            self._choose(now.laws[law])
+        if now.gains:
+            imgui.TextUnformatted("K_e = " + ", ".join(f"{gain:.3g}" for gain in now.gains))
+        feedback = _chosen("rate fed back", now.settings[FEEDBACK], FEEDBACKS)
+        if feedback is not None:
+            self._choose({FEEDBACK: feedback})
+
+    def _build_disturbances(self, now: Standing) -> None:
+        _, self._torque = imgui.InputDouble("torque [N m]", self._torque, 0.1, 1.0, "%.2f")
+        _, self._duration = imgui.InputDouble("duration [s]", self._duration, 0.05, 0.5, "%.3f")
+        for label, sign in (("Push +", 1.0), ("Push -", -1.0)):
+            if imgui.Button(label) and self._duration > 0.0:
+                self._send(PushNow(sign * self._torque, self._duration))
+            imgui.SameLine()
+        imgui.NewLine()
+        on_all = ", all axes" if len(now.axes) > 1 else ""
+        self._build_number(f"e{on_all} [deg]", BIAS, now.settings[BIAS], 0.1)
+        self._build_number(f"noise{on_all} [ug/rtHz]", NOISE, now.settings[NOISE], 100.0)
+
+    def _build_number(self, label: str, field: str, value: float, step: float) -> None:
+        """A number that counts once it has been typed to the end."""
+        changed, typed = imgui.InputDouble(label, self._typed.get(field, value), step, 10.0 * step, "%.4g")
+        if changed:
+            self._typed[field] = typed
+        if imgui.IsItemDeactivatedAfterEdit() and field in self._typed:
+            self._choose({field: self._typed[field]})
+        if not imgui.IsItemActive():
+            self._typed.pop(field, None)
+
+    def _build_plots(self, now: Standing) -> None:
+        for title, unit, curves in (
+            ("Tilt", "deg", {"tilt": "tilt"}),
+            ("Tilt rate", "rad/s", {"rate": "true", "estimate": "estimate"}),
+            ("Command", "rad/s", {"command": "u"}),
+        ):
+            flags = int(implot.Flags.NoLegend) if len(curves) == 1 else 0
+            if implot.BeginPlot(f"{title} [{unit}]", imgui.Vec2(-1.0, PLOT_HEIGHT), flags):
+                implot.SetupAxes("", "", 0, int(implot.AxisFlags.AutoFit))
+                start, always = now.time_s - PLOTTED_S, int(implot.Cond.Always)
+                implot.SetupAxisLimits(int(implot.Axis.X1), start, now.time_s, always)
+                implot.SetupLegend(int(implot.Location.NorthWest), int(implot.LegendFlags.Horizontal))
+                for name, label in curves.items():
+                    if self._curves.get("time"):
+                        implot.PlotLine(label, self._curves["time"], self._curves[name])
+                implot.EndPlot()
+
+    def _choose(self, values: dict[str, Any]) -> None:
+        self._send(Choose(values))
+
+    def _send(self, message: messages.Message) -> None:
+        self.viewer.send_to_sim(message)
+
+
+def _chosen(label: str, now: str, options: dict[str, str]) -> str | None:
+    """A list to choose from: what has been chosen just now, if anything."""
+    names = list(options)
+    place = names.index(now) if now in names else -1
+    changed, place = imgui.Combo(label, place, list(options.values()))
+    return names[place] if changed and 0 <= place < len(names) else None

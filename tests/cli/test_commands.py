@@ -1,0 +1,374 @@
+"""The command line: what it says where, to whom, and with which exit status."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+import tomli_w
+from click.testing import CliRunner
+from rich.table import Table
+
+from cmg_mj import load_scenario
+from cmg_mj.cli import cli
+from cmg_mj.inputs.bundled import bundled
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.terminal_tables import columns_of, comparison_table
+from cmg_mj.studies.compare import comparison
+from cmg_mj.studies.compare.statistics import standings
+from tests.command import COMMAND, cmg_mj, cmg_mj_process, environment
+from tests.run_folders import assert_whole
+
+SUMMARY = [
+    "observer",
+    "seed",
+    "fell",
+    "settle_time_s",
+    "velocity_rms_error_rad_s",
+    "velocity_rms_error_fog_rad_s",
+    "tilt_rms_deg",
+    "gimbal_peak_deg",
+    "command_rms_rad_s",
+    "command_saturated_fraction",
+]
+"""Names that users' scripts rely on."""
+
+COMMANDS = sorted(cli.commands)
+
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+@pytest.fixture
+def quick() -> str:
+    """A short scenario with a push."""
+    Path("quick.toml").write_text("title = 'Quick'\nduration_s = 0.4\n[[push]]\nstart_s = 0.2")
+    return "quick.toml"
+
+
+# --- help ----------------------------------------------------------------------------------------------------
+
+
+def test_help_names_every_command_in_a_whole_line() -> None:
+    said = cmg_mj("--help")
+    assert (said.status, said.err) == (0, "")
+    listed = said.out.partition("Commands:\n")[2]
+    assert re.findall(r"^  (\w+)  +[A-Z][^\n]*[a-z]\.$", listed, re.MULTILINE) == COMMANDS
+    assert "..." not in said.out.replace("[ARGS]...", "")
+    assert "\n    cmg-mj run push_recovery\n" in said.out  # examples keep their lines
+    assert "\b" not in said.out
+    assert "\\b" not in said.out
+    assert "Exit status: 0 done" in said.out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_a_command(command: str) -> None:
+    said = cmg_mj(command, "-h")
+    assert (said.status, said.err) == (0, "")
+    assert said.out.startswith(f"Usage: cmg-mj {command} ")
+    assert "INTEGER" not in said.out  # but N
+    assert max(map(len, said.out.splitlines())) <= 100
+
+
+def test_without_a_command_it_helps() -> None:
+    said = cmg_mj()
+    assert said.status == 2
+    assert said.out == ""
+    assert said.err.startswith("Usage: cmg-mj [OPTIONS] COMMAND")
+
+
+def test_version() -> None:
+    assert cmg_mj("--version").out == f"cmg-mj, version {version('cmg_mj')}\n"
+
+
+def test_help_does_not_wait_for_physics() -> None:
+    """Imports that take a second are made by the commands that need them."""
+    program = "import sys\nfrom cmg_mj import cli\nprint([m for m in ('mujoco', 'numpy', 'rich') if m in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=environment(), capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "[]\n"
+
+
+def test_the_group_is_an_ordinary_one_of_clicks() -> None:
+    assert CliRunner().invoke(cli, ["--help"]).exit_code == 0
+
+
+# --- list and check ------------------------------------------------------------------------------------------
+
+
+def test_list() -> None:
+    said = cmg_mj("list")
+    assert (said.status, said.err) == (0, "")
+    assert said.out == "\n".join(cmg_mj("list", what).out for what in ("scenarios", "observers", "laws"))
+    for name in bundled("scenarios"):
+        assert re.search(rf"^  {name}  +[A-Z]", said.out, re.MULTILINE)
+    for name in OBSERVERS:
+        assert re.search(rf"^  {name}  +\S", said.out, re.MULTILINE)
+    assert re.search(
+        r"  homogeneous +k1=20  k2=150  alpha=0\.85 .*\n(?: .*\n)* +The homogeneous finite-time diff", said.out
+    )
+    assert re.search(r"  luenberger +L=\[\[20, 0\], \[150, 0\], \[0, 20\]\]\n", said.out)
+    assert re.search(r"  finite_difference +no parameters\n", said.out)
+    assert max(map(len, said.out.splitlines())) <= 100
+
+
+def test_check_says_what_a_scenario_amounts_to(quick: str) -> None:
+    said = cmg_mj("check", quick)
+    assert (said.status, said.err) == (0, "")
+    for fragment in (
+        "quick.toml: valid",
+        "0.4 s, 80 physics steps of 0.005 s (RK4), seed 0",
+        "scissored_pair.xml, cubes: cube1, cube2",
+        "equilibrium bias 0.5 deg, initial tilt 1 deg",
+        "K_e = [35, 4, -1, 0.3] at 200 Hz, at most 4.7 rad/s",
+        "stable with the reduced model and its true state, slowest pole -0.203 1/s",
+        "homogeneous  k1=20  k2=150  alpha=0.85",
+        "companions  none",
+        "accelerometer 200 Hz, encoder 200 Hz, fog 200 Hz",
+        "1 N m from 0.2 s to 0.3 s",
+    ):
+        assert fragment in said.out
+    assert not Path("runs").exists()
+
+
+def test_check_warns_of_gains_that_cannot_hold_the_rig() -> None:
+    Path("my.toml").write_text("[controller]\ngains = [-35, 4, -1, 0.3]")
+    assert "UNSTABLE" in cmg_mj("check", "my.toml").out
+
+
+# --- run -----------------------------------------------------------------------------------------------------
+
+
+def test_json_is_alone_on_standard_output(quick: str) -> None:
+    said = cmg_mj("run", quick, "--json", "--seed", 5, "--set", "push=[]")
+    assert (said.status, said.err) == (0, "")
+    summary = json.loads(said.out)
+    assert [key for key in summary if key in SUMMARY] == SUMMARY
+    assert (summary["observer"], summary["seed"], summary["fell"]) == ("homogeneous", 5, False)
+    assert all(isinstance(summary[key], float) for key in SUMMARY[3:])
+
+
+def test_a_person_reads_a_table_and_where_the_files_are(quick: str) -> None:
+    said = cmg_mj("run", quick, "--set", "companions=['ltv']")
+    assert said.status == 0
+    assert said.out.startswith("Quick: homogeneous, seed 0\n")
+    assert "\x1b" not in said.out
+    assert all(line == line.rstrip() for line in said.out.splitlines())
+    for row in (
+        r"Outcome +stood to the end, 0\.4 s",
+        r"Tilt RMS \[deg\] +\d",
+        r"ltv +0\.\d+ +0\.\d+ +-?\d",
+        r"zero +0\.\d+ +0\.\d+ +0\.00 +0\.00\n",
+        r"mems_gyro +0\.0\d+ +0\.0\d+ +0\.9\d",
+    ):
+        assert re.search(row, said.out)
+    folder = "runs/quick-homogeneous-0"
+    assert said.err == f"Written to {folder}. Open the recording: rerun {folder}/recording.rrd\n"
+    assert (Path(folder) / "recording.rrd").exists()
+
+
+def test_a_plot_and_a_title_that_looks_like_markup() -> None:
+    title = r"[/red] [bold]5[/bold] {x} %s $\no$"
+    Path("my.toml").write_text(f"title = '{title}'\nduration_s = 0.3\ncompanions = ['ltv', 'linear']")
+    said = cmg_mj("run", "my.toml", "--plot", "--out", "it")
+    assert said.status == 0
+    assert said.out.startswith(f"{title}: homogeneous, seed 0\n")
+    assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_default_folder_tells_runs_apart(quick: str) -> None:
+    Path("mine.py").write_text(
+        "from cmg_mj.observers.finite_difference import FiniteDifference\nclass Mine(FiniteDifference): pass\n"
+    )
+    for options in (["--seed", 3], ["--observer", "ltv"], ["--observer", "mine:Mine"]):
+        assert cmg_mj("run", quick, *options).status == 0
+    assert sorted(os.listdir("runs")) == ["quick-Mine-0", "quick-homogeneous-3", "quick-ltv-0"]
+
+
+def test_another_world_is_named_wherever_a_run_is(quick: str) -> None:
+    said = cmg_mj("run", quick, "--world", 2)
+    assert said.out.startswith("Quick: homogeneous, seed 0, world 2\n")
+    assert os.listdir("runs") == ["quick-homogeneous-0-world2"]
+    at = Path("runs/quick-homogeneous-0-world2")
+    summary = json.loads((at / "summary.json").read_text())
+    assert summary["world"] == 2
+    head = (at / "scenario.toml").read_text().splitlines()[1]
+    assert head == "#     cmg-mj run scenario.toml --world 2"
+    again = cmg_mj("run", at / "scenario.toml", "--world", 2, "--json", "--out", "again")
+    assert json.loads(again.out) == summary
+    other = json.loads(cmg_mj("run", at / "scenario.toml", "--json", "--out", "other").out)
+    assert "world" not in other
+    assert other["velocity_rms_error_rad_s"] != summary["velocity_rms_error_rad_s"]
+    assert "--world" in cmg_mj("run", quick, "--world", -1).complaint
+
+
+def test_an_observer_and_its_parameters_from_the_command_line(quick: str) -> None:
+    said = [
+        cmg_mj("run", quick, "--json", "--observer", "linear", *settings).out
+        for settings in ([], ["--set", "observer.tau=0.02"], ["--set", "observer.tau=0.04"])
+    ]
+    assert json.loads(said[0])["observer"] == "linear"
+    assert said[0] == said[1] != said[2]
+
+
+# --- compare -------------------------------------------------------------------------------------------------
+
+
+def test_compare_prints_a_list_of_summaries(quick: str) -> None:
+    said = cmg_mj("compare", quick, "--observers", "ltv, linear,ltv", "--worlds", 2, "--json")
+    assert (said.status, said.err) == (0, "")
+    compared = json.loads(said.out)
+    assert [entry["observer"] for entry in compared] == ["ltv", "linear", *REFERENCES]
+    assert all([key for key in entry if key in SUMMARY] == SUMMARY for entry in compared)
+    assert json.loads(Path("runs/quick-compare-0/summary.json").read_text()) == compared
+
+
+def test_compare_prints_a_table(quick: str) -> None:
+    """All observers fit into 100 columns; the widest numbers are not cut."""
+    said = cmg_mj("compare", quick, "--worlds", 2)
+    assert said.status == 0
+    lines = said.out.splitlines()
+    assert lines[0] == "Quick: 2 worlds an observer, seed 0"
+    assert max(map(len, lines)) <= 100
+    assert "…" not in said.out
+    for name in OBSERVERS:
+        assert re.search(rf"^ {name} +\S+ +\S+", said.out, re.MULTILINE)
+    assert "stopped" not in said.out  # a column that there is only if something stopped
+    assert said.err.startswith("Written to runs/quick-compare-0. ")
+
+
+def test_two_observers_of_the_bias_fit_too() -> None:
+    Path("bias.toml").write_text("duration_s = 0.3\n[metrics]\nbias_from_s = 0.1")
+    said = cmg_mj("compare", "bias.toml", "--worlds", 1, "--observers", "adaptive,homogeneous_adaptive")
+    assert max(map(len, said.out.splitlines())) <= 100
+    assert cmg_mj("run", "bias.toml", "--observer", "adaptive").out.count("Bias ") == 2
+
+
+def test_compare_prints_markdown(quick: str) -> None:
+    said = cmg_mj("compare", quick, "--worlds", 1, "--observers", "linear", "--markdown")
+    header, line, row, zero, *_ = said.out.splitlines()
+    assert re.match(r"\| observer +\| +velocity RMS error \[rad/s\] \|", header)
+    assert line.count("|") == header.count("|") == row.count("|") == zero.count("|")
+    assert re.match(r"\| `linear` +\| +0\.", row)
+    assert re.match(r"\| `zero` +\| +0\.", zero)
+
+
+def test_numbers_that_there_are_not() -> None:
+    """No world stood to the end: dashes, and null in JSON."""
+    Path("my.toml").write_text("duration_s = 1.0\n[plant]\nequilibrium_bias_deg = 30.0")
+    said = cmg_mj("compare", "my.toml", "--worlds", 1, "--observers", "linear", "--out", "it")
+    assert said.status == 0
+    assert re.search(r"^ linear( +-){9} +100%$", said.out, re.MULTILINE)
+    assert "zero" not in said.out.splitlines()  # nothing stood, on whose motion it could ride along
+    (summary,) = json.loads(Path("it/summary.json").read_text())
+    assert (summary["fell"], summary["tilt_rms_deg"]) == (True, None)
+
+
+def test_every_column_is_of_a_key_there_is(quick: str) -> None:
+    compared = comparison.compare(comparison.prepare_comparison(load_scenario(quick), ["linear"]), 1)
+    summaries = standings(compared)
+    columns = columns_of(summaries)
+    assert {"velocity_rms_error_rad_s", "velocity_fit", "tilt_rms_deg", "fell_fraction"} <= set(columns)
+    table = comparison_table(summaries, "").renderables[0]
+    assert isinstance(table, Table)
+    assert (len(table.columns), table.row_count) == (1 + len(columns), 1 + len(REFERENCES))
+
+
+# --- bench ---------------------------------------------------------------------------------------------------
+
+
+def test_bench(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("REPEATS", 1), ("ONE_WORLD_S", 0.1), ("MANY_WORLDS_S", 0.1), ("CONTROL_RATES_HZ", (200.0,))):
+        monkeypatch.setattr(f"cmg_mj.studies.benchmark.{name}", value)
+    said = cmg_mj("bench", "--observers", "linear", "--worlds", 2, "--json")
+    assert (said.status, said.err) == (0, "")
+    (figures,) = json.loads(said.out)["figures"]
+    assert figures["closed_loop_over_bare"] > 1.0  # the closed loop does all that bare MuJoCo does, and more
+    assert figures["closed_loop_share_of_batch"] < 1.0
+    assert figures["timestep_ms"] == 5.0
+    assert "linear" in cmg_mj("bench", "--observers", "linear", "--worlds", 2).out
+
+
+def test_bench_of_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmg_mj.studies.sweeps.cost.DURATION_S", 3.0)
+    monkeypatch.setattr("cmg_mj.studies.sweeps.cost.RIGS", {"plant.equilibrium_bias_deg": "-0.5:0.5"})
+    said = cmg_mj("bench", "--sweep", "--observers", "linear", "--worlds", 8, "--json")
+    assert (said.status, said.err) == (0, "")
+    one, many = json.loads(said.out)["figures"]
+    assert (one["rigs"], one["trials"], many["rigs"], many["trials"]) == (1, 8, 2, 8)
+    assert min(one["cpu_over_batch"], many["cpu_over_batch"]) > 1.0
+    assert "linear" in cmg_mj("bench", "--sweep", "--observers", "linear", "--worlds", 8).out
+    assert cmg_mj("bench", "--sweep", "--board").complaint == "--board and --sweep: one of them"
+
+
+# --- terminals, pipes ----------------------------------------------------------------------------------------
+
+
+def on_a_terminal(*arguments: str) -> tuple[subprocess.CompletedProcess[str], str]:
+    """Run with standard error on a terminal of 100 columns; what it showed."""
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        [*COMMAND, *arguments], env=environment(COLUMNS="100"), stdout=subprocess.PIPE, stderr=theirs, text=True
+    ) as running:
+        os.close(theirs)
+        shown = b""
+        while True:  # meanwhile: a slow run shows more progress than the terminal has room for
+            try:
+                piece = os.read(ours, 65536)
+            except OSError:  # the terminal is closed and read to its end
+                break
+            if not piece:
+                break
+            shown += piece
+        out, _ = running.communicate()
+    os.close(ours)
+    return subprocess.CompletedProcess(running.args, running.returncode, out), shown.decode()
+
+
+def test_progress_is_shown_on_a_terminal_and_nowhere_else() -> None:
+    Path("long.toml").write_text(tomli_w.dumps({"title": "[b]Long[/b]", "duration_s": 4.0}))
+    done, shown = on_a_terminal("run", "long.toml", "--json")
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["outcome"] == "done"
+    assert "[b]Long[/b]" in shown
+    assert re.search(r"\d+%", shown)
+    silent = cmg_mj("run", "long.toml", "--json")
+    assert (silent.status, silent.err) == (0, "")
+    assert silent.out == done.stdout
+
+
+def test_a_reader_that_has_had_enough_is_no_error(quick: str) -> None:
+    """Everything is written before the summary is printed."""
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [*COMMAND, "run", quick, "--out", "it"], env=environment(), stdout=write, stderr=subprocess.PIPE, text=True
+    )
+    os.close(write)
+    assert "Traceback" not in done.stderr
+    assert "Error" not in done.stderr
+    assert_whole("it")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_standard_output_that_cannot_be_written() -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([*COMMAND, "list"], env=environment(), stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2
+    assert done.stderr == "cmg-mj: standard output: No space left on device\n"
+
+
+def test_wrong_input_in_a_process_of_its_own() -> None:
+    """As a user meets it: one line, nothing else, status 2, nothing written."""
+    said = cmg_mj_process("run", "push_recovery", "--set", "plant.timestep=1", cwd=Path())
+    assert "plant.timestep: no such field; did you mean 'timestep_s'?" in said.complaint
+    assert list(Path().iterdir()) == []

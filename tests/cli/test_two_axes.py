@@ -1,0 +1,253 @@
+"""What a scenario of several axes says, what is written of its run, and what is refused."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj import InputError, load_plant
+from cmg_mj.results.summary_keys import AXES, KEYS
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario, of_axis
+from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.studies.save import save_run
+from tests.command import cmg_mj
+
+SHORT = ("duration_s=2", "push.0.start_s=1", "push.1.start_s=1")
+
+
+def two_axes(*settings: str) -> Experiment:
+    return prepare(load_scenario("two_axes", [*SHORT, *settings]))
+
+
+def test_an_axis_has_what_it_is_given_and_the_rest_of_what_holds_for_all() -> None:
+    scenario = load_scenario(
+        "two_axes",
+        [
+            "axes.roll.observer.k1=25",
+            "axes.pitch.observer.kind=linear",
+            "axes.pitch.controller.gains=[1, 2, 3, 4]",
+            "axes.roll.sensors.accelerometer.latency_s=0.005",
+        ],
+    )
+    roll, pitch = (of_axis(scenario, name) for name in ("roll", "pitch"))
+    assert roll.observer.parameters == {"k1": 25}
+    assert (pitch.observer.kind, pitch.observer.parameters) == ("linear", {})
+    assert (roll.controller.gains, pitch.controller.gains) == ("carried_over", (1.0, 2.0, 3.0, 4.0))
+    assert (roll.sensors.accelerometer.latency_s, pitch.sensors.accelerometer.latency_s) == (0.005, 0.0)
+    assert (roll.plant.equilibrium_bias_deg, pitch.plant.equilibrium_bias_deg) == (0.5, -0.3)
+    assert roll.plant.turn_rate_rad_s == pitch.plant.turn_rate_rad_s == 1.0
+
+
+def test_what_a_run_writes_reruns_and_has_every_axis(tmp_path: Path) -> None:
+    experiment = two_axes("axes.roll.observer.kind=adaptive", "axes.pitch.controller.lqr.state_cost=[1, 1, 1, 1]")
+    result = experiment.run()
+    place = save_run(tmp_path / "run", experiment, result, plot=True)
+    assert result.trajectory is not None
+
+    again = prepare(load_scenario(str(place / "scenario.toml"))).run().trajectory
+    assert again is not None
+    kept = Trajectory.load(place / "trajectory.parquet")
+    assert kept.axes == ("roll", "pitch")
+    assert kept.layout == result.trajectory.layout
+    for name, column in result.trajectory.columns.items():
+        np.testing.assert_array_equal(again[name], column, err_msg=name)
+        np.testing.assert_array_equal(kept[name], column, err_msg=name)
+    roll = kept.along("roll")
+    assert roll.observers == ("adaptive",)
+    np.testing.assert_array_equal(roll["estimate/adaptive/bias_rad"], kept["roll/estimate/adaptive/bias_rad"])
+    np.testing.assert_array_equal(roll.qpos(), kept.qpos())
+    with pytest.raises(InputError, match="axis 'rol': did you mean 'roll'"):
+        kept.along("rol")
+    assert {"plot-roll.png", "plot-pitch.png", "recording.rrd"} <= {path.name for path in place.iterdir()}
+
+
+def test_with_companions_it_reruns_with_the_same_columns(tmp_path: Path) -> None:
+    """An axis' own observer is no companion of its own; of the other axis it may be."""
+    experiment = two_axes("axes.roll.observer.kind=linear", "companions=['homogeneous', 'kalman']")
+    experiment.save(tmp_path / "scenario.toml")
+    first, again = (
+        run.run().trajectory for run in (experiment, prepare(load_scenario(str(tmp_path / "scenario.toml"))))
+    )
+    assert first is not None
+    assert again is not None
+    assert list(again.columns) == list(first.columns)
+    assert "roll/estimate/homogeneous/x2_rad_s" in first.columns
+
+
+def test_the_observer_that_is_named_is_that_of_all_axes() -> None:
+    mixed = load_scenario("two_axes", ["axes.roll.observer.kind=linear"])
+    assert prepare(mixed).observer_title == "roll linear, pitch homogeneous"
+    for kind in ("homogeneous", "linear", "kalman"):
+        assert prepare(mixed.with_observer(kind)).observer_title == kind
+    tuned = load_scenario("two_axes", ["axes.roll.observer.k1=25"])
+    assert of_axis(tuned.with_observer("homogeneous"), "roll").observer.parameters == {"k1": 25}
+
+
+def test_an_observer_on_the_command_line_is_that_of_all_axes(tmp_path: Path) -> None:
+    file = tmp_path / "mixed.toml"
+    file.write_text('[plant]\nmodel = "two_axes"\n[axes.roll.observer]\nkind = "linear"\n', encoding="utf-8")
+    assert of_axis(load_scenario(str(file), observer="kalman"), "roll").observer.kind == "kalman"
+    assert of_axis(load_scenario(str(file), observer="linear"), "pitch").observer.kind == "linear"
+    assert of_axis(load_scenario(str(file)), "roll").observer.kind == "linear"
+
+
+def test_another_law_does_without_the_files_gains() -> None:
+    assert load_scenario("two_axes", ["controller.kind=lqg"]).controller.gains is None
+    assert two_axes("controller.kind=lqg").run().outcomes[0].kind == "done"
+    with pytest.raises(InputError, match="lqg takes no gains"):
+        two_axes("controller.kind=lqg", "controller.gains=[1, 2, 3, 4]")
+    limited = load_scenario(
+        "two_axes", ["axes.roll.controller.rate_limit_rad_s=3", "axes.roll.controller.gains=[1, 2, 3, 4]"]
+    )
+    roll = of_axis(limited.with_law("lqg"), "roll").controller
+    assert (roll.kind, roll.gains, roll.rate_limit_rad_s) == ("lqg", None, 3.0)
+
+
+def test_sensors_of_an_axis_have_rates_of_their_own() -> None:
+    experiment = two_axes("axes.roll.sensors.accelerometer.rate_hz=1000")
+    assert experiment.plant.timestep == 0.001
+    assert experiment.run().outcomes[0].kind == "done"
+
+
+def test_the_true_rate_is_used_throughout_where_it_is_fed_back() -> None:
+    """What the observer says then changes nothing, the gimbals' turn against the other axis included."""
+    runs = [two_axes("controller.feedback=truth", f"observer.kind={kind}").run() for kind in ("homogeneous", "linear")]
+    first, second = (run.trajectory for run in runs)
+    assert first is not None
+    assert second is not None
+    for name in ("roll/u_rad_s", "pitch/u_rad_s", "angle/roll/cube1/gimbal_rad"):
+        np.testing.assert_array_equal(first[name], second[name], err_msg=name)
+
+
+def test_replay_of_several_axes_is_refused_for_what_it_is(tmp_path: Path) -> None:
+    experiment = two_axes()
+    place = save_run(tmp_path / "run", experiment, experiment.run())
+    assert "about several axes (roll, pitch)" in cmg_mj("replay", str(place)).complaint
+
+
+def test_the_rigs_figures_are_the_worst_of_its_axes() -> None:
+    summary = two_axes().run().summaries[0]
+    axes = list(summary[AXES].values())
+    for key, about in KEYS.items():
+        if key in summary and None not in (values := [axis[key] for axis in axes]):
+            assert summary[key] == (min(values) if about.better == "more" else max(values)), key
+    zero = [axis["references"]["zero"]["velocity_rms_error_rad_s"] for axis in axes]
+    assert summary["references"]["zero"]["velocity_rms_error_rad_s"] == max(zero)
+
+
+def test_a_push_moves_the_axis_that_it_is_about() -> None:
+    calm = (
+        "plant.turn_rate_rad_s=0",
+        "plant.initial_tilt_deg=0",
+        "plant.equilibrium_bias_deg=0",
+        "controller.feedback=fog",
+    )
+    for i, name in enumerate(("roll", "pitch")):
+        trajectory = (
+            two_axes(*calm, "axes.pitch.plant.equilibrium_bias_deg=0", f"push.{1 - i}.torque_n_m=0").run().trajectory
+        )
+        assert trajectory is not None
+        during = slice(200, 230)
+        peaks = {axis: np.abs(trajectory[f"{axis}/x2_rad_s"][during]).max() for axis in ("roll", "pitch")}
+        assert peaks.pop(name) > 5.0 * max(peaks.values())
+        assert trajectory[f"{name}/push_n_m"][205] == 1.0
+
+
+def test_check_says_what_each_axis_amounts_to() -> None:
+    said = cmg_mj("check", "two_axes")
+    assert said.status == 0
+    assert said.out.count(": valid") == 2
+    assert "two_axes, axis roll" in said.out
+    assert "equilibrium bias -0.3 deg" in said.out
+    assert "push        1 N m about pitch from 6 s to 6.1 s" in said.out
+
+
+def test_the_command_prints_each_axis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    sets = [part for setting in SHORT for part in ("--set", setting)]
+    said = cmg_mj("run", "two_axes", *sets, "--out", "it")
+    assert said.status == 0, said
+    assert "roll" in said.out
+    assert "Riding along, pitch" in said.out
+    summary = json.loads((tmp_path / "it" / "summary.json").read_text())
+    assert list(summary["axes"]) == ["roll", "pitch"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        (["axes.rol.plant.initial_tilt_deg=1"], "axes.rol: the rig has no such axis; did you mean 'roll'"),
+        (["axes.roll.plant.modl=1"], "axes.roll.plant.modl: no such field; allowed: accelerometer_inner_m"),
+        (["axes.roll.plant=3"], "axes.roll.plant = 3: must be a section"),
+        (["axes.roll=3"], "axes.roll = 3: must be a section"),
+        (["axes=3"], "axes = 3: must be a section"),
+        (["axes.roll.controller.rate_hz=100"], "[axes.roll]: controller.rate_hz: is the same on all axes"),
+        (["axes.roll.controller.against_turning=false"], "controller.against_turning: is the same on all axes"),
+        (
+            ["swing=[{frequency_hz=15.0, axis='roll'}]", "controller.rate_hz=100"],
+            "at most 10 Hz at controller.rate_hz = 100",
+        ),
+        (["axes.roll.controller.gain=[1,2,3,4]"], "[axes.roll]: controller.gain: no such field; did you mean 'gains'"),
+        (["axes.roll.observer.k9=1"], "[axes.roll]: observer.k9: homogeneous has no such parameter"),
+        (["axes.pitch.observer.kind=lineer"], "[axes.pitch]: observer.kind = 'lineer'"),
+        (["axes.roll.sensors.encoder.counts=3"], "[axes.roll]: sensors.encoder.counts: no such field"),
+        (["axes.roll.plant.initial_tilt_deg=60"], "axes.roll.plant.initial_tilt_deg = 60"),
+        (["push.0.axis=yaw"], "push.0.axis = 'yaw': the rig has no such axis; allowed: pitch, roll"),
+        (["push=[{start_s=1.0}]"], "push.0.axis: the rig has several axes: which of roll, pitch?"),
+        (["swing=[{frequency_hz=1.0}]"], "swing.0.axis: the rig has several axes"),
+        (["swing=[{frequency_hz=50.0, axis='roll'}]"], "swing.0.frequency_hz = 50.0: must be a number greater than 0"),
+        (
+            ["swing=[{frequency_hz=1.0, axis='roll', start_s=20.0}]"],
+            "swing.0.start_s = 20: must be less than duration_s",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(settings: list[str], complaint: str) -> None:
+    with pytest.raises(InputError) as error:
+        prepare(load_scenario("two_axes", settings))
+    assert complaint in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("setting", ["push.0.axis=roll", "axes.roll.plant.initial_tilt_deg=1"])
+def test_a_rig_of_one_axis_without_a_name_has_none_to_speak_of(setting: str) -> None:
+    with pytest.raises(InputError, match="the rig has one axis, without a name"):
+        prepare(load_scenario("push_recovery", [setting]))
+
+
+def test_what_takes_one_axis_says_so() -> None:
+    for arguments in (
+        ["export", "linear", "--scenario", "two_axes"],
+        ["tune", "two_axes", "--observer", "linear"],
+        ["run", "two_axes", "--driver", "board"],
+    ):
+        complaint = cmg_mj(*arguments).complaint
+        assert "tilts about several axes (roll, pitch)" in complaint
+        assert "plant.locked_axes" in complaint
+
+
+def test_a_rig_of_two_axes_with_one_locked_is_a_rig_of_one() -> None:
+    experiment = two_axes('plant.locked_axes=["roll"]')
+    result = experiment.run()
+    assert result.trajectory is not None
+    assert result.trajectory.axes == ()
+    assert AXES not in result.summaries[0]
+    assert experiment.axes[0].scenario.plant.equilibrium_bias_deg == -0.3
+
+
+def test_in_a_loop_of_ones_own() -> None:
+    import mujoco
+
+    from cmg_mj import StateFeedback, control
+
+    rig = load_plant(model="two_axes", equilibrium_bias_deg=0.3, turn_rate_rad_s=1.0)
+    law = StateFeedback(dt=0.005, gains=(71.9, 9.54, -0.862, 0.223))
+    controller = rig.controller("gyro_free", seed=3, law=law)
+    data = rig.new_data()
+    while data.time < 3.0:
+        control(rig, controller, data)
+        mujoco.mj_step(rig.model, data)
+    assert abs(rig.lean(data.qpos)) < 0.03
+    assert len(controller.parts) == 2

@@ -1,0 +1,232 @@
+"""Exported controllers on the emulated board: in lockstep with the host, and closing the loop."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import subprocess
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj.codegen.board import Board
+from cmg_mj.codegen.board.deploy import exported
+from cmg_mj.codegen.board.image import build
+from cmg_mj.codegen.board.tools import available
+from cmg_mj.controllers.processor import Decision
+from cmg_mj.errors import InputError
+from cmg_mj.observers import OBSERVERS, Measurement
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
+from tests.codegen.board.toy import SHORT, short, toy
+from tests.command import cmg_mj
+
+pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
+
+NO_COUNTS = ("sensors.accelerometer.counts_per_g=0", "sensors.encoder.counts_per_revolution=0")
+ARE_PUSHED = ("homogeneous", "kalman", "gyro_free")
+"""In lockstep; the others stand there for half a second."""
+PUSHED = ("duration_s=2.5", "push.0.start_s=1.0", "push.0.torque_n_m=2.5")
+
+
+def sets(settings: tuple[str, ...]) -> list[str]:
+    return [word for setting in settings for word in ("--set", setting)]
+
+
+class Recorded:
+    """A processor that does what the controller itself does, and keeps what it was given and decided."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.own = experiment.controller()
+        self.shown: list[tuple[list[float], list[float]]] = []
+        self.decided: list[Decision] = []
+
+    def start(self) -> None:
+        self.own.reset()
+
+    def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
+        tick = self.own.decide(len(self.shown) * self.own.period, accelerations, encoders, math.nan, math.nan)
+        self.shown.append((list(accelerations), list(encoders)))
+        self.decided.append(Decision(tick.u, tick.x_e, tick.estimates[0]))
+        return self.decided[-1]
+
+
+DOUBLE = re.compile(
+    r"__aeabi_\w*d\w*|__\w*df\w*|(pow|exp|log|sqrt|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|f(abs|max|min|mod)"
+    r"|floor|ceil|copysign|hypot|expm1|log1p)"
+)
+"""What computes in double precision on this processor: the compiler's helpers, and the C library's functions."""
+
+
+def in_double_precision(image: Path) -> list[str]:
+    told = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
+    names = [line.split()[-1] for line in told.splitlines()]
+    assert "main" in names
+    return [name for name in names if DOUBLE.fullmatch(name)]
+
+
+def test_a_processor_that_is_the_controller_changes_nothing() -> None:
+    experiment = short("adaptive")
+    ours, elsewhere = experiment.run(), experiment.run_on(Recorded(experiment))
+    assert ours.summaries == elsewhere.summaries
+    assert ours.trajectory is not None
+    assert elsewhere.trajectory is not None
+    for name in ours.trajectory.columns:
+        np.testing.assert_array_equal(ours.trajectory[name], elsewhere.trajectory[name], err_msg=name)
+
+
+@pytest.mark.parametrize("observer", list(OBSERVERS))
+def test_lockstep_on_the_same_inputs(observer: str) -> None:
+    """What the board is shown is rounded to single precision, and so are its numbers; nothing is in double."""
+    experiment = prepare(load_scenario("push_recovery", PUSHED if observer in ARE_PUSHED else SHORT, observer))
+    host = Recorded(experiment)
+    experiment.run_on(host)
+    with exported(experiment.controller()) as files:
+        image = build(files.observer, files.folder).path
+        assert in_double_precision(image) == []
+        board = Board(image)
+    with board:
+        board.start()
+        decided = [board.update(*shown) for shown in host.shown]
+    for signal in (lambda decision: decision.estimate[1], lambda decision: decision.x_e):
+        ours, its = (np.array([signal(decision) for decision in those]) for those in (host.decided, decided))
+        assert np.sqrt(np.mean((its - ours) ** 2)) < 1e-5
+    if observer in ARE_PUSHED:  # and hard: the command went to its limit
+        assert max(abs(decision.u) for decision in host.decided) == experiment.law.rate_limit
+    u, its_u = (np.array([decision.u for decision in those]) for those in (host.decided, decided))
+    assert np.sqrt(np.mean((its_u - u) ** 2)) < 1e-4
+
+
+def test_super_twisting_is_chaotic_by_itself() -> None:
+    """So no lockstep can hold over a whole run, of single precision or of anything else; of linear it can."""
+    ends = []
+    for name in ("super_twisting", "linear"):
+        experiment = prepare(load_scenario("push_recovery", [], name))
+        recorded = experiment.run().trajectory
+        assert recorded is not None
+        columns = [recorded[key].tolist() for key in ("y1_rad", "y2_rad", "u_rad_s")]
+        rates = []
+        for moved in (0.0, 1e-12):
+            observer = experiment.design.observer()
+            state = observer.init(Measurement(columns[0][0] + moved, columns[1][0]))
+            rates.append([])
+            for y1, y2, u in zip(columns[0][1:], columns[1][1:], columns[2], strict=False):
+                state, estimate = observer.step(state, Measurement(y1 + moved, y2), u)
+                rates[-1].append(estimate[1])
+        ends.append(np.abs(np.subtract(*rates)).max())
+    assert ends[0] > 0.01
+    assert ends[1] < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("observer", "settings"),
+    [("gyro_free", ()), ("adaptive", ("controller.trim_s=0.2", "controller.angles=estimated"))],
+)
+def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
+    """Tick by tick, without the sensors' counts: a reading just between two of them may fall to either side."""
+    experiment = short(observer, *NO_COUNTS, *settings)
+    host, board = experiment.run(), experiment.run(driver="board")
+    assert board.outcomes == host.outcomes
+    assert host.trajectory is not None
+    assert board.trajectory is not None
+    assert board.trajectory.columns.keys() == host.trajectory.columns.keys()
+    for name in ("x1_rad", "x2_rad_s", "u_rad_s", "x_e_rad_times_s", f"estimate/{observer}/x2_rad_s"):
+        np.testing.assert_allclose(board.trajectory[name], host.trajectory[name], atol=1e-4, err_msg=name)
+    assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
+
+
+def test_companions_ride_along_on_the_host() -> None:
+    experiment = short("linear", "companions=['ltv']")
+    host, board = experiment.run(), experiment.run(driver="board")
+    key = "velocity_rms_error_rad_s"
+    assert board.values(key, "ltv") == pytest.approx(host.values(key, "ltv"), rel=1e-3)
+    assert host.values(key, "ltv") != host.values(key)
+
+
+def test_what_the_board_cannot_do_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': a board has no such sensor"):
+        short("linear", "controller.feedback=truth").run(driver="board")
+
+
+@pytest.mark.parametrize(
+    "update",
+    ["*u = (float)((double)e[0] * 0.1);", "extern double pow(double, double); *u = (float)pow((double)e[0], 0.5);"],
+)
+def test_what_is_would_be_seen(tmp_path: Path, update: str) -> None:
+    assert in_double_precision(toy(tmp_path, update=update + " return;"))
+
+
+def test_the_commands(tmp_path: Path) -> None:
+    out = tmp_path / "on_board"
+    said = cmg_mj(*f"run push_recovery --driver board --observer gyro_free --json --out {out}".split(), *sets(SHORT))
+    assert (said.status, said.err) == (0, "")
+    assert json.loads(said.out) == json.loads((out / "summary.json").read_text())
+    assert json.loads(said.out)["outcome"] == "done"
+    assert cmg_mj("bench", "--markdown").complaint == "--markdown: only the table of --board is printed so"
+
+
+@pytest.mark.usefixtures("elsewhere")
+def test_a_run_on_the_board_says_so_and_reruns_to_the_same_numbers() -> None:
+    first = cmg_mj("run", "push_recovery", "--driver", "board", *sets(SHORT))
+    host = cmg_mj("run", "push_recovery", *sets(SHORT))
+    assert "homogeneous on the board, seed 0" in " ".join(first.out.split())
+    assert "board" not in host.out
+    assert len(list(Path("runs").iterdir())) == 2
+    ran, beside = sorted(Path("runs").iterdir(), key=lambda folder: "-board-0" not in folder.name)
+    file = ran / "scenario.toml"
+    assert "cmg-mj run scenario.toml --driver board" in file.read_text().splitlines()[1]
+    assert "board" not in (beside / "scenario.toml").read_text()
+    assert cmg_mj("run", file, "--driver", "board", "--out", "again").status == 0
+    assert cmg_mj("run", file, "--out", "on_host").status == 0
+    folders = [ran, Path("again"), beside, Path("on_host")]
+    summaries = [(folder / "summary.json").read_text() for folder in folders]
+    assert summaries[0] == summaries[1] != summaries[2] == summaries[3]
+    assert (ran / "scenario.toml").read_text() == Path("again/scenario.toml").read_text()
+    assert tomllib.loads(file.read_text()) == tomllib.loads(Path("on_host/scenario.toml").read_text())
+    told = ["board", "board", None, None]
+    assert [json.loads(summary).get("driver") for summary in summaries] == told
+    assert [Trajectory.load(folder / "trajectory.parquet").metadata.get("driver") for folder in folders] == told
+    cmg_mj("run", "push_recovery", "--driver", "board", *sets(SHORT))
+    assert len(list(Path("runs").iterdir())) == 2  # the same run again goes to the same folder
+
+
+COMPANION = """
+import signal
+from cmg_mj import Estimate
+
+class Presses:
+    '''Presses Ctrl-C at the 20th sample.'''
+    def __init__(self, dt, model):
+        pass
+    def init(self, y):
+        return 0
+    def step(self, k, y, u):
+        if k == 18:
+            signal.raise_signal(signal.SIGINT)
+        return k + 1, Estimate(y.y1, 0.0 * y.y1, y.y2)
+"""
+
+
+@pytest.mark.usefixtures("elsewhere", "ctrl_c")
+def test_ctrl_c_ends_the_board_too() -> None:
+    Path("pressing.py").write_text(COMPANION)
+    others = children()
+    said = cmg_mj(
+        *["run", "push_recovery", "--driver", "board", "--out", "here"], "--set", "companions=['pressing:Presses']"
+    )
+    assert said.status == 130
+    assert said.err.endswith("cmg-mj: interrupted at 0.095 s; what was recorded until then is in here\n")
+    assert json.loads(Path("here/summary.json").read_text())["outcome"] == "interrupted"
+    assert children() == others
+
+
+def children() -> set[str]:
+    """Processes that this one has started."""
+    if not Path("/proc/self/task").exists():
+        return set()
+    return {pid for task in Path("/proc/self/task").iterdir() for pid in (task / "children").read_text().split()}

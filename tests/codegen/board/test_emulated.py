@@ -1,0 +1,144 @@
+"""The emulated board: what it is sent and answers, how it counts, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cmg_mj.codegen.board.qemu import Board
+from cmg_mj.errors import InputError, RunStopped
+from tests.codegen.board.toy import needs_board, toy
+from tests.command import environment
+
+pytestmark = needs_board
+
+SHOWN = (0.25, 9.75, -0.5, 9.5)
+
+
+def is_running(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def test_it_answers_what_the_controller_decides(tmp_path: Path) -> None:
+    with Board(toy(tmp_path)) as board:
+        assert board.sizes == (4, 4, 16, 4)
+        answers = [board.update(SHOWN, (k, 0.5)) for k in range(3)]
+        assert [answer.u for answer in answers] == [105.0, 206.0, 307.0]
+        assert [answer.x_e for answer in answers] == [0.0, 0.5, 1.0]
+        board.start()
+        answer = board.update(SHOWN, (0.0, 0.0))
+    assert answer.u == 100.0
+    assert answer.estimate == SHOWN
+
+
+def test_its_observer_is_not_the_controllers(tmp_path: Path) -> None:
+    with Board(toy(tmp_path)) as board:
+        board.init(0.0, 0.0, 0.0)
+        assert board.step(1.0, 2.0, 3.0, 4.0)[0] == (1.0, 2.0, 3.0, 4.0)
+        assert board.update(SHOWN, (0.0, 0.0)).u == 100.0
+
+
+def test_it_counts_instructions_and_stack(tmp_path: Path) -> None:
+    """Exactly, and always the same: a step with 250 more instructions takes 250 more."""
+    costs = []
+    for more in ("", '__asm volatile(".rept 250\\n\\tnop\\n\\t.endr");'):
+        with Board(toy(tmp_path, step=more), counting=True) as board:
+            assert board.nops() == [0, 100, 1000]
+            board.init(0.0, 0.0, 0.0)
+            seen = {board.step(0.1, 0.2, 0.3, 0.4)[1] for _ in range(20)}
+            assert len(seen) == 1
+            costs.append(seen.pop())
+    assert costs[1].instructions - costs[0].instructions == 250
+    assert 0 < costs[0].instructions < 20
+    assert costs[0].stack == 0
+
+
+def test_it_knows_the_deepest_stack(tmp_path: Path) -> None:
+    room = "volatile int room[300]; for (int i = 0; i < 300; i++) room[i] = 1; s->steps += room[7];"
+    with Board(toy(tmp_path, step=room)) as board:
+        assert 1200 <= board.step(0.0, 0.0, 0.0, 0.0)[1].stack <= 1216
+        board.init(0.0, 0.0, 0.0)
+        assert board.init(0.0, 0.0, 0.0).stack == 0
+
+
+def test_no_process_is_left_behind(tmp_path: Path) -> None:
+    with Board(toy(tmp_path)) as board:
+        process = board.process_id
+        assert is_running(process)
+    assert not is_running(process)
+    board = Board(tmp_path / "toy-toy.elf")
+    process = board.process_id
+    del board
+    assert not is_running(process)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it ends when nobody talks to it")
+def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
+    toy(tmp_path)
+    code = "import sys, time; from pathlib import Path; from cmg_mj.codegen.board.qemu import Board\n"
+    code += "b = Board(Path('toy-toy.elf')); print(b.process_id, flush=True); time.sleep(60)"
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, text=True, env=environment()
+    ) as user:
+        assert user.stdout is not None
+        process = int(user.stdout.readline())
+        assert is_running(process)
+        user.send_signal(signal.SIGKILL)
+    deadline = time.monotonic() + 10.0
+    while is_running(process) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not is_running(process)
+
+
+@pytest.mark.parametrize(
+    ("update", "said"),
+    [
+        ("for (;;) {}", "the board has not answered for 3 s"),
+        ("__builtin_trap();", "the board is gone: its processor met a fault"),
+        ("*(volatile int *)0xf0000000 = 1;", "the board is gone: its processor met a fault"),
+        (
+            "volatile int room[1100]; for (int i = 1099; i >= 0; i--) room[i] = i; c->x_e = room[3];",
+            "the board is gone: its stack is full",
+        ),
+    ],
+)
+def test_what_goes_wrong_on_it_is_said(tmp_path: Path, update: str, said: str) -> None:
+    image = toy(tmp_path, update=f"if (e[0] == 1) {{ {update} }}")
+    with Board(image, patience_s=3.0 if "not answered" in said else 30.0) as board:
+        assert board.update(SHOWN, (0.0, 0.0)).u == 100.0
+        with pytest.raises(RunStopped, match=f"^{said}$"):
+            board.update(SHOWN, (1.0, 0.0))
+        process = board.process_id
+    assert not is_running(process)
+
+
+def test_one_that_somebody_kills(tmp_path: Path) -> None:
+    with Board(toy(tmp_path)) as board:
+        os.kill(board.process_id, signal.SIGKILL)
+        with pytest.raises(RunStopped, match=r"^the board is gone: qemu-system-arm was ended by signal 9$"):
+            board.update(SHOWN, (0.0, 0.0))
+
+
+def test_an_image_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(RunStopped, match=r"the board is gone: qemu-system-arm says .*no\.elf"):
+        Board(tmp_path / "no.elf")
+
+
+def test_c_that_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"^toy: arm-none-eabi-gcc refuses it: .*no_such"):
+        toy(tmp_path, update="no_such(e[0]);")
+
+
+def test_arithmetic_in_double_precision_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="double-promotion"):
+        toy(tmp_path, update="if (e[0] * 0.1 > e[1]) return;")

@@ -1,0 +1,68 @@
+"""Without the cross-compiler, the emulator or CasADi: one line that says what to install."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from cmg_mj.codegen.board.tools import COMPILER, EMULATOR, SIZE, available, missing
+from tests.command import cmg_mj
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+def install(folder: Path, *programs: str) -> None:
+    """Programs that do nothing, found before any other."""
+    for program in programs:
+        path = folder / program
+        path.write_text("#!/bin/sh\necho nano.specs\n")
+        path.chmod(0o755)
+
+
+@pytest.mark.parametrize(
+    ("there", "packages"),
+    [
+        ((), "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"),
+        ((EMULATOR,), "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
+        ((COMPILER, SIZE, EMULATOR), "libnewlib-arm-none-eabi"),
+        ((SIZE, EMULATOR), "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
+    ],
+)
+def test_it_is_said_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, there: tuple[str, ...], packages: str
+) -> None:
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    install(programs, *there)
+    monkeypatch.setenv("PATH", f"{programs}{os.pathsep}/bin/nowhere")
+    assert missing() == packages.split()
+    assert not available()
+    line = f"the emulated board needs what is not installed here: apt install {packages} (Debian's names: "
+    assert cmg_mj("run", "push_recovery", "--driver", "board").complaint.startswith(line)
+    assert cmg_mj("bench", "--board", "--observers", "linear").complaint.startswith(line)
+    assert not Path("runs").exists()
+
+
+@pytest.mark.skipif(bool(missing()), reason=f"not installed: {', '.join(missing())}")
+def test_without_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmg_mj.codegen.export.find_spec", lambda name: None)
+    said = cmg_mj("run", "push_recovery", "--driver", "board")
+    assert said.complaint == 'export: casadi is not installed: python -m pip install "cmg_mj[export]"'
+    assert not Path("runs").exists()
+
+
+@pytest.mark.skipif(bool(missing()), reason=f"not installed: {', '.join(missing())}")
+@pytest.mark.parametrize("program", [COMPILER, EMULATOR])
+def test_a_program_that_is_none(tmp_path: Path, program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = tmp_path / program
+    broken.write_bytes(b"\x7fELF")
+    broken.chmod(0o755)
+    monkeypatch.setattr("cmg_mj.codegen.board.tools.missing", list)
+    monkeypatch.setattr("cmg_mj.codegen.board.image.COMPILER", str(broken) if program == COMPILER else COMPILER)
+    monkeypatch.setattr("cmg_mj.codegen.board.qemu.EMULATOR", str(broken) if program == EMULATOR else EMULATOR)
+    monkeypatch.setattr("cmg_mj.codegen.board.qemu._ends_with_us", list)
+    words = f"{broken} cannot be run: Exec format error"
+    assert words in cmg_mj("run", "push_recovery", "--driver", "board").complaint
+    assert not Path("runs").exists()

@@ -1,0 +1,114 @@
+"""An export compiled, and driven from here; and what the sensors of a closed loop have shown."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmg_mj import load_scenario, prepare
+from cmg_mj.codegen.export import export
+from cmg_mj.controllers.controller import Controller
+from cmg_mj.simulation.simulate import simulate
+
+pytest.importorskip("casadi", reason="casadi is not installed: the extra [export]")
+
+COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")
+
+WARNINGS = ("-Wall", "-Wextra", "-pedantic", "-Wdouble-promotion", "-Wconversion", "-Wsign-conversion", "-Wshadow")
+STRICT = ("-std=c99", *WARNINGS, "-Werror", "-O2", "-ffp-contract=off")
+TYPES = {"double": np.float64, "single": np.float32}
+
+
+def compile_c(*arguments: object) -> None:
+    assert COMPILER is not None
+    subprocess.run([COMPILER, *STRICT, *map(str, arguments)], check=True, timeout=300)
+
+
+def read_by_every_compiler(*sources: Path) -> None:
+    """Without a warning; nothing is compiled."""
+    for compiler in filter(None, map(shutil.which, ("gcc", "clang"))):
+        subprocess.run([compiler, *STRICT, "-fsyntax-only", *map(str, sources)], check=True, timeout=300)
+
+
+def controller(kind: str, *settings: str) -> Controller:
+    return prepare(load_scenario("push_recovery", settings, kind)).controller()
+
+
+class Compiled:
+    """An export as a shared library, compiled without a warning, and what its example says."""
+
+    def __init__(self, kind: str, precision: Any, folder: Path, *settings: str) -> None:
+        self.type = TYPES[precision]
+        of = controller(kind, *settings)
+        files = export(of, folder, precision=precision)
+        self.name = files[0].stem
+        self.width = 3 + len(of.extra_signals[0])
+        self.header, self.source, self.example, _ = files
+        read_by_every_compiler(self.source, self.example)
+        self.library = folder / "export.so"
+        compile_c("-shared", "-fPIC", self.source, "-o", self.library, "-lm")
+        compile_c(self.source, self.example, "-o", folder / "example", "-lm")
+        self.said = subprocess.run([folder / "example"], capture_output=True, text=True, check=False).stdout
+        self._loaded = ctypes.CDLL(str(self.library))
+
+    def run(self, samples: np.ndarray) -> np.ndarray:
+        """What `update` makes of raw samples, (n, 4 + gimbals): the estimates and u, (n, 4 + extra signals)."""
+        controller = ctypes.create_string_buffer(8192)
+        samples = np.ascontiguousarray(samples, self.type)
+        results = np.full((len(samples), self.width + 1), np.nan, self.type)
+        self._call("start", controller)
+        for sample, result in zip(samples, results, strict=True):
+            self._call("update", controller, sample[:4], sample[4:], result, result[-1:])
+        return results.astype(float)
+
+    def step(self, state: np.ndarray, *given: float) -> tuple[np.ndarray, np.ndarray]:
+        """One step of the observer alone: the state and the estimate."""
+        state, estimate = state.astype(self.type), np.full(self.width, np.nan, self.type)
+        number = ctypes.c_double if self.type is np.float64 else ctypes.c_float
+        self._call("step", state, *map(number, given), estimate)
+        return state.astype(float), estimate.astype(float)
+
+    def _call(self, function: str, *arguments: Any) -> None:
+        pointers = [x.ctypes.data_as(ctypes.c_void_p) if isinstance(x, np.ndarray) else x for x in arguments]
+        getattr(self._loaded, f"{self.name}_{function}")(*pointers)
+
+
+class Recorded:
+    """A closed loop of push_recovery over 15 s, or until it fell.
+
+    Attributes:
+        samples: Raw accelerations and encoders, (n, 4 + gimbals).
+        results: The controller's estimates and u, (n, 4 + extra signals).
+        rate: The true tilt rate [rad/s], (n,).
+    """
+
+    def __init__(self, kind: str, *settings: str) -> None:
+        experiment = prepare(load_scenario("push_recovery", settings, kind))
+        controller = experiment.controller()
+        samples, results, rates = [], [], []
+        decide = controller.decide
+
+        def recorded(step: int, forces: Any, encoders: Any, fog: float, rate: float) -> Any:
+            tick = decide(step, forces, encoders, fog, rate)
+            samples.append([*forces, *encoders])
+            results.append([*tick.estimates[0], tick.u])
+            rates.append(rate)
+            return tick
+
+        controller.decide = recorded  # type: ignore[method-assign]
+        scenario = experiment.scenario
+        simulate(experiment.plant, controller, scenario.duration_s, observers=[kind], pushes=scenario.push)
+        self.samples, self.results, self.rate = np.array(samples), np.array(results), np.array(rates)
+
+
+@cache
+def recorded(kind: str, *settings: str) -> Recorded:
+    return Recorded(kind, *settings)

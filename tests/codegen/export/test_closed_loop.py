@@ -1,0 +1,89 @@
+"""What is exported against Python, on the samples of a closed loop over 15 s."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj.observers import OBSERVERS, Measurement
+from tests.codegen.export.compiled import Compiled, controller, needs_compiler, recorded
+
+pytestmark = needs_compiler
+
+OWN = [f"tests.codegen.export.own:{name}" for name in ("Plain", "Elaborate")]
+SWITCHING = "super_twisting"
+"""Makes so much of a difference that single precision cannot follow it: see the test with those words."""
+
+
+@pytest.mark.parametrize("kind", [*OBSERVERS, *OWN])
+def test_double_precision_is_bit_for_bit(kind: str, tmp_path: Path) -> None:
+    loop, compiled = recorded(kind), Compiled(kind, "double", tmp_path)
+    np.testing.assert_array_equal(compiled.run(loop.samples), loop.results)
+    assert compiled.said.splitlines()[-1] == "as in cmg_mj"
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        pytest.param(("controller.trim_s=0.52",), id="trimmed"),
+        pytest.param(("controller.angles=estimated", "controller.rate_hz=400"), id="estimated angles"),
+        pytest.param(("controller.gains=[30, 3.5, -1.2, 0.5]", "controller.rate_limit_rad_s=0.6"), id="limited"),
+        pytest.param(("observer.torque=true", "observer.bias=false", "observer.sinusoid_hz=1.5"), id="a sinusoid"),
+    ],
+)
+def test_settings_of_the_scenario_are_in_the_c(settings: tuple[str, ...], tmp_path: Path) -> None:
+    loop = recorded("adaptive", *settings)
+    plain = Compiled("adaptive", "double", tmp_path / "plain").run(loop.samples)
+    assert not np.array_equal(plain[:, -1], loop.results[:, -1])  # they do make a difference
+    np.testing.assert_array_equal(Compiled("adaptive", "double", tmp_path, *settings).run(loop.samples), loop.results)
+
+
+@pytest.mark.parametrize("kind", [*OBSERVERS, *OWN])
+def test_single_precision_is_close_and_nothing_else(kind: str, tmp_path: Path) -> None:
+    """RMS of the rate's difference: below 1e-5 rad/s, or 1e-4 of the observer's own error."""
+    loop, compiled = recorded(kind), Compiled(kind, "single", tmp_path)
+    off = compiled.run(loop.samples)[:, 1] - loop.results[:, 1]
+    own_error = loop.results[:, 1] - loop.rate
+    assert (rms(off) <= max(1e-5, 1e-4 * rms(own_error))) is (kind != SWITCHING)
+    assert compiled.said.splitlines()[-1] == "as in cmg_mj"
+
+    code = re.sub(r"/\*.*?\*/", "", compiled.header.read_text() + compiled.source.read_text(), flags=re.DOTALL)
+    assert not re.search(r"\bdouble\b|malloc|static (?!const|void)", code)
+    floats = re.findall(r"(?<![\w.])(?:\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)\w?", code)
+    assert floats
+    assert all(literal.endswith("f") for literal in floats)
+    if shutil.which("nm"):
+        listed = subprocess.run(["nm", "-D", "-u", compiled.library], capture_output=True, text=True, check=True).stdout
+        called = [name for name in re.findall(r"U (\w+)", listed) if not name.startswith("_")]
+        assert "atan2f" in called
+        assert all(name.endswith("f") for name in called), called
+
+
+def test_what_single_precision_cannot_follow(tmp_path: Path) -> None:
+    """The one that switches: each of its steps is as exact, and Python itself does the same to samples rounded once."""
+    loop = recorded(SWITCHING)
+    compiled = Compiled(SWITCHING, "single", tmp_path)
+    off = rms(compiled.run(loop.samples)[:, 1] - loop.results[:, 1])
+    own = controller(SWITCHING)
+    rounded = [own.tilt(*forces) for forces in loop.samples[:, :4].astype(np.float32).astype(float).tolist()]
+    states, estimates = [own.observer.init(Measurement(rounded[0], 0.0))], [0.0]
+    for y1 in rounded[1:]:
+        state, estimate = own.observer.step(states[-1], Measurement(y1, 0.0), 0.0)
+        states.append(state)
+        estimates.append(estimate[1])
+    assert rms(np.array(estimates) - loop.results[:, 1]) > 0.1 * off > 1e-4
+
+    single_steps = [
+        compiled.step(np.array(before), y1, 0.0, 0.0, 0.0)[1][1] - estimate
+        for before, y1, estimate in zip(states, rounded[1:], estimates[1:], strict=False)
+    ]
+    assert rms(np.array(single_steps)) < 1e-5
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,130 @@
+"""Play between the servos' motors and the gimbals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from cmg_mj.controllers.backlash import Backlash
+from cmg_mj.plant.plant import load_plant
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
+
+DT = 0.005
+
+
+def experiment(*settings: str) -> Experiment:
+    return prepare(load_scenario("push_recovery", ["duration_s=1.5", "push=[]", *settings]))
+
+
+def test_the_gap_in_radians() -> None:
+    assert load_plant(gimbal_backlash_arcmin=60.0).backlash == pytest.approx(np.radians(1.0))
+    assert load_plant().backlash == 0.0
+
+
+@pytest.mark.parametrize("worlds", [None, 3])
+def test_the_gimbal_rests_until_the_motor_has_crossed_the_gap(worlds: int | None) -> None:
+    """The motor swings by 2 about 0 behind a gap of 1; its angle less half the gap forward, plus half backward."""
+    motor = 2.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 401))
+    rates: Any = np.diff(motor) / DT
+    play = Backlash(1.0 if worlds is None else np.full(worlds, 1.0), DT)
+    gimbal = [0.0]
+    for rate in rates.tolist():
+        turned = play(rate if worlds is None else np.full(worlds, rate))
+        if worlds is not None:
+            assert np.ptp(turned) == 0.0
+        gimbal.append(gimbal[-1] + DT * float(np.max(turned)))
+    angle = np.array(gimbal)
+    assert np.abs(motor - angle).max() == pytest.approx(0.5)
+    assert angle[50] == pytest.approx(1.5)  # the top of the first swing
+    assert angle[60] == pytest.approx(1.5)  # the motor has turned back by 0.38
+    assert angle[150] == pytest.approx(-1.5)
+    still = (motor[1:-1] < 2.0 - 1e-9) & (np.abs(np.diff(angle)[1:]) < 1e-12)
+    assert still.any()
+
+
+def test_without_a_gap_the_command_goes_through_as_it_is() -> None:
+    rates = np.random.default_rng(0).normal(size=(50, 2))
+    play = Backlash(np.array([0.0, 0.1]), DT)
+    turned = np.array([play(rate) for rate in rates])
+    np.testing.assert_array_equal(turned[:, 0], rates[:, 0])
+    alone = Backlash(0.1, DT)
+    np.testing.assert_array_equal(turned[:, 1], [alone(float(rate)) for rate in rates[:, 1]])
+
+
+def trajectory(of: Experiment, driver: Any = "native") -> Trajectory:
+    found = of.run(driver=driver).trajectory
+    assert found is not None
+    return found
+
+
+def gimbals_from_commands(run: Trajectory, gap: float) -> np.ndarray:
+    """Where a gap leaves the gimbal behind the recorded commands: the motor's angle, followed at half the gap."""
+    motor = np.concatenate([[0.0], np.cumsum(run["u_rad_s"][:-1] * DT)])
+    gimbal = np.zeros(len(motor))
+    for k in range(1, len(motor)):
+        off = motor[k] - gimbal[k - 1]
+        gimbal[k] = gimbal[k - 1] + np.sign(off) * max(0.0, abs(off) - gap / 2.0)
+    return gimbal
+
+
+@pytest.mark.parametrize("driver", ["native", "callback"])
+def test_the_rigs_gimbals_stay_behind_the_recorded_commands(driver: Any) -> None:
+    """But for their servos' motion, I x'' = kp (setpoint - x) - kv x', and what the tilt does to it."""
+    gap = np.radians(60.0 / 60.0)
+    run = trajectory(experiment("plant.gimbal_backlash_arcmin=60.0"), driver)
+    foreseen = gimbals_from_commands(run, gap)
+    servo = [85.6], [1.56e-3, 0.731, 85.6]
+
+    def off(setpoint: np.ndarray) -> float:
+        """By how much of the gap the gimbal is elsewhere."""
+        return float(np.abs(run["x3_rad"] - lsim(servo, setpoint, run["time_s"])[1]).max() / gap)
+
+    assert off(foreseen) < 0.05
+    assert off(gimbals_from_commands(run, 0.0)) > 0.4
+    assert np.abs(np.diff(foreseen)[20:] == 0.0).mean() > 0.1  # it does rest
+
+
+def test_a_users_own_loop_has_it_too() -> None:
+    import mujoco
+
+    from cmg_mj.simulation.callback import control
+
+    of = experiment("plant.gimbal_backlash_arcmin=60.0", "plant.timestep_s=0.005")
+    controller, data = of.controller(), of.plant.new_data()
+    for _ in range(100):
+        control(of.plant, controller, data)
+        mujoco.mj_step(of.plant.model, data)
+    assert data.qpos[of.plant.tilt] - of.plant.tilt_zero + of.plant.bias == trajectory(of)["x1_rad"][100]
+    controller.reset()
+    assert controller.turning is None
+
+
+def test_observers_are_told_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    of = experiment("plant.gimbal_backlash_arcmin=60.0")
+    told: list[float] = []
+    controller = of.controller()
+    observer: Any = controller.observer
+    monkeypatch.setattr(type(observer), "step", _recorded(type(observer).step, told))
+    commanded = []
+    step = 0
+    ideal = of.plant.ideal(of.plant.new_data().sensordata.tolist(), of.plant.new_data().qvel.tolist())
+    while len(commanded) < 20:
+        if controller.update(step, ideal):
+            assert controller.tick is not None
+            commanded.append(controller.tick.u)
+        step += controller.beat
+    assert told == commanded[:-1]
+    assert controller.turning != commanded[-1] or controller.turning == 0.0
+
+
+def _recorded(step: Any, told: list[float]) -> Any:
+    def recorded(self: Any, state: Any, y: Any, u: float) -> Any:
+        told.append(u)
+        return step(self, state, y, u)
+
+    return recorded

@@ -1,0 +1,600 @@
+"""The law (8), its integrator and limits, and the controller around it, against the paper's numbers and scipy."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import solve_continuous_are
+
+from cmg_mj.controllers.controller import RIDES_ALONG, Controller
+from cmg_mj.controllers.laws.state_feedback import StateFeedback, lqr_gains
+from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.observers import Estimate, Measurement, make_observer
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario, parse_scenario
+from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, Ideal, Sensors
+from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.simulation.experiment import prepare
+from tests.observers.reference import DT, GRAVITY_TORQUE, J1, J2, PAPER
+from tests.plant import paper_model as paper
+
+K_E = (35.0, 4.0, -1.0, 0.3)  # aranovskiy2020 Table 2
+OTHER_GAINS = (20.0, -3.0, 1.5, 0.4)
+RATE_LIMIT = 4.7  # rad/s: 45 rev/min, Dynamixel MX-106R
+
+MOMENTUM = paper.J_d * paper.omega_d
+
+A_E = np.array(
+    [[0.0, 1.0, 0.0, 0.0], [GRAVITY_TORQUE / J1, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0]]
+)
+B_E = np.array([[0.0], [MOMENTUM / J1], [1.0], [0.0]])
+
+
+def run(*settings: str) -> Trajectory:
+    trajectory = prepare(load_scenario("push_recovery", settings)).run().trajectory
+    assert trajectory is not None
+    return trajectory
+
+
+# --- the reduced model that the gains are for ----------------------------------------------------------------
+
+
+def test_reduced_model_is_the_printed_equation() -> None:
+    """The second line of (4), and (6)."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        x1, x2, x3, u = rng.uniform(-1.0, 1.0), rng.uniform(-9.0, 9.0), rng.uniform(-3.0, 3.0), rng.uniform(-5.0, 5.0)
+        gyroscopic = u * (MOMENTUM * math.cos(x3) - J2 * x2 * math.sin(2.0 * x3))
+        f2 = (gyroscopic + GRAVITY_TORQUE * math.sin(x1)) / (J1 + J2 * math.sin(x3) ** 2)
+        assert PAPER.tilt_acceleration(x1, x2, x3, u) == pytest.approx(f2, rel=1e-12, abs=1e-12)
+    np.testing.assert_allclose(PAPER.A_e, A_E, rtol=1e-14)
+    np.testing.assert_allclose(PAPER.B_e, B_E, rtol=1e-14)
+
+
+def test_the_extended_pair_is_controllable() -> None:
+    """As the paper says below (7). Rank by Hautus' test, with the least singular value of [A - s I, B]."""
+    for pole in np.linalg.eigvals(A_E):
+        hautus = np.hstack([PAPER.A_e - pole * np.eye(4), PAPER.B_e])
+        assert np.linalg.svd(hautus, compute_uv=False)[-1] > 1e-3
+
+
+def test_closed_loop_poles_of_table_2() -> None:
+    """Of the law itself, differentiated: A_e - B_e K_e has -10.47 +- 4.60j and -0.203 +- 0.295j."""
+    K = [[-StateFeedback(DT)(*row)[0] for row in (1e-3 * np.eye(4)).tolist()]]
+    poles = np.linalg.eigvals(A_E - B_E @ (1e3 * np.array(K)))
+    expected = [-10.47 - 4.60j, -10.47 + 4.60j, -0.203 - 0.295j, -0.203 + 0.295j]
+    found = sorted(poles, key=lambda s: (round(s.real, 2), s.imag))
+    np.testing.assert_allclose([s.real for s in found], [s.real for s in expected], atol=6e-3)
+    np.testing.assert_allclose([s.imag for s in found], [s.imag for s in expected], atol=6e-3)
+    np.testing.assert_allclose([s.real for s in found[2:]], -0.203, atol=6e-4)
+    np.testing.assert_allclose([abs(s.imag) for s in found[2:]], 0.295, atol=6e-4)
+
+
+# --- the law -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("law", "gains"), [(StateFeedback(DT), K_E), (StateFeedback(DT, OTHER_GAINS), OTHER_GAINS)])
+def test_law_is_the_papers(law: StateFeedback, gains: tuple[float, float, float, float]) -> None:
+    """u = -K_e [y1, x2, y2, x_e], x_e' = -x3 over a control period."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        x = rng.normal(0.0, [0.02, 0.2, 0.5, 1.0]).tolist()
+        u, x_e = law(*x)
+        assert u == pytest.approx(-(gains[0] * x[0] + gains[1] * x[1] + gains[2] * x[2] + gains[3] * x[3]), rel=1e-12)
+        assert x_e == pytest.approx(x[3] - DT * x[2], rel=1e-12)
+
+
+@pytest.mark.parametrize("limit", [RATE_LIMIT, 2.0])
+def test_rate_limit(limit: float) -> None:
+    law = StateFeedback(DT) if limit == RATE_LIMIT else StateFeedback(DT, rate_limit=limit)
+    x1 = limit / 35.0
+    assert law(0.999 * x1, 0.0, 0.0, 0.0)[0] == pytest.approx(-0.999 * limit)
+    for sign in (1.0, -1.0):
+        assert law(sign * 1.001 * x1, 0.0, 0.0, 0.0)[0] == -sign * limit
+        assert law(sign * 9.0, 0.0, 0.0, 0.0)[0] == -sign * limit
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("k4", [0.3, -0.3])
+def test_integrator_does_not_wind_up(sign: float, k4: float) -> None:
+    """Saturated: x_e moves only if that brings the demand back. The demand moves by k4 x3 dt a period."""
+    law = StateFeedback(DT, (35.0, 4.0, -1.0, k4))
+    saturating = -sign * 0.5  # demand of sign * 17.5 rad/s
+    outward = math.copysign(0.2, sign * k4)
+    assert law(saturating, 0.0, outward, 1.0) == (sign * RATE_LIMIT, 1.0)
+    u, x_e = law(saturating, 0.0, -outward, 1.0)
+    assert (u, x_e) == (sign * RATE_LIMIT, pytest.approx(1.0 + DT * outward))
+    assert law(0.0, 0.0, outward, 0.0)[1] == pytest.approx(-DT * outward)  # not saturated: it integrates
+
+
+def test_integrator_stays_bounded_through_a_long_saturation_and_resumes() -> None:
+    """Held at x1 = 0.5 for 10 s with the gimbal turned outward, it stays; let go, it goes on at -x3."""
+    law, x_e = StateFeedback(DT), 0.0
+    for _ in range(2000):
+        _, x_e = law(-0.5, 0.0, 0.3, x_e)
+    assert x_e == 0.0
+    for _ in range(200):
+        u, x_e = law(0.0, 0.0, 0.3, x_e)
+        assert abs(u) < RATE_LIMIT
+    assert x_e == pytest.approx(-0.3)
+
+
+def test_law_treats_each_world_alone() -> None:
+    rng = np.random.default_rng(2)
+    x = rng.normal(0.0, [[0.2], [1.0], [0.5], [3.0]], (4, 500))
+    u, x_e = StateFeedback(DT)(*x)
+    singles = [StateFeedback(DT)(*column) for column in x.T.tolist()]
+    np.testing.assert_array_equal(np.array(singles).T, [u, x_e])
+    assert 50 < np.sum(np.abs(u) == RATE_LIMIT) < 450
+
+
+def reduced_loop(
+    e: float, duration: float, x: list[float], x_e: float = 0.0, law: StateFeedback | None = None
+) -> np.ndarray:
+    """(4) under the sampled law with y1 = x1 - e and the true rate: [x1, x2, x3, x_e, u] at each tick."""
+    law, rows = law or StateFeedback(DT), []
+    for _ in range(round(duration / DT)):
+        u, following = law(x[0] - e, x[1], x[2], x_e)
+        rows.append([*x, x_e, u])
+        x, x_e = one_period(x, u), following
+    return np.array(rows)
+
+
+def one_period(x: list[float], u: float) -> list[float]:
+    """(4) over a control period, u held; RK4, whose error here is below 1e-9."""
+
+    def slope(x: list[float]) -> list[float]:
+        gyroscopic = u * (MOMENTUM * math.cos(x[2]) - J2 * x[1] * math.sin(2.0 * x[2]))
+        return [x[1], (gyroscopic + GRAVITY_TORQUE * math.sin(x[0])) / (J1 + J2 * math.sin(x[2]) ** 2), u]
+
+    def along(k: list[float], h: float) -> list[float]:
+        return [a + h * b for a, b in zip(x, k, strict=True)]
+
+    k1 = slope(x)
+    k2 = slope(along(k1, DT / 2.0))
+    k3 = slope(along(k2, DT / 2.0))
+    k4 = slope(along(k3, DT))
+    return along([(a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)], DT)
+
+
+@pytest.mark.parametrize("e_deg", [0.5, -2.0])
+def test_integrator_settles_at_plus_k1_over_k4_e(e_deg: float) -> None:
+    """The paper's own sign is minus; with y1 = x1 - e, u = 0 asks for x_e = +k_e1/k_e4 e = +35/0.3 e."""
+    e = math.radians(e_deg)
+    end = reduced_loop(e, 60.0, [math.radians(1.0), 0.0, 0.0])[-1]
+    np.testing.assert_allclose(end[:3], 0.0, atol=2e-3 * abs(e))
+    assert end[3] == pytest.approx(35.0 / 0.3 * e, rel=1e-3)
+    still = reduced_loop(e, 0.1, [0.0, 0.0, 0.0], 35.0 / 0.3 * e)
+    np.testing.assert_allclose(still[:, [0, 1, 2, 4]], 0.0, atol=1e-12)
+
+
+def test_sampled_loop_decays_as_its_poles_say() -> None:
+    """Small motions of the loop at 200 Hz: the slow pair decays at 0.203/s (the sampling moves it by 1 %)."""
+    x_e = reduced_loop(0.0, 45.0, [1e-4, 0.0, 0.0])[:, 3]
+    peaks = np.flatnonzero((np.abs(x_e[1:-1]) > np.abs(x_e[:-2])) & (np.abs(x_e[1:-1]) > np.abs(x_e[2:]))) + 1
+    late = peaks[peaks * DT > 5.0]
+    decay = -np.polyfit(late * DT, np.log(np.abs(x_e[late])), 1)[0]
+    assert decay == pytest.approx(0.203, rel=0.02)
+    assert np.diff(late * DT) == pytest.approx(math.pi / 0.295, rel=0.02)
+
+
+# --- LQR -----------------------------------------------------------------------------------------------------
+
+WEIGHTS = [([100.0, 1.0, 1.0, 0.1], 1.0), ([1.0, 1.0, 1.0, 1.0], 0.2), ([2000.0, 5.0, 0.5, 0.05], 3.0)]
+
+
+def riccati(state_cost: list[float], input_cost: float) -> np.ndarray:
+    return solve_continuous_are(A_E, B_E, np.diag(state_cost), np.array([[input_cost]]))
+
+
+@pytest.mark.parametrize(("state_cost", "input_cost"), WEIGHTS)
+def test_lqr_gains_are_those_of_the_riccati_equation(state_cost: list[float], input_cost: float) -> None:
+    expected = B_E.T @ riccati(state_cost, input_cost) / input_cost
+    np.testing.assert_allclose([lqr_gains(PAPER, state_cost, input_cost)], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("state_cost", "input_cost"), WEIGHTS[:2])
+def test_simulated_cost_of_the_lqr_is_x_P_x(state_cost: list[float], input_cost: float) -> None:
+    """The integral of x'Qx + u'Ru along the linear loop; and no law nearby does better."""
+    x0 = np.array([0.02, -0.1, 0.1, 0.3])
+    K = np.array([lqr_gains(PAPER, state_cost, input_cost)])
+
+    def cost(gain: np.ndarray) -> float:
+        def slope(t: float, z: np.ndarray) -> np.ndarray:
+            x = z[:4]
+            u = -gain @ x
+            return np.append(A_E @ x + (B_E @ u), state_cost @ x**2 + input_cost * u @ u)
+
+        return solve_ivp(slope, (0.0, 60.0), np.append(x0, 0.0), "LSODA", rtol=1e-9, atol=1e-12).y[4, -1]
+
+    best = cost(K)
+    assert best == pytest.approx(x0 @ riccati(state_cost, input_cost) @ x0, rel=1e-5)
+    for factor in ([1.05, 1.0, 1.0, 1.0], [1.0, 0.95, 1.0, 1.0], [1.0, 1.0, 1.05, 1.0], [1.0, 1.0, 1.0, 0.95]):
+        assert cost(K * factor) > best * (1.0 + 1e-7)
+
+
+def test_lqr_of_a_scenario_reaches_the_law() -> None:
+    state_cost, input_cost = WEIGHTS[0]
+    scenario = {"controller": {"lqr": {"state_cost": state_cost, "input_cost": input_cost}}}
+    expected = (B_E.T @ riccati(state_cost, input_cost) / input_cost).ravel()
+    law = prepare(parse_scenario(scenario)).law
+    assert isinstance(law, StateFeedback)
+    assert law.gains == pytest.approx(tuple(expected), rel=1e-6)
+    assert prepare(parse_scenario({})).law == StateFeedback(DT, K_E, RATE_LIMIT)
+
+
+@pytest.mark.parametrize("state_cost", [[1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
+def test_lqr_that_leaves_the_integrator_alone_is_refused(state_cost: list[float]) -> None:
+    with pytest.raises(InputError, match=r"^controller\.lqr: no stabilising gain"):
+        lqr_gains(PAPER, state_cost, 1.0)
+
+
+# --- the controller ------------------------------------------------------------------------------------------
+
+
+class Script:
+    """An observer that returns what it was told, and remembers what it was asked."""
+
+    def __init__(self, estimate: Callable[[int], Any]) -> None:
+        self.estimate = estimate
+        self.asked: list[tuple[float, float, float]] = []
+
+    def init(self, y: Measurement) -> int:
+        return 0
+
+    def step(self, state: int, y: Measurement, u: float) -> tuple[int, Any]:
+        self.asked.append((y.y1, y.y2, u))
+        return state + 1, self.estimate(state + 1)
+
+
+IDEAL_SENSORS = Sensors(
+    Accelerometer(noise_density_ug_rthz=0.0, counts_per_g=0.0),
+    Encoder(counts_per_revolution=0.0),
+    Fog(angle_random_walk_deg_rth=0.0, bandwidth_hz=0.0, bias_deg_h=0.0),
+)
+
+
+def reading(tilt: float, gimbal: float, rate: float) -> Ideal:
+    """A still rig: gravity in both accelerometers, gimbals moved oppositely from a quarter turn."""
+    x, z = -9.81 * math.sin(tilt), 9.81 * math.cos(tilt)
+    return Ideal((x, z, x, z), [math.pi / 2.0 + gimbal, math.pi / 2.0 - gimbal], rate, rate)
+
+
+def controller(observer: Any, law: StateFeedback | None = None, **options: Any) -> Controller:
+    return Controller(
+        observer,
+        law or StateFeedback(DT),
+        RadialTilt(0.1, 0.3),
+        IDEAL_SENSORS,
+        directions=[1.0, -1.0],
+        gimbal_zero=[math.pi / 2.0, math.pi / 2.0],
+        timestep=0.001,
+        **options,
+    )
+
+
+READINGS = [reading(0.01, 0.0, 0.5), reading(0.02, 0.1, 0.6), reading(-0.01, 0.2, 0.7), reading(0.03, -0.1, 0.8)]
+ESTIMATES = [Estimate(0.01, 0.0, 0.0), *(Estimate(0.001 * k, 0.1 * k, -0.05 * k) for k in (1, 2, 3))]
+
+
+def ticks(of: Controller, readings: list[Ideal] = READINGS) -> list[Any]:
+    found = []
+    for k, ideal in enumerate(readings):
+        assert of.update(5 * k, ideal)
+        found.append(of.tick)
+    return found
+
+
+def test_measurements_are_tilt_and_half_the_difference_of_the_gimbals() -> None:
+    for tick, (tilt, gimbal) in zip(
+        ticks(controller(Script(ESTIMATES.__getitem__))),
+        [(0.01, 0.0), (0.02, 0.1), (-0.01, 0.2), (0.03, -0.1)],
+        strict=True,
+    ):
+        assert tick.y1 == pytest.approx(tilt, abs=1e-14)
+        assert tick.y2 == pytest.approx(gimbal, abs=1e-14)
+    lopsided = Ideal(READINGS[0].accelerations, [math.pi / 2.0 + 0.3, math.pi / 2.0 - 0.1], 0.0, 0.0)
+    assert ticks(controller(Script(ESTIMATES.__getitem__)), [lopsided])[0].y2 == pytest.approx(0.2)
+
+
+def test_first_estimate_is_at_rest_at_the_measurement() -> None:
+    """For every observer; and the law acts on it at once."""
+    for kind in ("linear", "ltv", "homogeneous", "luenberger", "finite_difference", "super_twisting"):
+        tick = ticks(controller(make_observer(kind, DT, PAPER)), [reading(0.01, 0.2, 0.5)])[0]
+        assert tick.estimates == [(tick.y1, 0.0, tick.y2)]
+        assert tick.u == pytest.approx(-(35.0 * 0.01 - 0.2), rel=1e-9)
+        assert tick.x_e == 0.0
+
+
+def test_observer_gets_the_sample_and_the_command_held_since_the_last() -> None:
+    observer = Script(ESTIMATES.__getitem__)
+    found = ticks(controller(observer))
+    assert observer.asked == [(now.y1, now.y2, before.u) for before, now in itertools.pairwise(found)]
+
+
+@pytest.mark.parametrize("angles", ["measured", "estimated"])
+@pytest.mark.parametrize("feedback", ["observer", "fog", "truth"])
+def test_law_acts_on_the_signals_it_was_told_to(feedback: Any, angles: Any) -> None:
+    """(8) with y1, y2 or their estimates; the rate from the observer, the gyro (here off by 0.02) or the truth."""
+    of = controller(Script(ESTIMATES.__getitem__), feedback=feedback, angles=angles)
+    of.sensors = Sensors(
+        IDEAL_SENSORS.accelerometer,
+        IDEAL_SENSORS.encoder,
+        Fog(angle_random_walk_deg_rth=0.0, bandwidth_hz=0.0, bias_deg_h=math.degrees(0.02) * 3600.0),
+    )
+    of.reset()
+    x_e = 0.0
+    for ideal, estimate, tick in zip(READINGS, ESTIMATES, ticks(of), strict=True):
+        assert tick.fog == pytest.approx(ideal.rate + 0.02, rel=1e-12)
+        x1, x3 = (estimate.x1, estimate.x3) if angles == "estimated" else (tick.y1, tick.y2)
+        x2 = {"observer": estimate.x2, "fog": tick.fog, "truth": ideal.rate}[feedback]
+        assert tick.u == pytest.approx(-(35.0 * x1 + 4.0 * x2 - x3 + 0.3 * x_e), rel=1e-12)
+        assert tick.x_e == pytest.approx(x_e, abs=1e-15)
+        x_e -= DT * x3
+
+
+def test_companions_see_the_same_and_change_nothing() -> None:
+    companion = Script(lambda k: Estimate(9.0, -9.0 * k, 9.0))
+    alone, observer = ticks(controller(Script(ESTIMATES.__getitem__))), Script(ESTIMATES.__getitem__)
+    together = ticks(controller(observer, companions={"hers": companion}))
+    assert companion.asked == observer.asked
+    assert [tick.u for tick in together] == [tick.u for tick in alone]
+    assert [tick.estimates[1].x2 for tick in together] == [0.0, -9.0, -18.0, -27.0]
+
+
+class WithBias(Script):
+    """One that estimates the bias and something else besides."""
+
+    extra_signals = ("torque_n_m", "bias_rad")
+
+
+def test_extra_signals_follow_the_state() -> None:
+    of = controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4 * k, 0.5 * k)))
+    assert of.extra_signals == [("torque_n_m", "bias_rad")]
+    assert [tuple(tick.estimates[0])[3:] for tick in ticks(of)] == [(0.0, 0.0), (0.4, 0.5), (0.8, 1.0), (0.4 * 3, 1.5)]
+
+
+def test_signals_that_are_not_declared_are_left_out() -> None:
+    found = ticks(controller(Script(lambda k: (0.1, 0.2, 0.3, 0.4))))
+    assert [tuple(tick.estimates[0]) for tick in found[1:]] == [(0.1, 0.2, 0.3)] * 3
+
+
+def test_a_declared_signal_that_is_missing_or_nan_stops_the_run() -> None:
+    with pytest.raises(RunStopped, match="has 4 parts, not 5"):
+        ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4))))
+    with pytest.raises(RunStopped, match="returned nan for bias_rad"):
+        ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, math.nan))))
+
+
+@pytest.mark.parametrize("names", ["bias_rad", ("x1_rad",), ("a", "a"), ("Bias",), (3,), ("a/b",)])
+def test_names_of_signals_are_checked(names: Any) -> None:
+    observer: Any = Script(ESTIMATES.__getitem__)
+    observer.extra_signals = names
+    with pytest.raises(ValueError, match="extra_signals must be a tuple of names"):
+        controller(observer)
+
+
+def test_trim_holds_the_integrator_where_the_bias_asks_for_it() -> None:
+    """u = 0 at y1 = -e needs k_e4 x_e = k_e1 e; from the end of the trim on, x_e' = -x3 as ever."""
+    found = ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, 0.01 * k)), trim_s=2.0 * DT))
+    expected = [0.0, 35.0 / 0.3 * 0.01]
+    expected += [expected[-1] - DT * found[1].y2, expected[-1] - DT * (found[1].y2 + found[2].y2)]
+    assert [tick.x_e for tick in found] == pytest.approx(expected, rel=1e-12)
+    assert -35.0 * -0.01 - 0.3 * found[1].x_e == pytest.approx(0.0, abs=1e-15)  # at rest at y1 = -e nothing is asked
+
+
+def test_trim_needs_a_bias_and_an_integrator() -> None:
+    with pytest.raises(
+        InputError, match=r"controller\.trim_s = 1: needs an observer in the loop that estimates the bias"
+    ):
+        controller(Script(ESTIMATES.__getitem__), trim_s=1.0)
+    with pytest.raises(InputError, match=r"controller\.trim_s = 1: the gain on the integrator is zero"):
+        controller(WithBias(ESTIMATES.__getitem__), trim_s=1.0, law=StateFeedback(DT, (35.0, 4.0, 1.0, 0.0)))
+
+
+def test_reset_starts_the_same_run_again() -> None:
+    of = controller(make_observer("homogeneous", DT, PAPER), seed=3)
+    of.sensors = Sensors()
+    of.reset()
+    first = ticks(of)
+    of.reset()
+    assert of.tick is None
+    assert ticks(of) == first
+
+
+def test_nothing_is_due_between_ticks() -> None:
+    observer = Script(ESTIMATES.__getitem__)
+    of = controller(observer)
+    assert (of.period, of.beat) == (5, 5)
+    due = [of.update(step, READINGS[0]) for step in range(16)]
+    assert [step for step, is_due in enumerate(due) if is_due] == [0, 5, 10, 15]
+    assert len(observer.asked) == 3
+
+
+def test_beat_is_where_anything_may_be_due() -> None:
+    sensors = Sensors(Accelerometer(rate_hz=1000.0), Encoder(rate_hz=100.0), Fog(rate_hz=500.0))
+    of = Controller(
+        Script(ESTIMATES.__getitem__),
+        StateFeedback(0.01),
+        RadialTilt(0.1, 0.3),
+        sensors,
+        directions=[1.0],
+        gimbal_zero=[0.0],
+        timestep=0.0005,
+    )
+    assert (of.period, of.beat) == (20, 2)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_an_estimate_that_is_no_number_stops_the_run(value: float) -> None:
+    of = controller(Script(lambda k: Estimate(0.0, value if k == 2 else 0.0, 0.0)))
+    with pytest.raises(RunStopped, match=rf"observer Script returned {value} for x2 at t = 0\.01 s"):
+        ticks(of)
+
+
+@pytest.mark.parametrize("estimate", [Estimate(math.nan, 0.0, 0.0), Estimate(0.0, 0.0, math.nan)])
+def test_an_estimated_angle_that_is_no_number_stops_the_run(estimate: Estimate) -> None:
+    """If the law uses the estimated angles."""
+    with pytest.raises(RunStopped):
+        ticks(controller(Script(lambda k: estimate), angles="estimated"))
+
+
+def test_an_observer_that_raises_stops_the_run_by_name() -> None:
+    def fail(k: int) -> Estimate:
+        raise ZeroDivisionError("no gain")
+
+    with pytest.raises(
+        RunStopped, match=r"observer Script raised ZeroDivisionError: no gain at t = 0\.005 s"
+    ) as caught:
+        ticks(controller(Script(fail)))
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+
+
+@pytest.mark.parametrize(
+    "estimate", [(0.0, np.float64(0.1), 0.0), np.array([0.0, 0.1, 0.0]), (0, 0.1, 0), (0.0, 0.1, 0.0, "more")]
+)
+def test_a_users_estimate_may_be_anything_with_three_numbers(estimate: Any) -> None:
+    tick = ticks(controller(Script(lambda k: estimate)))[1]
+    assert tick.u == pytest.approx(-(35.0 * 0.02 + 4.0 * 0.1 - 0.1), rel=1e-9)
+
+
+# --- in the loop ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["homogeneous", "ltv", "linear"])
+def test_recorded_commands_are_the_papers_law(kind: str) -> None:
+    """(8) on the record of a run on the full model, through start, push and saturation."""
+    trajectory = run("duration_s=1", f"observer.kind={kind}", "push.0.start_s=0.3", "push.0.torque_n_m=4.0")
+    y1, y2, u, x_e = (trajectory[name] for name in ("y1_rad", "y2_rad", "u_rad_s", "x_e_rad_times_s"))
+    x2 = trajectory[f"estimate/{kind}/x2_rad_s"]
+    demanded = -(35.0 * y1 + 4.0 * x2 - 1.0 * y2 + 0.3 * x_e)
+    np.testing.assert_allclose(u, np.clip(demanded, -4.7, 4.7), rtol=0.0, atol=1e-12)
+    saturated = np.abs(demanded) > 4.7
+    assert 0 < saturated.sum() < 100
+    assert x_e[0] == 0.0
+    held = saturated & (y2 * demanded > 0.0)
+    np.testing.assert_allclose(np.diff(x_e), np.where(held, 0.0, -0.005 * y2)[:-1], rtol=0.0, atol=1e-12)
+
+
+def test_a_scenario_may_feed_back_the_estimated_angles() -> None:
+    """As the text after (10) has it: the whole estimate, the integrator too."""
+    trajectory = run("duration_s=0.5", "push=[]", "observer.kind=ltv", "controller.angles=estimated")
+    x1, x2, x3 = (trajectory[f"estimate/ltv/{name}"] for name in ("x1_rad", "x2_rad_s", "x3_rad"))
+    u, x_e = trajectory["u_rad_s"], trajectory["x_e_rad_times_s"]
+    np.testing.assert_allclose(u, -(35.0 * x1 + 4.0 * x2 - 1.0 * x3 + 0.3 * x_e), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(np.diff(x_e), -0.005 * x3[:-1], rtol=0.0, atol=1e-12)
+    assert np.abs(x1 - trajectory["y1_rad"]).max() > 1e-3
+
+
+def test_the_true_rate_is_read_only_when_asked_for() -> None:
+    """feedback = observer: another truth (a biased gyro) changes nothing; feedback = fog: it does."""
+    runs = {
+        (feedback, bias): run(
+            "duration_s=0.3", "push=[]", f"controller.feedback={feedback}", f"sensors.fog.bias_deg_h={bias}"
+        )
+        for feedback in ("observer", "fog")
+        for bias in (0.0, 3600.0)
+    }
+    for feedback, same in (("observer", True), ("fog", False)):
+        pair = [runs[feedback, bias]["u_rad_s"] for bias in (0.0, 3600.0)]
+        assert np.array_equal(pair[0], pair[1]) == same
+
+
+def test_gimbals_move_oppositely_at_the_commanded_rate() -> None:
+    """The command arrives as +-u: the gimbals' mean rate, in their own directions, follows it."""
+    trajectory = run(
+        "duration_s=1", "push=[]", "controller.feedback=truth", "sensors.accelerometer.noise_density_ug_rthz=0"
+    )
+    first, second = (trajectory[f"angle/cube{i}/gimbal_rad"] - math.pi / 2.0 for i in (1, 2))
+    np.testing.assert_allclose(first, -second, atol=1e-6)
+    np.testing.assert_allclose(trajectory["x3_rad"], first, atol=1e-6)
+    commanded = np.concatenate([[0.0], np.cumsum(trajectory["u_rad_s"])[:-1]]) * 0.005
+    np.testing.assert_allclose(first[100:], commanded[100:], atol=2e-2)
+
+
+# --- something else while it runs --------------------------------------------------------------------------
+
+
+def test_another_observer_rides_along_and_takes_over() -> None:
+    """The command is the one's until the other takes over, which began with the next sample and knows its held u."""
+    one, other = Script(lambda k: Estimate(0.0, 1.0, 0.0)), Script(lambda k: Estimate(0.0, -1.0, 0.0))
+    of = controller(one)
+    rates = []
+    for k in range(3 + RIDES_ALONG + 5):
+        if k == 3:
+            of.exchange(observer=other)
+        of.update(5 * k, READINGS[k % 4])
+        assert of.tick is not None
+        rates.append(of.tick.estimates[0][1])
+    assert rates == [0.0, *[1.0] * (2 + RIDES_ALONG), *[-1.0] * 5]
+    assert len(one.asked) == 2 + RIDES_ALONG
+    assert len(other.asked) == RIDES_ALONG + 4
+    assert other.asked == [*one.asked[3:], *other.asked[RIDES_ALONG - 1 :]]
+
+
+def test_it_takes_over_at_once_from_one_that_fails() -> None:
+    def failing(k: int) -> Estimate:
+        if k > 4:
+            raise KeyError("gone")
+        return Estimate(0.0, 1.0, 0.0)
+
+    of = controller(Script(failing))
+    rates = []
+    for k in range(9):
+        if k == 3:
+            of.exchange(observer=Script(lambda k: Estimate(0.0, -1.0, 0.0)))
+        of.update(5 * k, READINGS[0])
+        assert of.tick is not None
+        rates.append(of.tick.estimates[0][1])
+    assert rates == [0.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
+
+
+def test_before_the_first_tick_an_observer_is_exchanged_at_once() -> None:
+    of = controller(Script(lambda k: Estimate(0.0, 1.0, 0.0)))
+    of.exchange(observer=Script(ESTIMATES.__getitem__))
+    assert [tick.estimates[0] for tick in ticks(of)][1:] == ESTIMATES[1:]
+
+
+def test_law_and_feedback_change_with_the_integrator_as_it_was() -> None:
+    of = controller(Script(ESTIMATES.__getitem__))
+    of.update(0, READINGS[0])
+    of.update(5, READINGS[1])
+    other = StateFeedback(DT, (30.0, 3.0, -0.5, 0.1))
+    of.exchange(law=other, feedback="truth")
+    of.update(10, READINGS[2])
+    assert of.tick is not None
+    assert of.tick.x_e == pytest.approx(-DT * 0.1)
+    assert of.tick.u == other(of.tick.y1, 0.7, of.tick.y2, of.tick.x_e)[0]
+
+
+def test_sensors_start_afresh_between_their_samples_too() -> None:
+    """Other sensors have something to show at the next tick, though none of theirs is due."""
+    slow = Sensors(
+        Accelerometer(rate_hz=50.0, noise_density_ug_rthz=0.0, counts_per_g=0.0),
+        IDEAL_SENSORS.encoder,
+        IDEAL_SENSORS.fog,
+    )
+    of = controller(Script(lambda k: Estimate(0.0, 0.0, 0.0)))
+    of.sensors = slow
+    of.reset()
+    of.update(0, READINGS[0])
+    of.update(5, READINGS[1])
+    assert of.tick is not None
+    assert of.tick.y1 == pytest.approx(0.01)
+    of.exchange(sensors=Sensors(Accelerometer(rate_hz=50.0, bias_mg=(1.0, 1.0)), slow.encoder, slow.fog))
+    of.update(10, READINGS[2])
+    assert of.tick.y1 != pytest.approx(0.01, abs=0.005)
+
+
+def test_rates_stay_while_it_runs() -> None:
+    of = controller(Script(ESTIMATES.__getitem__))
+    with pytest.raises(InputError, match=r"controller.rate_hz: stays 200 Hz"):
+        of.exchange(law=StateFeedback(0.01))
+    with pytest.raises(InputError, match="sensors: their rates stay"):
+        of.exchange(sensors=Sensors(Accelerometer(rate_hz=1000.0)))

@@ -1,0 +1,301 @@
+"""Models that lack something or have it otherwise: one clear line that names it."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cmg_mj import load_plant
+from cmg_mj.errors import InputError
+from cmg_mj.inputs.bundled import folder
+from tests.command import Said, cmg_mj
+from tests.inputs.complaints import assert_in_order, check, table
+
+
+def edited(rig: tuple[str, str] | None = None, cube: tuple[str, str] | None = None) -> Said:
+    """`check` on a copy of the bundled model, in which a pattern has been replaced."""
+    for name, edit in (("scissored_pair.xml", rig), ("cube.xml", cube)):
+        text = (folder("models") / name).read_text()
+        if edit:
+            text, count = re.subn(edit[0], edit[1], text, flags=re.DOTALL)
+            assert count, f"{edit[0]} does not occur in {name}"
+        Path(name.replace("scissored_pair", "rig")).write_bytes(text.encode("latin-1"))
+    return check("duration_s = 0.1\n[plant]\nmodel = 'rig.xml'")
+
+
+def without(start: str) -> tuple[str, str]:
+    return rf"<{start}.*?/>", ""
+
+
+BODY = '<body name="more" pos="1 0 0">{}<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
+
+
+@table(
+    (
+        "joint tilt",
+        {"rig": without('joint name="tilt"')},
+        "the model has no joint 'tilt'; its joints: cube1/flywheel, ",
+    ),
+    ("typo in tilt", {"rig": ('"tilt"', '"tlit"')}, "the model has no joint 'tilt'; did you mean 'tlit'?"),
+    (
+        "joint flywheel",
+        {"cube": without('joint name="flywheel"')},
+        "has no joint 'cube1/flywheel', 'cube2/flywheel'; its joints: cube1/g",
+    ),
+    ("joint gimbal", {"cube": without('joint name="gimbal"')}, "the model has no joint 'cube1/gimbal'"),
+    (
+        "actuator servo",
+        {"cube": without("intvelocity")},
+        "has no actuator 'cube1/gimbal_servo', 'cube2/gimbal_servo'; its actuators: cube1/f",
+    ),
+    ("actuator motor", {"cube": without("velocity name")}, "the model has no actuator 'cube1/flywheel_motor'"),
+    ("sensor encoder", {"cube": without("jointpos")}, "the model has no sensor 'cube1/gimbal_encoder'"),
+    ("accelerometer", {"rig": without('accelerometer name="accelerometer_inner"')}, "no sensor 'accelerometer_inner'"),
+    ("gyro", {"rig": without("gyro")}, "the model has no sensor 'fog'; its sensors: accelerometer_inner"),
+    (
+        "keyframe",
+        {"rig": ("<keyframe>.*</keyframe>", "")},
+        "the model has no keyframe 'equilibrium'; its keyframes: none",
+    ),
+    ("typo in keyframe", {"rig": ('"equilibrium"', '"equilibrum"')}, "'equilibrium'; did you mean 'equilibrum'?"),
+    ("cubes", {"rig": ('<frame name="cube..mount.*?</frame>', "")}, "the model has no joint 'cube1/gimbal'"),
+    ("the cube's file", {"rig": ('file="cube.xml"', 'file="cub.xml"')}, "not a model MuJoCo can read: ", "cub.xml"),
+)
+def test_a_model_that_lacks(given: dict[str, Any], fragments: list[str]) -> None:
+    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**given).complaint)
+
+
+@table(
+    ("an end", {"rig": ("<keyframe>.*", "")}, "not a model MuJoCo can read: XML syntax error at line "),
+    ("nothing", {"rig": (".*", "")}, "not a model MuJoCo can read: ", "empty file"),
+    ("no XML", {"rig": (".*", "a = 1")}, "not a model MuJoCo can read: XML syntax error at line 1"),
+    ("an unknown element", {"rig": ("<headlight", "<headlite")}, "unrecognized element", "'headlite', line 20"),
+    (
+        "a gimbal that slides",
+        {"cube": ('joint name="gimbal" type="hinge"', 'joint name="gimbal" type="slide"')},
+        "joint 'cube1/gimbal' must be a hinge",
+    ),
+    ("a slide", {"rig": ('name="yaw" type="hinge"', 'name="yaw" type="slide"')}, "joint 'yaw' must be a hinge"),
+    ("no name", {"rig": ("</worldbody>", BODY.format("<joint/>"))}, "the joint of body 'more' has no name"),
+    ("a tilt about x", {"rig": ('name="tilt" type="hinge" axis="0 1 0"', 'name="tilt"')}, "'tilt' must turn about y"),
+    (
+        "a servo on the flywheel",
+        {"cube": ('name="gimbal_servo" joint="gimbal"', 'name="gimbal_servo" joint="flywheel"')},
+        "actuator 'cube1/gimbal_servo' must drive the joint 'cube1/gimbal'",
+    ),
+    (
+        "an encoder on the flywheel",
+        {"cube": ('name="gimbal_encoder" joint="gimbal"', 'name="gimbal_encoder" joint="flywheel"')},
+        "sensor 'cube1/gimbal_encoder' must be the jointpos of 'cube1/gimbal'",
+    ),
+    ("another gyro", {"rig": ("<gyro(.*?)/>", r"<velocimeter\1/>")}, "sensor 'fog' must be of the kind 'gyro'"),
+    (
+        "an accelerometer that lies on its side",
+        {"rig": ('(name="accelerometer_outer" pos="[^"]*") euler="[^"]*"', r"\1")},
+        "the site of sensor 'accelerometer_outer' must have its y axis along the tilt axis",
+    ),
+    (
+        "accelerometers the wrong way round",
+        {"rig": ('name="accelerometer_inner" pos="[^"]*"', 'name="accelerometer_inner" pos="0.3 0 0.3"')},
+        "accelerometer_outer must lie farther from the tilt axis than accelerometer_inner",
+    ),
+    (
+        "a keyframe without speed",
+        {"rig": ("ctrl=.0 314 0 -314.", "")},
+        "'equilibrium' must give 'cube1/flywheel_motor' a",
+    ),
+    (
+        "a speed that is none",
+        {"rig": ("ctrl=.0 314 0", 'ctrl="0 nan 0')},
+        "ctrl of key 'equilibrium' is no number of any size",
+    ),
+    (
+        "a keyframe upside down",
+        {"rig": ("qpos=.0 -0.78539816339744828", 'qpos="0 2.356')},
+        "the rig must stand upright",
+    ),
+    ("no mass", {"cube": ('mass="0.61"', 'mass="0"')}, "does not compile: mass and inertia", "'cube1/flywheel'"),
+)
+def test_a_model_that_has(given: dict[str, Any], fragments: list[str]) -> None:
+    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**given).complaint)
+
+
+def test_the_unedited_copy_is_a_model() -> None:
+    assert edited().status == 0
+
+
+def test_a_lock_without_a_bearing() -> None:
+    edited(rig=('<joint name="yaw".*?/>', ""))
+    complaint = cmg_mj("run", "my.toml", "--set", "plant.lock_thrust_bearing=true").complaint
+    assert "plant.lock_thrust_bearing = true: rig.xml has no joint 'yaw' to lock" in complaint
+
+
+def test_a_lock_where_the_keyframe_gives_no_rates() -> None:
+    edited(rig=('qvel="[^"]*"', ""))
+    with pytest.raises(
+        InputError, match=r"^rig\.xml: keyframe 'equilibrium' must start 'cube1/flywheel' at its motor's"
+    ):
+        load_plant(model="rig.xml", lock_thrust_bearing=True)
+
+
+AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
+"""The keyframe's angles of tilt, gimbal, flywheel and gimbal."""
+
+
+@table(
+    ("no gravity", {"rig": ("0 0 -9.81", "0 0 0")}, "<option gravity='0 0 0'>: must point straight down"),
+    ("a gravity that is none", {"rig": ("0 0 -9.81", "0 0 nan")}, "<option gravity='0 0 nan'>: must point straight"),
+    ("gravity aslant", {"rig": ("0 0 -9.81", "0 9.81 -9.81")}, "<option gravity='0 9.81 -9.81'>: must point straight"),
+    ("a step that is none", {"rig": ('timestep="[^"]*"', 'timestep="nan"')}, "<option timestep='nan'>: must be from"),
+    ("a rate that is none", {"rig": ("0 0 0 314 0", "0 0 0 nan 0")}, "qvel of key 'equilibrium' is no number"),
+    ("a setpoint that is none", {"rig": (' act="1.5707963267948966', ' act="nan')}, "act of key 'equilibrium' is no"),
+    (
+        "a place that is none",
+        {"rig": ('outer" pos="0.14250000000000004', 'outer" pos="nan')},
+        "'accelerometer_outer' is",
+    ),
+    ("a servo that is none", {"cube": ("85.6", "nan")}, "gainprm of actuator 'cube1/gimbal_servo' is no number"),
+    ("a mass of any size", {"cube": ('mass="1.66"', 'mass="1e300"')}, "mass of body 'frame' is no number of any size"),
+    (
+        "a keyframe that lies flat",
+        {"rig": (AT, "0.78539816339744828 1.5707963267948966 0 1.5707963267948966")},
+        "the rig must stand upright, its mass above the tilt axis; it leans by 90 deg ('tilt' = -0.785398 would be up",
+    ),
+    (
+        "gimbals a quarter turn off",
+        {"rig": (AT, "-0.78539816339744828 0 0 0")},
+        "the axis of 'cube1/flywheel' must be at right angles to the tilt's; it is 90 deg off ('cube1/gimbal' = ",
+        "the axis of 'cube2/flywheel'",
+        "keyframe 'equilibrium' must have the setpoint (act) of 'cube2/gimbal_servo' where its gimbal stands: 0, not",
+    ),
+    ("no setpoints", {"rig": (' act="1[^"]*"', "")}, "must have the setpoint (act) of 'cube1/gimbal_servo' where"),
+    (
+        "flywheels at rest",
+        {"rig": ('qvel="[^"]*"', "")},
+        "start 'cube1/flywheel' at its motor's speed: qvel says 0, ctrl",
+    ),
+    ("a tilt that moves", {"rig": ('qvel="0 0', 'qvel="0 1')}, "only flywheels may turn, not 'tilt' (1 rad/s)"),
+    (
+        "a centre of mass 3 cm beside the line",
+        {"rig": ('_mount" pos="0.095', '_mount" pos="0.125')},
+        "it leans by 7.77 deg ('tilt' = -0.920926 would be upright)",
+        "the site of sensor 'accelerometer_inner' must lie on the radial line",
+    ),
+    (
+        "an accelerometer beside the line",
+        {"rig": ('outer" pos="0.14250000000000004 0 0.14250000000000004"', 'outer" pos="0.1725 0 0.13"')},
+        "the site of sensor 'accelerometer_outer' must lie on the radial line, from the tilt axis through the centre",
+    ),
+    (
+        "an accelerometer before the line",
+        {"rig": ('outer" pos="0.14250000000000004 0', 'outer" pos="0.14250000000000004 0.08')},
+        "'accelerometer_outer' must lie on the radial line, from the tilt axis through the centre of mass; it lies",
+    ),
+    (
+        "a mesh that is none",
+        {"rig": ("<asset>", '<asset><mesh name="rig" file="rig.xml"/>')},
+        "does not compile: no decoder found for mesh file 'rig.xml'",
+    ),
+    (
+        "a picture without end",
+        {"rig": ('width="256"', 'width="100000000"')},
+        "<texture width='100000000'>: at most 10000",
+    ),
+    ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml is not UTF-8 text (at byte "),
+)
+def test_a_model_that_is_set_wrongly(given: dict[str, Any], fragments: list[str]) -> None:
+    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**given).complaint)
+
+
+def test_all_that_is_missing_and_wrong_is_said_at_once() -> None:
+    edited()
+    rig = Path("rig.xml").read_text()
+    for edit in (
+        ('name="fog" site', 'name="fg" site'),
+        ("0 0 -9.81", "0 0 9.81"),
+        ('"tilt"', '"tlit"'),
+        ("<key name.*?/>", ""),
+    ):
+        rig = re.sub(*edit, rig, count=1, flags=re.DOTALL)
+    Path("rig.xml").write_text(rig)
+    assert_in_order(
+        [
+            "rig.xml: the model has no joint 'tilt'; did you mean 'tlit'? its joints: ",
+            "the model has no sensor 'fog'; did you mean 'fg'? its sensors: ",
+            "the model has no keyframe 'equilibrium'; its keyframes: none",
+            "<option gravity='0 0 9.81'>: must point straight down",
+            "a rig needs a joint or a site tilt, the joints CUBE/gimbal, CUBE/flywheel, the actuators ",
+        ],
+        cmg_mj("check", "rig.xml").complaint,
+    )
+
+
+def test_check_of_a_model_by_itself() -> None:
+    edited()
+    said = cmg_mj("check", "rig.xml")
+    assert (said.status, said.err) == (0, "")
+    for fragment in ("rig.xml: a rig", "cube1, cube2", "J_d = 0.0011 kg m^2", "--set plant.model=rig.xml"):
+        assert fragment in said.out
+    assert "hint" not in said.out
+    assert "scissored_pair.xml: a rig" in cmg_mj("check", "scissored_pair.xml").out
+    assert "the model has no joint 'tilt', 'cube1/gimbal', 'cube1/flywheel'" in cmg_mj("check", "cube.xml").complaint
+
+
+def test_a_hint_for_momenta_that_do_not_cancel() -> None:
+    hint = "momenta do not cancel while the thrust bearing is free"
+    assert hint in cmg_mj("check", "single_gimbal.xml").out
+    assert hint not in cmg_mj("check", "single_gimbal").out  # the scenario locks it
+
+
+@table(
+    ("a pipe", '<include file="pipe"/>', "<include file='pipe'>: is no ordinary file"),
+    ("a device", "<include file='/dev/zero'/>", "<include file='/dev/zero'>: is no ordinary file"),
+    ("a pipe further in", '<include file="inner.xml"/>', "<include file='pipe'>: is no ordinary file"),
+    ("a pipe for a part", '<asset><model name="a" file="pipe"/></asset>', "<model file='pipe'>: is no ordinary file"),
+    ("a pipe for a mesh", '<asset><mesh file="pipe"/></asset>', "<mesh file='pipe'>: is no ordinary file"),
+    (
+        "a pipe in a folder",
+        '<compiler meshdir="meshes"/><asset><mesh file="pipe"/></asset>',
+        "<mesh file='pipe'>: is no ordinary file",
+    ),
+    (
+        "a billion copies",
+        '<worldbody><replicate count="1000000000"/></worldbody>',
+        "<replicate count='1000000000'>: at most 10000",
+    ),
+    (
+        "copies in three directions",
+        "<composite count='1000 1000 3'/>",
+        "<composite count='1000 1000 3'>: at most 10000",
+    ),
+    ("itself", '<asset><model name="a" file="my.xml"/></asset>', "my.xml: contains itself: my.xml in my.xml"),
+    ("itself further in", '<asset><model file="outer.xml"/></asset>', "contains itself: my.xml in outer.xml in my.xml"),
+)
+def test_files_that_never_end(given: str, fragments: list[str]) -> None:
+    Path("meshes").mkdir()
+    for pipe in ("pipe", "meshes/pipe"):
+        os.mkfifo(pipe)
+    Path("inner.xml").write_text('<mujoco><!-- <include file="my.xml"/> --><include file="pipe"/></mujoco>')
+    Path("outer.xml").write_text('<mujoco><asset><model file="my.xml"/></asset></mujoco>')
+    Path("my.xml").write_text(f"<mujoco>{given}</mujoco>")
+    assert_in_order(fragments, cmg_mj("check", "my.xml").complaint)
+
+
+@table(
+    (
+        "a stiff damper",
+        "tilt_damping_n_m_s=1e6",
+        "plant.tilt_damping_n_m_s = 1e+06: ",
+    ),
+    ("a huge mass", "flywheel_imbalance_kg_m=1e9", "plant.flywheel_imbalance_kg_m = 1e+09: "),
+    ("a huge damper", "gimbal_damping_n_m_s=1e30", "plant.gimbal_damping_n_m_s = 1e+30: "),
+)
+@pytest.mark.parametrize("step", [[], ["--set", "plant.timestep_s=0.005"]])
+def test_settings_that_no_physics_stands(given: str, fragments: list[str], step: list[str]) -> None:
+    said = cmg_mj("run", "push_recovery", "--set", f"plant.{given}", *step)
+    assert_in_order(fragments, said.complaint)
+    assert not Path("runs").exists()

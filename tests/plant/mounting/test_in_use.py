@@ -1,0 +1,98 @@
+"""A mounted robot through all that runs a rig: it is one like the others, on a hinge or on its feet."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cmg_mj.plant.plant.mounting import mount
+
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.simulation.gymnasium_env import ScissoredPair
+from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.sweeps.api import sweep
+from tests.command import cmg_mj
+from tests.plant.mounting.robots import ROBOTS
+from tests.simulation.test_gymnasium_env import acting
+from tests.visualization.studio.session import Session, as_rows
+from tests.visualization.studio.test_session import same
+
+PUSHED = ["duration_s=2.0", "plant.initial_tilt_deg=0.2", "push=[{start_s=0.5,torque_n_m=1.0}]"]
+
+PUSH = 7
+"""Column of a session's rows."""
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+@pytest.fixture(scope="module", params=["bicycle", "inverted_double_pendulum, its joint held"])
+def scenario(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A scenario file: of a robot that stands on the floor, and of one on a hinge."""
+    robot = ROBOTS[request.param]
+    model = mount(robot.path, **robot.options).save(tmp_path_factory.mktemp("robot") / "balanced.xml")
+    write_scenario(model, robot.path, "homogeneous")
+    return str(model.with_suffix(".toml"))
+
+
+def opened(scenario: str) -> Experiment:
+    return prepare(load_scenario(scenario, PUSHED))
+
+
+def test_the_callback_and_a_batch_give_the_runners_trajectory(scenario: str) -> None:
+    experiment = opened(scenario)
+    native, callback = (experiment.run(driver) for driver in ("native", "callback"))
+    many = experiment.run_many(3)
+    assert native.trajectory is not None
+    assert callback.trajectory is not None
+    assert many.trajectory is not None
+    assert native.stood.all()
+    for name, values in native.trajectory.columns.items():
+        np.testing.assert_array_equal(callback.trajectory[name], values, err_msg=name)
+        np.testing.assert_array_equal(many.trajectory.world(0)[name], values, err_msg=name)
+
+
+def test_studio_gives_it_too(scenario: str) -> None:
+    studio = Session(lambda _: opened(scenario))
+    try:
+        studio.run(2.0)
+        assert (studio.live.stopped, studio.live.note) == ("", "")
+        rows = studio.rows
+    finally:
+        studio.handle.close()
+    trajectory = opened(scenario).run().trajectory
+    assert trajectory is not None
+    assert len(rows) == 400
+    rows[:, PUSH] = rows[:, PUSH].round(12)  # put together again from a free joint's three torques
+    same(rows, as_rows(trajectory))
+
+
+def test_the_environment_gives_it_too(scenario: str) -> None:
+    env = ScissoredPair(scenario, PUSHED, in_rad_s=True)
+    ticks, infos, _ = acting(env, 0)
+    trajectory = opened(scenario).run().trajectory
+    assert trajectory is not None
+    assert len(ticks) == 400
+    for name in ("x1_rad", "x2_rad_s", "x3_rad"):
+        np.testing.assert_array_equal([info[name] for info in infos[:-1]], trajectory[name])
+
+
+def test_a_sweep(scenario: str) -> None:
+    found = sweep(load_scenario(scenario, PUSHED), {"push.0.torque_n_m": [1.0, 200.0]}, ["homogeneous"], worlds=2)
+    stood = {row["push.0.torque_n_m"]: row["stood"] for row in found.trials.to_pylist()}
+    assert stood == {1.0: True, 200.0: False}
+
+
+def test_commands(scenario: str, tmp_path: Path) -> None:
+    """A run with its recording, a check, a comparison."""
+    settings = [part for value in PUSHED for part in ("--set", value)]
+    done = cmg_mj("run", scenario, *settings, "--out", str(tmp_path / "run"))
+    assert done.status == 0, done.err
+    assert (tmp_path / "run" / "recording.rrd").stat().st_size > 10_000
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["outcome"] == "done"
+    assert cmg_mj("check", scenario).status == 0
+    observers = ("--observers", "homogeneous,linear", "--worlds", "2")
+    done = cmg_mj("compare", scenario, *settings, *observers, "--out", str(tmp_path / "compared"))
+    assert done.status == 0, done.err

@@ -1,0 +1,221 @@
+"""What mount makes: the file is the spec, joints are held, and the line on the floor is a hinge as far as it tilts."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from cmg_mj.plant.plant.mounting import mount
+
+from cmg_mj.errors import InputError
+from cmg_mj.plant.axis import find_axis
+from cmg_mj.plant.plant import load_plant
+from cmg_mj.plant.tilt_line import SupportLine
+from cmg_mj.simulation.experiment import prepare
+from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.prospects import prospects
+from tests.command import cmg_mj
+from tests.plant.mounting.robots import EXAMPLES, ROBOTS
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+BALL = """
+<mujoco>
+  <option timestep="0.001" integrator="RK4"/>
+  <worldbody>
+    <body name="pole" pos="0 0 0.5">
+      <joint name="ankle" axis="0 1 0"/>
+      <geom type="capsule" fromto="0 0 0 0 0 0.8" size="0.03" mass="2"/>
+      <body name="arm" pos="0 0 0.6" euler="20 10 0">
+        <joint name="shoulder" type="ball"/>
+        <geom type="capsule" fromto="0 0 0 0.2 0 0" size="0.02" mass="0.2"/>
+        <body name="slide" pos="0.2 0 0"><joint name="gripper" type="slide" axis="1 0 0"/>
+          <geom size="0.02" mass="0.1"/></body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+UNIVERSAL = """
+<mujoco>
+  <option timestep="0.001" integrator="RK4"/>
+  <worldbody>
+    <body name="cross" pos="0 0 0.1"><joint name="roll" axis="1 0 0"/>
+      <inertial pos="0 0 0" mass="0.05" diaginertia="1e-5 1e-5 1e-5"/>
+      <body name="trunk"><joint name="pitch" axis="0 1 0"/>
+        <geom type="box" size="0.05 0.05 0.1" pos="{0} 0 0.2" mass="2"/></body></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def everything(model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    names = [name for name in dir(model) if "_" in name and not name.startswith("_")]
+    return {name: values for name in names if isinstance(values := getattr(model, name), np.ndarray)}
+
+
+@pytest.mark.parametrize("name", ["bicycle", "walker2d, freed", "humanoid"])
+def test_the_file_is_the_spec(name: str) -> None:
+    """MuJoCo writes six digits."""
+    made = mount(ROBOTS[name].path, **ROBOTS[name].options)
+    of_file, of_spec = mujoco.MjModel.from_xml_path(str(made.save("rig.xml"))), made.spec.compile()
+    saved, spec = everything(of_file), everything(of_spec)
+    for field in ("body_mass", "body_inertia", "body_pos", "jnt_axis", "eq_solimp", "site_pos"):
+        np.testing.assert_allclose(saved[field], spec[field], rtol=1e-4, atol=1e-5, err_msg=field)
+    for field in ("qpos", "qvel", "act", "ctrl"):
+        found, expected = (getattr(model.key("equilibrium"), field) for model in (of_file, of_spec))
+        np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5, err_msg=field)
+    np.testing.assert_allclose(saved["eq_data"][:, :5], spec["eq_data"][:, :5], atol=1e-5)
+    assert {k: v.shape for k, v in saved.items()} == {k: v.shape for k, v in spec.items()}
+
+
+def test_a_spec_is_taken_and_not_changed() -> None:
+    spec = mujoco.MjSpec.from_string(BALL)
+    before = spec.to_xml()
+    made = mount(spec, "pole")
+    assert spec.to_xml() == before
+    assert made.spec.body("cube1/half") is not None
+
+
+def test_every_joint_is_held_where_it_stands() -> None:
+    """A ball, too, and in any pose of its reference: a run with pushes moves them by less than 0.1 deg."""
+    made = mount(mujoco.MjSpec.from_string(BALL), "pole")
+    assert made.held == ("shoulder", "gripper")
+    model = made.save("rig.xml")
+    can = prospects(write_scenario(model, model, "homogeneous"))
+    assert not can.hints
+    result = write_scenario(model, model, "homogeneous", can).run()
+    assert result.stood.all()
+    trajectory = result.trajectory
+    assert trajectory is not None
+    turned = np.stack([trajectory[f"orientation/shoulder/{part}"] for part in "xyz"])
+    assert np.degrees(2.0 * np.abs(turned)).max() < 0.1
+    assert np.abs(trajectory["position/gripper_m"]).max() < 1e-3
+
+
+def test_servos_hold_what_they_drive() -> None:
+    text = BALL.replace("</mujoco>", '<actuator><position joint="gripper" kp="2000" kv="20"/></actuator></mujoco>')
+    assert mount(mujoco.MjSpec.from_string(text), "pole", hold="servos").held == ("shoulder",)
+    assert mount(mujoco.MjSpec.from_string(text), "pole", free=["gripper"]).held == ("shoulder",)
+
+
+def test_a_larger_module_has_more_momentum() -> None:
+    """Masses grow with s^3, inertias and with them the momentum with s^5; the wheels turn as fast."""
+    models = [
+        load_plant(model=str(mount(EXAMPLES / "torso.xml", "torso", axis="x", scale=s).save(f"{s}.xml")))
+        for s in (1.0, 1.5)
+    ]
+    small, large = (plant.reduced for plant in models)
+    assert large.J_d / small.J_d == pytest.approx(1.5**5, rel=1e-4)
+    assert large.omega_d == pytest.approx(small.omega_d)
+    masses = [plant.model.body("cube1/flywheel").mass[0] for plant in models]
+    assert masses[1] / masses[0] == pytest.approx(1.5**3, rel=1e-4)
+
+
+def test_the_line_on_the_floor_is_a_hinge_in_its_place() -> None:
+    """The bicycle with a hinge along the line that mount has found, for its free joint: the same reduced model."""
+    made = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options)
+    model = made.spec.compile()
+    key = model.key("equilibrium").id
+    free = find_axis(model, key, "")
+    assert isinstance(free.line, SupportLine)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, key)
+    qpos, qvel, spec = data.qpos.copy(), data.qvel.copy(), made.spec
+    frame = spec.body("frame")
+    spec.delete(spec.joint("root"))
+    frame.pos, frame.quat = qpos[:3], qpos[3:7]
+    frame.add_joint(name="roll", type=mujoco.mjtJoint.mjJNT_HINGE, pos=free.point, axis=free.direction)
+    spec.key("equilibrium").qpos, spec.key("equilibrium").qvel = [0.0, *qpos[7:]], [0.0, *qvel[6:]]
+    hinged = spec.compile()
+    fixed = find_axis(hinged, hinged.key("equilibrium").id, "")
+    for name in ("J1", "J2", "J_d", "omega_d", "gravity_torque"):
+        expected = getattr(fixed.reduced, name)
+        assert getattr(free.reduced, name) == pytest.approx(expected, rel=1e-5, abs=1e-6 * fixed.reduced.J1), name
+
+
+def test_meshes_are_found_from_another_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "robot"
+    (folder / "meshes").mkdir(parents=True)
+    points = "\n".join(f"v {x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (0, 8))
+    faces = "f 1 3 4\nf 1 4 2\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\nf 1 5 7\nf 1 7 3\nf 2 4 8\nf 2 8 6"
+    (folder / "meshes" / "pole.obj").write_text(f"{points}\n{faces}\n", encoding="utf-8")
+    (folder / "robot.xml").write_text(
+        '<mujoco><compiler meshdir="meshes"/><asset><mesh name="p" file="pole.obj" scale="0.1 0.1 0.1"/></asset>'
+        '<worldbody><body name="pole"><joint axis="0 1 0"/><geom type="mesh" mesh="p" mass="2"/></body></worldbody>'
+        "</mujoco>",
+        encoding="utf-8",
+    )
+    (tmp_path / "elsewhere").mkdir()
+    path = mount(folder / "robot.xml", "pole").save(tmp_path / "elsewhere" / "rig.xml")
+    assert load_plant(model=str(path)).reduced.J1 > 0.0
+    assert str(tmp_path) not in path.read_text(encoding="utf-8")
+
+
+def test_a_second_axis(tmp_path: Path) -> None:
+    """A universal joint, mounted twice: the hinge that was held is let go, the first pair is kept, both stand."""
+    once = mount(mujoco.MjSpec.from_string(UNIVERSAL.format(0)), "trunk", axis="roll", name="roll", at=(0.0, 0.0, 0.15))
+    assert once.held == ("pitch",)
+    twice = mount(once.spec, "trunk", axis="pitch", name="pitch", at=(0.0, 0.0, 0.35))
+    assert twice.held == ()
+    assert [equality.name for equality in twice.spec.equalities] == []
+    model = twice.save("rig.xml")
+    can = prospects(write_scenario(model, model, "homogeneous", axis="pitch"), "pitch")
+    experiment = write_scenario(model, model, "homogeneous", can, "pitch")
+    assert experiment.plant.axis_names == ["roll", "pitch"]
+    assert can.reduced == experiment.plant.along("pitch").reduced != experiment.plant.along("roll").reduced
+    assert prepare(experiment.scenario).run_many(3, keep_trajectory=False).stood.all()
+    with pytest.raises(InputError, match="no room: the modules overlap 'roll/cube1', which is there already"):
+        mount(once.spec, "trunk", axis="pitch", name="pitch", at=(0.0, 0.0, 0.15))
+    off = mount(mujoco.MjSpec.from_string(UNIVERSAL.format(0.01)), "trunk", axis="roll", name="roll", at=(0, 0, 0.15))
+    with pytest.raises(InputError, match=r"the hinge 'pitch' has to turn by .* deg, and the modules of another axis"):
+        mount(off.spec, "trunk", axis="pitch", name="pitch", at=(0.0, 0.0, 0.35))
+
+
+def test_keyframes_of_its_own_are_kept() -> None:
+    text = BALL.replace(
+        "</mujoco>",
+        '<keyframe><key name="home" qpos="0.1 1 0 0 0 0.05"/><key name="up" qpos="0 1 0 0 0 0"/></keyframe></mujoco>',
+    )
+    made = mount(mujoco.MjSpec.from_string(text), "pole", keyframe="home")
+    model = made.spec.compile()
+    assert [model.key(i).name for i in range(model.nkey)] == ["equilibrium", "home", "up"]
+    home, stands = model.key("home"), model.key("equilibrium")
+    assert home.qpos[0] == pytest.approx(0.1)
+    assert home.qpos[5] == stands.qpos[5] == pytest.approx(0.05)
+    assert stands.ctrl.tolist() == home.ctrl.tolist()
+    assert model.equality("gripper_held").data[0] == pytest.approx(0.05)
+
+
+def test_the_command_prints_what_the_pair_can_do() -> None:
+    given = ("mount", EXAMPLES / "torso.xml", "--body", "torso", "--axis", "x")
+    said = cmg_mj(*given, "-o", "a.xml", "--json")
+    assert said.status == 0, said.err
+    figures = json.loads(said.out)
+    assert figures["held"] == ["front_hip", "rear_hip"]
+    assert figures["ceiling_tilt_deg"] < 2.0
+    assert figures["scale_that_suffices"] == 1.21
+    assert (
+        0.0 < figures["borne_impulse_least_n_m_s"] <= figures["borne_impulse_n_m_s"] < figures["ceiling_impulse_n_m_s"]
+    )
+    words = cmg_mj(*given, "-o", "b.xml")
+    assert (words.status, "--scale 1.21 suffices" in words.out) == (0, True)
+    assert sorted(path.name for path in Path().iterdir()) == ["a.toml", "a.xml", "b.toml", "b.xml"]
+
+
+def test_what_it_changes_it_says() -> None:
+    text = BALL.replace('timestep="0.001" integrator="RK4"', 'timestep="0.02" solver="PGS" gravity="0.001 0 -9.8"')
+    made = mount(mujoco.MjSpec.from_string(text), "pole")
+    assert [note.split(" now ")[-1] for note in made.notes] == [
+        "straight down",
+        "RK4, which fast flywheels need",
+        "Newton: another does not hold joints stiffly",
+        "5 ms",
+    ]
+    option = made.spec.compile().opt
+    assert (option.timestep, option.gravity.tolist()) == (0.005, [0.0, 0.0, pytest.approx(-9.8)])
+    assert int(option.solver) == int(mujoco.mjtSolver.mjSOL_NEWTON)
+    assert int(option.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4)

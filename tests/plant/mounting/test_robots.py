@@ -1,0 +1,109 @@
+"""Pairs on robots that no one here wrote: they stand as long and bear as much as `mount` says."""
+
+from __future__ import annotations
+
+import copy
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from cmg_mj.plant.plant.mounting import mount
+
+from cmg_mj.plant.mounting.fall_check import falls_with
+from cmg_mj.plant.tilt_line import HingeLine, SupportLine
+from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.studies.push_limits.largest_push import PUSH_S
+from cmg_mj.studies.push_limits.mount_report import PUSHED_AT_S, write_scenario
+from cmg_mj.studies.push_limits.prospects import Prospects, prospects, scale_that_suffices
+from tests.plant.mounting.robots import ROBOTS
+
+WORLDS = 10
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def mounted(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Experiment, Prospects, str]:
+    robot = ROBOTS[request.param]
+    folder = tmp_path_factory.mktemp("robot")
+    found = mount(robot.path, **robot.options)
+    model = found.save(folder / "balanced.xml")
+    can = prospects(write_scenario(model, robot.path, "homogeneous"))
+    return write_scenario(model, robot.path, "homogeneous", can), can, request.param
+
+
+def pushed(
+    experiment: Experiment, torque: float, duration_s: float, tilt_deg: float = 0.0, at_s: float = 2.0
+) -> np.ndarray:
+    """Which of ten worlds stand to the end."""
+    scenario = experiment.scenario
+    push = [scenario.push[0].__class__(at_s, PUSH_S, torque)] if torque else []
+    plant = scenario.plant.__class__(
+        model=str(experiment.plant.path), equilibrium_bias_deg=0.0, initial_tilt_deg=tilt_deg
+    )
+    changed = scenario.model_copy(update={"push": push, "duration_s": duration_s, "plant": plant})
+    return prepare(changed).run_many(WORLDS, keep_trajectory=False).stood
+
+
+def test_it_stands_thirty_seconds(mounted: tuple[Experiment, Prospects, str]) -> None:
+    """Ten seeds, default sensors, `homogeneous`, from the smaller of a degree and a quarter of the ceiling."""
+    experiment, can, _ = mounted
+    tilt = min(1.0, 0.25 * math.degrees(can.ceiling.tilt))
+    assert pushed(experiment, 0.0, 30.0, tilt).all()
+
+
+def test_it_stands_thirty_seconds_with_a_push(mounted: tuple[Experiment, Prospects, str]) -> None:
+    """The same with 0.6 E, once the gimbals have come back from the start: E is borne by gimbals that are upright."""
+    experiment, can, _ = mounted
+    tilt = min(1.0, 0.25 * math.degrees(can.ceiling.tilt))
+    assert pushed(experiment, 0.6 * can.bears.impulse / PUSH_S, 30.0, tilt, PUSHED_AT_S).all()
+
+
+def test_it_bears_what_the_reduced_model_says(mounted: tuple[Experiment, Prospects, str]) -> None:
+    """E is within 35 % of the simulation's: most stand 0.65 E and fall with E/0.65; all fall with 1.8 E."""
+    experiment, can, _ = mounted
+    torque = can.bears.impulse / PUSH_S
+    assert 0.0 < can.bears.impulse < can.ceiling_push
+    assert pushed(experiment, 0.65 * torque, 8.0).sum() > WORLDS / 2
+    assert pushed(experiment, torque / 0.65, 8.0).sum() < WORLDS / 2
+    assert not pushed(experiment, 1.8 * torque, 8.0).any()
+
+
+def test_it_starts_to_fall_as_its_reduced_model_does(mounted: tuple[Experiment, Prospects, str]) -> None:
+    """Nothing controlled, the simulated robot leans as cosh(lambda t): inertia, gravity and the line are right.
+
+    Without the damping that a file gives its joints, which the reduced model does not have: its 1 N m s/rad makes the
+    pole of Gymnasium's inverted_pendulum 6 % smaller; no other's changes by more than 0.1 %.
+    """
+    experiment, can, _ = mounted
+    plant = experiment.plant
+    undamped = copy.copy(plant.model)
+    undamped.dof_damping[:] = 0.0
+    assert falls_with(undamped, plant.key, plant.axis.line) == pytest.approx(can.ceiling.pole, rel=0.03)
+    assert not can.hints
+
+
+def test_plain_mujoco_loads_it_and_it_rests(mounted: tuple[Experiment, Prospects, str]) -> None:
+    """At the keyframe nothing accelerates but for what the flywheels' motors do."""
+    experiment, can, name = mounted
+    model = mujoco.MjModel.from_xml_path(str(experiment.plant.path))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
+    mujoco.mj_forward(model, data)
+    tilting = experiment.plant.axis.line.motion(model, data) @ data.qacc
+    assert abs(tilting) < math.radians(0.05) * can.ceiling.pole**2
+    assert isinstance(experiment.plant.axis.line, SupportLine if ROBOTS[name].on_contacts else HingeLine)
+
+
+def test_where_the_pair_is_too_small_it_says_which_is_not(tmp_path: Path) -> None:
+    """The scale that the tests use for the torso is the one that mount names for the papers' cube."""
+    robot = ROBOTS["torso"]
+
+    def ceiling_at(scale: float) -> float:
+        model = mount(robot.path, **{**robot.options, "scale": scale}).save(tmp_path / f"{scale}.xml")
+        return prospects(write_scenario(model, model, "homogeneous")).ceiling.tilt
+
+    assert math.degrees(ceiling_at(1.0)) < 2.0
+    assert scale_that_suffices(ceiling_at, 1.0) == robot.options["scale"]

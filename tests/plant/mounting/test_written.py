@@ -1,0 +1,119 @@
+"""Where the mount command writes: both files or neither, and in nobody's place."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import mujoco
+import pytest
+from cmg_mj.plant.plant.mounting import mount
+
+from cmg_mj.errors import InputError
+from cmg_mj.studies.push_limits.prospects import scale_that_suffices
+from tests.command import cmg_mj
+from tests.plant.mounting.robots import EXAMPLES, ROBOTS
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+TORSO = EXAMPLES / "torso.xml"
+GIVEN = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3")
+NO_XML = "must be a file that ends in .xml, such as balanced.xml"
+
+
+def there() -> list[str]:
+    return sorted(str(path) for path in Path().rglob("*"))
+
+
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [
+        ("b.toml", f"-o b.toml: {NO_XML}"),
+        ("noext", f"-o noext: {NO_XML}"),
+        (".", f"-o .: {NO_XML}"),
+        ("", NO_XML),
+        ("there/is/none.xml", "-o there/is/none.xml: cannot be written: there is no folder there/is"),
+        ("folder.xml", "-o folder.xml: folder.xml is a folder"),
+    ],
+)
+def test_the_place_is_looked_at_before_anything_is_made(out: str, said: str) -> None:
+    Path("folder.xml").mkdir()
+    assert said in cmg_mj(*GIVEN, "-o", out, "--overwrite").complaint
+    assert there() == ["folder.xml"]
+    spec = mujoco.MjSpec.from_file(str(TORSO))
+    with pytest.raises(InputError):
+        mount(spec, "torso", axis="x", scale=1.3).save(out)
+
+
+@pytest.mark.parametrize("observer", ["homogenous", "nowhere:Class"])
+def test_an_observer_that_is_none_leaves_nothing(observer: str) -> None:
+    Path("a.xml").write_text("mine", encoding="utf-8")
+    assert observer.partition(":")[0] in cmg_mj(*GIVEN, "-o", "a.xml", "--overwrite", "--observer", observer).complaint
+    assert (there(), Path("a.xml").read_text(encoding="utf-8")) == (["a.xml"], "mine")
+
+
+def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both files are written under other names, and renamed when all is done."""
+    for name in ("a.xml", "a.toml"):
+        Path(name).write_text("mine", encoding="utf-8")
+
+    def fails(*_: object, **__: object) -> None:
+        raise InputError(f"{next(Path().glob('.a.*.partial.xml'))}: fails")
+
+    monkeypatch.setattr("cmg_mj.studies.push_limits.prospects.prospects", fails)
+    assert "a.xml: fails" in cmg_mj(*GIVEN, "-o", "a.xml", "--overwrite").complaint
+    assert there() == ["a.toml", "a.xml"]
+    assert [Path(name).read_text(encoding="utf-8") for name in there()] == ["mine", "mine"]
+
+
+def test_a_file_that_the_robot_includes_is_never_overwritten() -> None:
+    Path("part.xml").write_bytes(TORSO.read_bytes())
+    Path("robot.xml").write_text('<mujoco><include file="part.xml"/></mujoco>', encoding="utf-8")
+    given = ("mount", "robot.xml", *GIVEN[2:])
+    said = cmg_mj(*given, "-o", "part.xml", "--overwrite").complaint
+    assert "-o part.xml: part.xml is the robot's own file, or one that it names" in said
+    assert Path("part.xml").read_bytes() == TORSO.read_bytes()
+    assert there() == ["part.xml", "robot.xml"]
+    with pytest.raises(InputError, match=r"part\.xml is the robot's own file"):
+        mount("robot.xml", "torso", axis="x", scale=1.3).save("part.xml")
+
+
+def test_what_is_written_speaks_of_itself_alone() -> None:
+    assert json.loads(cmg_mj(*GIVEN, "-o", "a.xml", "--json").out)["model"] == "a.xml"
+    assert there() == ["a.toml", "a.xml"]
+    text = Path("a.toml").read_text(encoding="utf-8")
+    assert 'model = "a.xml"' in text
+    assert "partial" not in text + Path("a.xml").read_text(encoding="utf-8")
+
+
+def test_what_mujoco_cannot_do_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise ValueError("Error: repeated name 'x'\nin frame")
+
+    monkeypatch.setattr("cmg_mj.plant.mounting.mount", fails)
+    said = cmg_mj(*GIVEN, "-o", "a.xml").complaint
+    assert f"{TORSO}: MuJoCo cannot put a pair on it: repeated name 'x' in frame" in said
+    assert there() == []
+
+
+def test_the_document_has_the_commands_of_its_robots() -> None:
+    """Each is what the tests mount, in the table's order."""
+    text = (EXAMPLES.parents[1] / "docs" / "mount.md").read_text(encoding="utf-8")
+    assert "\n".join(robot.command for robot in ROBOTS.values()) in text
+
+
+def test_a_command_of_the_document() -> None:
+    words = shlex.split(ROBOTS["bicycle"].command)
+    assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml").status == 0
+    made = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options).save("b.xml")
+    assert made.read_bytes() == Path("a.xml").read_bytes()
+
+
+def test_a_larger_pair_that_has_no_room_is_none_that_suffices() -> None:
+    def ceiling_at(scale: float) -> float:
+        if scale > 1.3:
+            raise InputError("no room")
+        return 0.01
+
+    assert scale_that_suffices(ceiling_at, 1.0) is None

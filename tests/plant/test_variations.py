@@ -1,0 +1,259 @@
+"""A rig that differs from its file by its settings is the rig of a file that says so."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.inputs.bundled import folder
+from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.plant_settings import PlantSettings
+from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.simulation.experiment import prepare
+from tests.plant import paper_model as paper
+
+KP, KV = 60.0, 1.1
+
+
+def edited(where: Path, file: str, *changes: tuple[str, str]) -> Path:
+    """The scissored pair with one of its files changed."""
+    for path in folder("models").glob("*.xml"):
+        shutil.copy(path, where)
+    text = (where / file).read_text()
+    for pattern, by in changes:
+        text, times = re.subn(pattern, by, text)
+        assert times, pattern
+    (where / file).write_text(text)
+    return where / "scissored_pair.xml"
+
+
+def run(*settings: str) -> Trajectory:
+    """Half a second of `push_recovery`."""
+    result = prepare(load_scenario("push_recovery", ["duration_s=0.5", "push=[]", *settings])).run()
+    assert result.trajectory is not None
+    return result.trajectory
+
+
+def assert_same(by_setting: Trajectory, by_file: Trajectory) -> None:
+    for name in by_file.columns:
+        np.testing.assert_array_equal(by_setting[name], by_file[name], name)
+
+
+# --- the servos -----------------------------------------------------------------------------------------------
+
+
+def test_a_servo_by_settings_is_that_of_a_file(tmp_path: Path) -> None:
+    path = edited(tmp_path, "cube.xml", ('kp="85.6" kv="0.731"', f'kp="{KP}" kv="{KV}"'))
+    by_setting = run(f"plant.servo_stiffness_n_m_rad={KP}", f"plant.servo_damping_n_m_s_rad={KV}")
+    assert_same(by_setting, run(f"plant.model={path}"))
+    assert not np.array_equal(by_setting["x1_rad"], run()["x1_rad"])
+
+
+def servo_torques(plant: Plant, error: float, rate: float) -> list[float]:
+    """Of both servos with the setpoint ahead of the gimbal, which turns [N m]."""
+    data = plant.new_data()
+    for i, cube in enumerate(plant.cubes):
+        data.act[i] = data.qpos[cube.gimbal] + error
+        data.qvel[cube.gimbal] = rate
+    mujoco.mj_forward(plant.model, data)
+    return [float(data.qfrc_actuator[cube.gimbal]) for cube in plant.cubes]
+
+
+@pytest.mark.parametrize("given", [{}, {"kp": KP}, {"kv": KV}, {"kp": KP, "kv": KV}])
+def test_a_servos_torque_is_stiffness_times_error_less_damping_times_rate(given: dict[str, Any]) -> None:
+    names = {"kp": "servo_stiffness_n_m_rad", "kv": "servo_damping_n_m_s_rad"}
+    settings: dict[str, Any] = {names[name]: value for name, value in given.items()}
+    plant = load_plant(PlantSettings(**settings))
+    kp, kv = given.get("kp", 85.6), given.get("kv", 0.731)
+    assert servo_torques(plant, 0.02, 0.3) == pytest.approx([kp * 0.02 - kv * 0.3] * 2, rel=1e-12)
+
+
+def test_with_a_gear_they_count_at_the_joint(tmp_path: Path) -> None:
+    path = edited(tmp_path, "cube.xml", ('(name="gimbal_servo")', r'\1 gear="2"'))
+    plant = load_plant(model=str(path), servo_stiffness_n_m_rad=KP, servo_damping_n_m_s_rad=KV)
+    data = plant.new_data()
+    for i, cube in enumerate(plant.cubes):
+        data.act[i] = 2.0 * (data.qpos[cube.gimbal] + 0.02)  # what the servo sees of a turn
+        data.qvel[cube.gimbal] = 0.3
+    mujoco.mj_forward(plant.model, data)
+    assert data.qfrc_actuator[plant.cubes[0].gimbal] == pytest.approx(KP * 0.02 - KV * 0.3, rel=1e-12)
+
+
+def test_a_stiffer_servo_gets_a_smaller_step() -> None:
+    """An undamped gimbal on its servo swings at sqrt(kp/I), I = I_c + I_d; the step is 1.5 over that."""
+    kp, inertia = 1000.0, 1.56e-3
+    plant = load_plant(lock_thrust_bearing=True, servo_stiffness_n_m_rad=kp, servo_damping_n_m_s_rad=0.0)
+    assert plant.largest_step == pytest.approx(1.5 / math.sqrt(kp / inertia), rel=2e-3)
+    assert load_plant().largest_step == 0.005
+
+
+@pytest.mark.parametrize("servo", ['<velocity name="gimbal_servo" joint="gimbal" kv="0.7"/>'])
+def test_a_servo_of_another_kind_has_no_stiffness(servo: str, tmp_path: Path) -> None:
+    path = edited(tmp_path, "scissored_pair.xml", (r'act="[^"]*" ', ""))
+    text = (tmp_path / "cube.xml").read_text()
+    (tmp_path / "cube.xml").write_text(re.sub(r"<intvelocity[^>]*/>", servo, text))
+    for name in ("servo_stiffness_n_m_rad", "servo_damping_n_m_s_rad"):
+        with pytest.raises(
+            InputError, match=rf"plant\.{name}: .*pair\.xml: actuator 'cube1/gimbal_servo' is no position"
+        ):
+            load_plant(PlantSettings(**{"model": str(path), name: 1.0}))
+
+
+# --- the flywheels --------------------------------------------------------------------------------------------
+
+
+def test_flywheels_by_a_setting_are_those_of_a_file(tmp_path: Path) -> None:
+    path = edited(tmp_path, "scissored_pair.xml", (r"\b314\b", "200"))
+    by_setting = run("plant.flywheel_speed_rad_s=200", "controller.lqr.state_cost=[100.0,1.0,1.0,0.1]")
+    assert_same(by_setting, run(f"plant.model={path}", "controller.lqr.state_cost=[100.0,1.0,1.0,0.1]"))
+
+
+@pytest.mark.parametrize("model", ["scissored_pair.xml", "single_gimbal.xml"])
+def test_the_momentum_is_inertia_times_speed(model: str) -> None:
+    """Turned a quarter back, a wheel spins about the tilt axis: its share of the angular momentum there is J w."""
+    J_d, speed = paper.J_d, 123.0
+    plant = load_plant(model=model, flywheel_speed_rad_s=speed)
+    assert [abs(cube.speed) for cube in plant.cubes] == [speed] * len(plant.cubes)
+    assert plant.reduced.omega_d == pytest.approx(speed, rel=1e-12)
+    assert plant.reduced.J_d * plant.reduced.omega_d == pytest.approx(J_d * speed, rel=1e-12)
+    as_filed = load_plant(model=model)
+    assert [cube.direction for cube in plant.cubes] == [cube.direction for cube in as_filed.cubes]
+    assert replace(plant.reduced, omega_d=as_filed.reduced.omega_d) == as_filed.reduced
+    data = plant.new_data()
+    for cube in plant.cubes:
+        data.qpos[cube.gimbal] = cube.gimbal_zero - cube.direction * math.pi / 2.0
+    mujoco.mj_forward(plant.model, data)
+    mujoco.mj_subtreeVel(plant.model, data)
+    momentum = data.subtree_angmom[plant.frame] @ data.xaxis[plant.tilt]
+    assert momentum == pytest.approx(len(plant.cubes) * J_d * speed, rel=1e-12)
+
+
+def test_a_gimbals_rate_turns_that_much_momentum() -> None:
+    """The torque on the upright rig at rest is 2 J w u: half the speed, half the torque."""
+    torques = []
+    for speed in (157.0, 314.0):
+        plant = load_plant(equilibrium_bias_deg=0.0, initial_tilt_deg=0.0, flywheel_speed_rad_s=speed)
+        data = plant.new_data()
+        for cube in plant.cubes:
+            data.qvel[cube.gimbal] = 0.5 * cube.direction
+        mujoco.mj_forward(plant.model, data)
+        torques.append(-float(data.qfrc_bias[plant.tilt]))
+    assert torques == pytest.approx([2.0 * paper.J_d * speed * 0.5 for speed in (157.0, 314.0)], rel=1e-9)
+
+
+def test_wheels_keep_their_speed_in_a_run() -> None:
+    for driver in ("native", "callback"):
+        scenario = load_scenario("push_recovery", ["duration_s=0.5", "push=[]", "plant.flywheel_speed_rad_s=250"])
+        trajectory = prepare(scenario).run(driver=driver).trajectory
+        assert trajectory is not None
+        np.testing.assert_allclose(np.abs(trajectory["rate/cube2/flywheel_rad_s"]), 250.0, rtol=0.01)
+
+
+def test_changed_back_it_is_the_rig_it_was() -> None:
+    plant = load_plant()
+    slow = plant.changed(PlantSettings(flywheel_speed_rad_s=100.0))
+    back = slow.changed(PlantSettings())
+    assert (back.cubes, back.reduced) == (plant.cubes, plant.reduced)
+    assert slow.reduced.omega_d == pytest.approx(100.0)
+    np.testing.assert_array_equal(back.model.key_qvel, plant.model.key_qvel)
+
+
+def test_a_motor_that_takes_no_such_speed(tmp_path: Path) -> None:
+    path = edited(tmp_path, "cube.xml", ('(name="flywheel_motor")', r'\1 ctrllimited="true" ctrlrange="-400 400"'))
+    assert load_plant(model=str(path), flywheel_speed_rad_s=400.0)
+    complaint = r"plant\.flywheel_speed_rad_s = 401: .*'cube1/flywheel_motor' takes only -400 to 400 rad/s"
+    with pytest.raises(InputError, match=complaint):
+        load_plant(model=str(path), flywheel_speed_rad_s=401.0)
+
+
+# --- the accelerometers ---------------------------------------------------------------------------------------
+
+INNER, OUTER = 0.05, 0.25
+
+
+def moved_sites(where: Path) -> Path:
+    """The file with its accelerometers on the diagonal of x and z at other distances."""
+
+    def site(which: str, radius: float) -> tuple[str, str]:
+        at = radius / math.sqrt(2.0)
+        return rf'(name="accelerometer_{which}" pos=)"[^"]*"', rf'\1"{at!r} 0 {at!r}"'
+
+    return edited(where, "scissored_pair.xml", site("inner", INNER), site("outer", OUTER))
+
+
+def test_accelerometers_by_settings_are_those_of_a_file(tmp_path: Path) -> None:
+    path = moved_sites(tmp_path)
+    plant = load_plant(accelerometer_inner_m=INNER, accelerometer_outer_m=OUTER)
+    filed = load_plant(model=str(path))
+    assert plant.radial_tilt == RadialTilt(INNER, OUTER)
+    for model, other in ((plant.model, filed.model), (plant.drawn_model, filed.drawn_model)):
+        np.testing.assert_allclose(model.site_pos, other.site_pos, rtol=0.0, atol=1e-15)
+    by_setting = run(f"plant.accelerometer_inner_m={INNER}", f"plant.accelerometer_outer_m={OUTER}")
+    np.testing.assert_allclose(by_setting["y1_rad"], run(f"plant.model={path}")["y1_rad"], rtol=0.0, atol=1e-9)
+
+
+def test_what_they_feel_of_a_turn_grows_with_the_distance() -> None:
+    """a = r (alpha tangential, -w^2 radial): their readings differ by that, and y1 is the tilt all the same."""
+    plant = load_plant(accelerometer_inner_m=INNER, accelerometer_outer_m=OUTER, lock_thrust_bearing=True)
+    data = plant.new_data()
+    data.qpos[plant.tilt], data.qvel[plant.tilt] = plant.tilt_zero + 0.2, 3.0
+    mujoco.mj_forward(plant.model, data)
+    alpha, rate = float(data.qacc[plant.tilt]), 3.0
+    ix, iz, ox, oz = plant.ideal(data.sensordata.tolist(), data.qvel.tolist()).accelerations
+    assert ox - ix == pytest.approx((OUTER - INNER) * alpha, rel=1e-12)
+    assert oz - iz == pytest.approx(-(OUTER - INNER) * rate**2, rel=1e-12)
+    assert plant.radial_tilt(ix, iz, ox, oz) == pytest.approx(0.2, abs=1e-12)
+    assert plant.radial_tilt.acceleration(ix, ox) == pytest.approx(alpha, rel=1e-12)
+
+
+def test_one_of_them_alone() -> None:
+    filed = load_plant().radial_tilt
+    assert load_plant(accelerometer_outer_m=OUTER).radial_tilt == RadialTilt(filed.r_inner, OUTER)
+    assert (
+        load_plant().changed(PlantSettings(accelerometer_inner_m=INNER)).changed(PlantSettings()).radial_tilt == filed
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ((0.2, 0.1), r"inner_m = 0\.2, plant\.accelerometer_outer_m = 0\.1: the inner .* 0\.2 and 0\.1 m away"),
+        ((0.2, 0.2), "must lie nearer"),
+        ((0.3, None), r"plant\.accelerometer_inner_m = 0\.3: .* 0\.3 and 0\.201525 m away"),
+        ((None, 0.05), r"plant\.accelerometer_outer_m = 0\.05: .* 0\.0671751 and 0\.05 m away"),
+    ],
+)
+def test_the_inner_one_is_the_inner_one(given: tuple, complaint: str) -> None:
+    with pytest.raises(InputError, match=complaint):
+        load_plant(accelerometer_inner_m=given[0], accelerometer_outer_m=given[1])
+
+
+# --- all of them ----------------------------------------------------------------------------------------------
+
+GIVEN: dict[str, Any] = {
+    "servo_stiffness_n_m_rad": KP,
+    "servo_damping_n_m_s_rad": 0.0,
+    "flywheel_speed_rad_s": 250.0,
+    "gimbal_backlash_arcmin": 20.0,
+    "accelerometer_inner_m": INNER,
+    "accelerometer_outer_m": OUTER,
+}
+
+
+@pytest.mark.parametrize("name", GIVEN)
+def test_it_stands_in_the_resolved_scenario(name: str) -> None:
+    experiment = prepare(load_scenario("push_recovery", [f"plant.{name}={GIVEN[name]}"]))
+    assert experiment.resolved()["plant"][name] == GIVEN[name]
+    assert experiment.differences[f"plant.{name}"] == GIVEN[name]
+    assert not prepare(load_scenario("push_recovery")).resolved()["plant"].get(name)

@@ -1,0 +1,81 @@
+"""Two axes about which one free body tilts: both lines' torques act on the same joint, and each is felt."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cmg_mj.plant.plant.mounting import mount
+
+from cmg_mj.plant.tilt_line import SupportLine
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
+from tests.visualization.studio.session import Session, as_rows
+from tests.visualization.studio.test_session import same
+
+POST = """
+<mujoco model="post">
+  <worldbody>
+    <geom type="plane" size="4 4 0.1" friction="1.5 0.05 0.001" condim="4"/>
+    <body name="post" pos="0 0 0.62">
+      <freejoint/>
+      <geom type="box" size="0.12 0.12 0.16" mass="4"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.59" size="0.03" mass="0.8" friction="1.5 0.05 0.001" condim="4"/>
+    </body>
+  </worldbody>
+</mujoco>"""
+SET = (
+    "duration_s=1.5",
+    "plant.turn_rate_rad_s=0",
+    "plant.equilibrium_bias_deg=0",
+    "plant.initial_tilt_deg=0",
+    "axes={}",
+)
+PUSH = 7
+"""Column of a session's rows; the second axis' comes seven later."""
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("post")
+    (folder / "post.xml").write_text(POST, encoding="utf-8")
+    one = mount(folder / "post.xml", body="post", axis="x", scale=1.3, name="roll").save(folder / "one.xml")
+    return mount(one, body="post", axis="y", scale=1.3, name="pitch", at=(0.0, 0.0, 0.55)).save(folder / "two.xml")
+
+
+def pushed(model: Path, **torques: float) -> Experiment:
+    pushes = ",".join(f"{{start_s=0.5, torque_n_m={torque}, axis='{axis}'}}" for axis, torque in torques.items())
+    return prepare(load_scenario("two_axes", [*SET, f"plant.model={model}", f"push=[{pushes}]"]))
+
+
+def test_a_push_about_either_axis_is_felt_there(model: Path) -> None:
+    plant = pushed(model).plant
+    assert all(isinstance(axis.line, SupportLine) for axis in plant.axes)
+    quiet = pushed(model).run().trajectory
+    assert quiet is not None
+    for axis, other in (("roll", "pitch"), ("pitch", "roll")):
+        experiment = pushed(model, **{axis: 12.0})
+        one, many = experiment.run().trajectory, experiment.run_many(2).trajectory
+        assert one is not None
+        assert many is not None
+        for name, values in one.columns.items():
+            np.testing.assert_array_equal(many.world(0)[name], values, err_msg=name)
+        after = round(0.6 / 0.005)
+        rate = {name: one[f"{name}/x2_rad_s"][after] - quiet[f"{name}/x2_rad_s"][after] for name in (axis, other)}
+        inertia = plant.along(axis).reduced.gimbals * plant.along(axis).reduced.J1
+        assert rate[axis] == pytest.approx(12.0 * 0.1 / inertia, rel=0.3)  # the controller is at it meanwhile
+        assert abs(rate[other]) < 0.05 * rate[axis]
+
+
+def test_in_studio_too(model: Path) -> None:
+    experiment = pushed(model, roll=5.0, pitch=3.0)
+    studio = Session(lambda _: experiment)
+    with studio.handle:
+        studio.run(1.5)
+        rows = studio.rows
+    trajectory = experiment.run().trajectory
+    assert trajectory is not None
+    assert len(rows) == 300
+    rows[:, [PUSH, PUSH + 7]] = rows[:, [PUSH, PUSH + 7]].round(12)  # put together again from the joint's three torques
+    same(rows, as_rows(trajectory))

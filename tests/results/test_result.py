@@ -1,0 +1,167 @@
+"""Numbers of many worlds taken together, and settings that vary over them."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.plant.plant import load_plant
+from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.result import Result
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
+
+ROWS = 2 + len(REFERENCES)  # of a world: two observers, and what they are judged beside
+BIASES = [0.5, 0.5, 40.0, 40.0]  # two worlds that stand, two that fall
+
+
+@cache
+def experiment() -> Experiment:
+    settings = ["duration_s=1.0", "push=[]", 'companions=["linear"]']
+    return prepare(load_scenario("push_recovery", settings, "homogeneous"))
+
+
+@cache
+def result() -> Result:
+    return experiment().run_many(4, vary={"equilibrium_bias_deg": BIASES})
+
+
+ERROR = "velocity_rms_error_rad_s"
+
+
+def test_worlds_vary_and_those_that_fell_do_not_count() -> None:
+    found = result()
+    assert found.stood.tolist() == [True, True, False, False]
+    assert found.fell.tolist() == [False, False, True, True]
+    values = found.values(ERROR)
+    assert np.isnan(values).tolist() == [False, False, True, True]
+    assert values[0] == found.summaries[0][ERROR]
+    assert found.mean(ERROR) == pytest.approx((values[0] + values[1]) / 2.0)
+    companion = found.values(ERROR, "linear")
+    assert companion[1] == found.summaries[1]["companions"]["linear"][ERROR]
+
+
+def test_the_table_has_a_row_per_observer_and_world() -> None:
+    table = result().table()
+    assert table["observer"].to_pylist() == [name for name in ("homogeneous", "linear", *REFERENCES) for _ in BIASES]
+    assert table["rides_along_in"].to_pylist() == [None] * 4 + ["homogeneous"] * 4 * (1 + len(REFERENCES))
+    assert table["world"].to_pylist() == [0, 1, 2, 3] * ROWS
+    assert table["stood"].to_pylist() == [True, True, False, False] * ROWS
+    assert table["outcome"].to_pylist() == ["done", "done", "fell", "fell"] * ROWS
+    assert table["end_time_s"].to_pylist() == [outcome.time_s for outcome in result().outcomes] * ROWS
+    for world, row in enumerate(table.slice(0, 4).to_pylist()):
+        summary = result().summaries[world]
+        assert {key: row[key] for key in summary if key in row} == {k: v for k, v in summary.items() if k in row}
+        assert set(summary) - set(row) == {"companions", "references"}
+    assert table[ERROR].to_pylist()[4:8] == [s["companions"]["linear"][ERROR] for s in result().summaries]
+    assert set(table["tilt_rms_deg"].to_pylist()[4:]) == {None}  # the loop's alone
+
+
+def test_the_table_of_a_group_and_of_one_world() -> None:
+    _, fell = result().groups(2)
+    assert fell.table()["world"].to_pylist()[:2] == [2, 3]
+    alone = experiment().run(world=5, keep_trajectory=False).table()
+    assert alone["world"].to_pylist() == [5] * ROWS
+    assert alone["seed"].to_pylist() == [0] * ROWS
+
+
+def test_references_have_values_too() -> None:
+    zero = result().values(ERROR, "zero")
+    assert zero[0] == result().summaries[0]["velocity_rms_rad_s"]
+    assert np.isnan(zero).tolist() == [False, False, True, True]
+    assert (result().values("velocity_fit", "mems_gyro")[:2] > 0.9).all()
+
+
+def test_groups_are_the_worlds_in_their_order() -> None:
+    stood, fell = result().groups(2)
+    assert stood.stood.all()
+    assert fell.fell.all()
+    assert fell.mean(ERROR) is None
+    assert stood.trajectory is not None
+    assert result().trajectory is not None
+    np.testing.assert_array_equal(stood.trajectory["x2_rad_s"], result().trajectory["x2_rad_s"][:, :2])  # type: ignore[index]
+    assert stood.seconds == 1.0 > fell.seconds
+
+
+def test_varied_rigs_are_those_of_their_own_scenarios() -> None:
+    """World i at a varied setting is world i of the scenario with that setting, bit for bit."""
+    alone = prepare(load_scenario("push_recovery", ["duration_s=1.0", "push=[]", "plant.equilibrium_bias_deg=1.0"]))
+    varied = experiment().run_many([5, 6], vary={"equilibrium_bias_deg": np.array([0.0, 1.0])})
+    assert varied.trajectory is not None
+    again = alone.run(world=6).trajectory
+    assert again is not None
+    np.testing.assert_array_equal(varied.trajectory["x2_rad_s"][:, 1], again["x2_rad_s"])
+
+
+def test_equal_settings_share_one_rig() -> None:
+    rigs = [each.plant for each in experiment().varied({"equilibrium_bias_deg": BIASES})]
+    assert rigs[0] is rigs[1]
+    assert rigs[2] is rigs[3] is not rigs[0]
+
+
+@pytest.mark.parametrize(
+    ("vary", "complaint"),
+    [
+        ({"equilibrium_bias_dg": [0.0, 1.0]}, "'equilibrium_bias_dg': no field of .plant.; did you mean"),
+        ({"settings": [1, 2]}, "no field of"),
+        ({"sensors.encodr.latency_s": [0.0, 0.005]}, "sensors.encodr: no such field; did you mean 'encoder'"),
+        ({"push.3.torque_n_m": [0.0, 0.005]}, "there is no push.3; it has 0 of them"),
+        ({"sensors.encoder.latency_s": [0.0, 0.005]}, "sensors.encoder.latency_s differs, which worlds of one batch"),
+        ({"observer.k1": [20.0, 21.0]}, "observer.k1 differs"),
+        ({"equilibrium_bias_deg": 1.0}, "must be lists of values by field"),
+        ({"equilibrium_bias_deg": "ab"}, "must be lists of values by field"),
+        ({}, "must be lists of values by field"),
+        ({"equilibrium_bias_deg": [0.0, 1.0], "initial_tilt_deg": [1.0]}, "as many values each"),
+        ({"equilibrium_bias_deg": [0.0]}, "2 worlds and 1 plants"),
+        ({"equilibrium_bias_deg": [0.0, 90.0]}, "plant.equilibrium_bias_deg = 90.*must be"),
+        ({"equilibrium_bias_deg": [[0.0], 1.0]}, "plant.equilibrium_bias_deg = "),
+        ({"timestep_s": [0.0005, 0.001]}, "must have the scenario's joints and timestep_s"),
+        ({"model": ["scissored_pair.xml", "single_gimbal.xml"]}, "must have the scenario's joints and timestep_s"),
+        ({"integrator": ["RK4", "Euler"]}, "one integrator in common"),
+    ],
+)
+def test_what_cannot_vary_is_refused(vary: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(InputError, match=complaint):
+        experiment().run_many(2, vary=vary)
+
+
+def test_plants_and_vary_are_not_given_together() -> None:
+    with pytest.raises(InputError, match="not both"):
+        experiment().run_many(1, plants=[load_plant()], vary={"equilibrium_bias_deg": [0.0]})
+
+
+def test_wrong_keys_and_groups_are_refused() -> None:
+    with pytest.raises(InputError, match="did you mean 'tilt_rms_deg'"):
+        result().values("tilt_rms_dg")
+    with pytest.raises(InputError, match="did not ride along; did you mean 'linear'"):
+        result().values(ERROR, "liner")
+    for count in (0, -1, 3):
+        with pytest.raises(InputError, match="cannot be parted so"):
+            result().groups(count)
+
+
+def test_one_world_is_one_group() -> None:
+    single = experiment().run()
+    (same,) = single.groups(1)
+    assert same is single
+    assert math.isfinite(single.values(ERROR)[0])
+
+
+@pytest.mark.parametrize("stored", [{"observers": ["homogeneous"]}, {"layout": 3}, {"layout": {"observers": []}}, [1]])
+def test_a_trajectory_of_an_earlier_version_is_named_so(stored: Any, tmp_path: Path) -> None:
+    table = pa.table({"time_s": [0.0], "x1_rad": [0.0]}).replace_schema_metadata(
+        {b"cmg_mj": json.dumps(stored).encode()}
+    )
+    pq.write_table(table, tmp_path / "old.parquet")
+    with pytest.raises(InputError, match="of an earlier version of cmg-mj; run its scenario"):
+        Trajectory.load(tmp_path / "old.parquet")

@@ -1,0 +1,116 @@
+"""What differs from the bundled scenario: in the folder's name, the title line and the summary."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cmg_mj import load_scenario, parse_scenario, prepare
+from cmg_mj.scenario.differences import LONGEST_NAME, differences, in_a_name, in_words, safe_name
+from tests.command import cmg_mj
+from tests.run_folders import write
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+SHORT = ["--set", "duration_s=0.1", "--set", "push=[]"]
+
+
+def differing(*settings: str, name: str = "push_recovery") -> dict[str, Any]:
+    return prepare(load_scenario(name, settings)).differences
+
+
+def test_nothing_differs() -> None:
+    assert differing() == {}
+    assert prepare(load_scenario("push_recovery", observer="ltv").model_copy(update={"seed": 3})).differences == {}
+    assert (
+        differing("title=other", "seed=4", "plant.equilibrium_bias_deg=0.5", "controller.gains=[35, 4, -1, 0.3]") == {}
+    )
+    assert prepare(parse_scenario({"duration_s": 1.0})).differences == {}
+    assert (in_words({}), in_a_name({})) == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("setting", "field", "value", "name"),
+    [
+        ("plant.equilibrium_bias_deg=1", "plant.equilibrium_bias_deg", 1.0, "equilibrium_bias_deg=1"),
+        ("sensors.encoder.rate_hz=100", "sensors.encoder.rate_hz", 100.0, "rate_hz=100"),
+        ("observer.k1=30", "observer.k1", 30, "k1=30"),
+        ("push.0.torque_n_m=-1.5", "push.0.torque_n_m", -1.5, "torque_n_m=-1.5"),
+        ("push=[]", "push", [], "push=none"),
+        ("companions=[ltv]", "companions", ["ltv"], "companions=ltv"),
+        ("plant.lock_thrust_bearing=true", "plant.lock_thrust_bearing", True, "lock_thrust_bearing=true"),
+        ("controller.gains=[30, 4, -1, 0.3]", "controller.gains", [30, 4, -1, 0.3], "gains=30_4_-1_0.3"),
+    ],
+)
+def test_one_field(setting: str, field: str, value: object, name: str) -> None:
+    found = differing(setting.replace("[ltv]", '["ltv"]'))
+    assert found == {field: value}
+    assert in_a_name(found) == f"-{name}"
+
+
+def test_names_that_need_their_section() -> None:
+    found = {"sensors.encoder.rate_hz": 1.0, "sensors.fog.rate_hz": 2.0, "push.0.start_s": 1.0, "push.1.start_s": 2.0}
+    assert in_a_name(found) == "-encoder.rate_hz=1-fog.rate_hz=2-push.0.start_s=1-and-1-more"
+    assert in_words(found) == ", encoder.rate_hz=1, fog.rate_hz=2, push.0.start_s=1, and 1 more"
+
+
+@pytest.mark.parametrize("value", ["ß" * 300, "\udcff/..\\ \n*?", "a" * 300, [0.1234567891] * 40, {"a": {}}])
+def test_any_value_makes_a_file_name(value: object) -> None:
+    name = in_a_name({"plant.x": value, "plant.y": value})
+    assert name.isascii()
+    assert len(name) <= LONGEST_NAME + len("-and-2-more")
+    assert not set(name) & set('/\\:*?"<>| \n')
+    assert len(os.fsencode(safe_name(str(value)))) <= 4 * LONGEST_NAME
+
+
+def test_a_field_that_is_not_there() -> None:
+    observer = {"observer": {"kind": "ltv"}}
+    assert differences({"a": {"x": 1, "y": 2}, **observer}, {"a": {"x": 1}, **observer}) == {"a.y": None}
+    assert in_a_name({"a.y": None}) == "-y=none"
+
+
+def test_a_scenario_of_a_users_own_differs_from_none() -> None:
+    file = write("duration_s = 0.3\n[plant]\nequilibrium_bias_deg = 2.0", "my.toml")
+    assert differing("duration_s=0.5", name=file) == {}
+
+
+def test_a_users_version_of_a_bundled_one() -> None:
+    assert cmg_mj("run", "push_recovery", *SHORT, "--out", "it").status == 0
+    write(
+        Path("it/scenario.toml").read_text().replace("equilibrium_bias_deg = 0.5", "equilibrium_bias_deg = 0.6"),
+        "push_recovery.toml",
+    )
+    expected = {"duration_s": 0.1, "plant.equilibrium_bias_deg": 0.6, "push": []}
+    assert differing(name="push_recovery.toml") == expected
+
+
+@pytest.mark.parametrize("command", [["run"], ["compare", "--observers", "linear,homogeneous", "--worlds", 1]])
+def test_folder_title_and_summary_tell(command: list[Any]) -> None:
+    settings = [*SHORT, "--set", "plant.equilibrium_bias_deg=1.0"]
+    said = cmg_mj(command[0], "push_recovery", *command[1:], *settings)
+    assert said.status == 0, said
+    assert said.out.splitlines()[0].endswith(", seed 0, duration_s=0.1, equilibrium_bias_deg=1, push=none")
+    what = {"run": "homogeneous"}.get(command[0], command[0])
+    (folder,) = os.listdir("runs")
+    assert folder == f"push_recovery-{what}-0-duration_s=0.1-equilibrium_bias_deg=1-push=none"
+    summary = json.loads(Path(f"runs/{folder}/summary.json").read_text())
+    for entry in summary if isinstance(summary, list) else [summary]:
+        assert entry["differs"] == {"duration_s": 0.1, "plant.equilibrium_bias_deg": 1.0, "push": []}
+    again = cmg_mj("run", f"runs/{folder}/scenario.toml")
+    assert again.out.splitlines()[0].endswith("equilibrium_bias_deg=1, push=none")
+
+
+def test_an_observer_that_the_bundled_scenario_does_not_suit() -> None:
+    """No trimming without an estimate of the bias."""
+    found = prepare(load_scenario("bias_estimation", ["controller.trim_s=0"], "linear")).differences
+    assert found == {"controller.trim_s": 0.0}
+
+
+def test_a_long_name_of_a_users_file() -> None:
+    file = write("duration_s = 0.1", f"{'long' * 60}.toml")
+    assert cmg_mj("run", file).status == 0
+    assert [len(name) < 100 for name in os.listdir("runs")] == [True]

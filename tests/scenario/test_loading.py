@@ -1,0 +1,250 @@
+"""Scenario files: what they mean, what replaces what, and that the resolved one says what the one it came from says."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+
+from cmg_mj import Estimate, InputError, Measurement, load_scenario, parse_scenario, prepare
+from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS, StateFeedback
+from cmg_mj.inputs.bundled import bundled, folder
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.scenario.loading import Scenario
+from tests.run_folders import write
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+def copy_models(place: str) -> None:
+    Path(place).mkdir(parents=True, exist_ok=True)
+    for name in ("scissored_pair.xml", "cube.xml"):
+        (Path(place) / name).write_text((folder("models") / name).read_text())
+
+
+# --- reading -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", bundled("scenarios"))
+def test_bundled_scenarios_are_right(name: str) -> None:
+    experiment = prepare(load_scenario(name))
+    assert experiment.scenario.title
+    assert load_scenario(str(folder("scenarios") / f"{name}.toml")) is not None
+
+
+def test_an_empty_file_is_the_defaults() -> None:
+    scenario = load_scenario(write(""))
+    assert scenario.model_dump(exclude={"plant"}) == Scenario().model_dump(exclude={"plant"})
+    assert dataclasses.replace(scenario.plant, model="") == dataclasses.replace(Scenario().plant, model="")
+
+
+def test_every_field_arrives() -> None:
+    """Values that are not the defaults, in every section, by way of a file."""
+    fields = {
+        "title": "Mine",
+        "duration_s": 2,  # a whole number is a number
+        "seed": 10**20,
+        "companions": ["linear", "ltv"],
+        "plant": {"timestep_s": 0.0005, "integrator": "implicit", "gimbal_friction_n_m": 0.25},
+        "controller": {"rate_hz": 500.0, "gains": [1, 2.5, -3, 4], "feedback": "truth", "angles": "estimated"},
+        "observer": {"kind": "homogeneous", "k1": 30},
+        "sensors": {
+            "accelerometer": {"bias_mg": [1, -2.5]},
+            "encoder": {"latency_s": 0.002},
+            "fog": {"rate_hz": 1000.0},
+        },
+        "push": [{"start_s": 0.5, "torque_n_m": -1}, {"start_s": 1, "duration_s": 0.25}],
+        "metrics": {"settle_band_deg": 0.5},
+    }
+    scenario = load_scenario(write(tomli_w.dumps(fields)))
+    assert (scenario.title, scenario.duration_s, scenario.seed) == ("Mine", 2.0, 10**20)
+    assert scenario.companion_names() == ["linear", "ltv"]
+    assert (scenario.plant.timestep_s, scenario.plant.integrator) == (0.0005, "implicit")
+    assert (scenario.plant.gimbal_friction_n_m, scenario.plant.tilt_friction_n_m) == (0.25, None)
+    assert scenario.controller.gains == (1.0, 2.5, -3.0, 4.0)
+    assert (scenario.controller.feedback, scenario.controller.angles) == ("truth", "estimated")
+    assert scenario.observer.parameters == {"k1": 30}
+    assert scenario.sensors.accelerometer.bias_mg == (1.0, -2.5)
+    assert (scenario.sensors.encoder.latency_s, scenario.sensors.fog.rate_hz) == (0.002, 1000.0)
+    assert [push.torque_n_m for push in scenario.push] == [-1.0, 1.0]
+    assert scenario.push[1].end_s == 1.25
+    assert scenario.metrics.settle_band_deg == 0.5
+    assert prepare(scenario).law == StateFeedback(1.0 / scenario.controller.rate_hz, (1.0, 2.5, -3.0, 4.0))
+
+
+def test_companions_leave_out_the_observer_itself_and_doubles() -> None:
+    every = parse_scenario({"companions": "all", "observer": {"kind": "ltv"}})
+    assert every.companion_names() == [name for name in OBSERVERS if name != "ltv"]
+    assert parse_scenario({"companions": ["ltv", "linear", "ltv", "homogeneous"]}).companion_names() == [
+        "ltv",
+        "linear",
+    ]
+
+
+# --- replacing -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("plant.equilibrium_bias_deg=1.5", lambda s: s.plant.equilibrium_bias_deg == 1.5),
+        ("plant.lock_thrust_bearing=true", lambda s: s.plant.lock_thrust_bearing is True),
+        ("plant.integrator=Euler", lambda s: s.plant.integrator == "Euler"),
+        ("plant.integrator='Euler'", lambda s: s.plant.integrator == "Euler"),
+        ("controller.gains=[1, 2, 3, 4]", lambda s: s.controller.gains == (1.0, 2.0, 3.0, 4.0)),
+        ("controller.lqr.state_cost=[1, 1, 1, 1]", lambda s: s.controller.lqr is not None),
+        ("sensors.fog.rate_hz=1000", lambda s: s.sensors.fog.rate_hz == 1000.0),
+        ("push.0.torque_n_m=-2", lambda s: s.push[0].torque_n_m == -2.0),
+        ("push=[]", lambda s: s.push == []),
+        ("title=a = b", lambda s: s.title == "a = b"),
+        (" title = spaced ", lambda s: s.title == "spaced"),
+        ("companions=all", lambda s: len(s.companion_names()) == len(OBSERVERS) - 1),
+        ("observer.kind=ltv", lambda s: s.observer.kind == "ltv"),
+        ("seed=7", lambda s: s.seed == 7),
+    ],
+)
+def test_a_setting_replaces_a_field(setting: str, value: Any) -> None:
+    assert not value(load_scenario("push_recovery"))
+    assert value(load_scenario("push_recovery", [setting]))
+
+
+def test_the_last_setting_counts() -> None:
+    assert load_scenario("push_recovery", ["seed=1", "seed=2"]).seed == 2
+
+
+def test_another_observer_brings_its_own_parameters() -> None:
+    """Those of the file's observer do not pass to it; those set on the command line do."""
+    file = write("[observer]\nkind = 'homogeneous'\nk1 = 30.0")
+    assert load_scenario(file, observer="homogeneous").observer.parameters == {"k1": 30.0}
+    assert load_scenario(file, observer="ltv").observer.parameters == {}
+    assert load_scenario(file, ["observer.tau=0.05"], observer="linear").observer.parameters == {"tau": 0.05}
+    assert load_scenario(write("[observer]\nk1 = 30.0"), observer="homogeneous").observer.parameters == {"k1": 30.0}
+
+
+def test_comparing_keeps_the_parameters_of_the_scenarios_own() -> None:
+    scenario = load_scenario(write("[observer]\nk1 = 30.0"))
+    assert scenario.with_observer("homogeneous").observer.parameters == {"k1": 30.0}
+    assert scenario.with_observer("ltv").observer.parameters == {}
+
+
+def test_what_does_not_fit_names_the_file_whenever_it_is_found() -> None:
+    scenario = load_scenario(write("plant.timestep_s = 0.001\n[controller]\nrate_hz = 300"), ["seed=1"]).with_observer(
+        "ltv"
+    )
+    with pytest.raises(InputError, match=r"^my\.toml with --set seed=1: controller\.rate_hz = 300 Hz: not a whole"):
+        prepare(scenario)
+
+
+# --- the model's file ----------------------------------------------------------------------------------------
+
+
+def test_a_model_is_found_beside_its_scenario() -> None:
+    """Not in the folder one happens to stand in, where another may have the same name."""
+    copy_models("here")
+    copy_models(".")
+    Path("scissored_pair.xml").write_text("<mujoco/>")
+    assert prepare(load_scenario(write("", "here/my.toml"))).plant.path == Path("here/scissored_pair.xml")
+
+
+def test_a_bundled_model_is_meant_unless_there_is_one_beside_the_scenario() -> None:
+    write("<mujoco/>", "scissored_pair.xml")
+    bundled_one = folder("models") / "scissored_pair.xml"
+    assert prepare(load_scenario(write("", "here/my.toml"))).plant.path == bundled_one
+    assert prepare(load_scenario("push_recovery")).plant.path == bundled_one
+
+
+def test_a_model_on_the_command_line_is_relative_to_where_one_stands() -> None:
+    copy_models("rigs")
+    scenario = load_scenario(write("", "here/my.toml"), ["plant.model=rigs/scissored_pair.xml"])
+    assert prepare(scenario).plant.path == Path("rigs/scissored_pair.xml")
+
+
+def test_a_model_that_is_nowhere() -> None:
+    copy_models("rigs")
+    with pytest.raises(InputError, match=r"^here/my\.toml: plant\.model = 'rig\.xml': no such file"):
+        load_scenario(write("[plant]\nmodel = 'rig.xml'", "here/my.toml"))
+
+
+# --- resolving -----------------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class Odd:
+    """A user's observer with defaults of all sorts."""
+
+    dt: float
+    model: object
+    gain: float = 0.5
+    nothing: float | None = None
+    matrix: np.ndarray = dataclasses.field(default_factory=lambda: np.eye(2))
+    number: np.float64 = dataclasses.field(default_factory=lambda: np.float64(0.1))
+    pair: tuple[str, ...] = ("a", "b")
+    function: Any = max
+    made: int = dataclasses.field(init=False, default=3)
+
+    def init(self, y: Measurement) -> Any:
+        return y.y1
+
+    def step(self, state: Any, y: Measurement, u: Any) -> tuple[Any, Estimate]:
+        return y.y1, Estimate(y.y1, self.gain * (y.y1 - state) / self.dt, y.y2)
+
+
+RESOLVED = {
+    "defaults": {},
+    "lqr": {"controller": {"lqr": {"state_cost": [30, 1, 0.5, 0.1], "input_cost": 0.3}}},
+    "every observer": {"companions": "all", "observer": {"kind": "luenberger"}},
+    "rational": {"plant": {"timestep_s": 1 / 3000}, "controller": {"rate_hz": 1000 / 3}, "duration_s": 0.3},
+    "a user's observer": {"observer": {"kind": f"{__name__}:Odd", "gain": 0.4, "nothing": 2.0}},
+    "pushes": {"push": [{"start_s": 0.1}, {"start_s": 0.2, "torque_n_m": -0.1}], "seed": 2**70},
+}
+
+
+@pytest.mark.parametrize("fields", RESOLVED.values(), ids=RESOLVED)
+def test_resolving_twice_changes_nothing(fields: dict[str, Any]) -> None:
+    sensors = {kind: {"rate_hz": 1000 / 3} for kind in ("accelerometer", "encoder", "fog")}
+    if "plant" in fields:
+        fields = {**fields, "sensors": sensors}
+    once = prepare(parse_scenario(fields)).resolved()
+    again = prepare(load_scenario(write(tomli_w.dumps(once)))).resolved()
+    assert again == once
+    assert tomllib.loads(tomli_w.dumps(once)) == once
+
+
+def test_the_resolved_scenario_has_everything_written_out() -> None:
+    once = prepare(load_scenario("push_recovery")).resolved()
+    assert once["plant"]["model"] == "scissored_pair.xml"  # a bundled one by name, wherever it is installed
+    assert once["controller"]["gains"] == list(TABLE_2_GAINS)
+    friction = {"friction_n_m": 0.0, "damping_n_m_s": 0.0, "friction_width_rad_s": 0.05}
+    assert once["observer"] == {"kind": "homogeneous", "k1": 20.0, "k2": 150.0, "alpha": 0.85, **friction}
+    assert once["sensors"]["fog"]["range_deg_s"] == 490.0
+    assert set(once["versions"]) == {"cmg_mj", "mujoco", "numpy", "scipy", "python"}
+    assert once["versions"]["python"] == ".".join(map(str, sys.version_info[:3]))
+
+
+def test_a_users_parameters_are_written_as_far_as_toml_can_hold_them() -> None:
+    kind = f"{__name__}:Odd"
+    assert prepare(parse_scenario({"observer": {"kind": kind}})).resolved()["observer"] == {
+        "kind": kind,
+        "gain": 0.5,
+        "matrix": [[1.0, 0.0], [0.0, 1.0]],
+        "number": 0.1,
+        "pair": ["a", "b"],
+    }
+
+
+def test_a_users_model_is_written_with_its_whole_path() -> None:
+    copy_models("here")
+    once = prepare(load_scenario(write("", "here/my.toml"))).resolved()
+    assert once["plant"]["model"] == str(Path("here/scissored_pair.xml").resolve())
+
+
+def test_preparing_again_gives_a_fresh_controller() -> None:
+    experiment = prepare(parse_scenario({"duration_s": 0.1}))
+    first, second = experiment.run(), experiment.run()
+    assert first.summaries == second.summaries

@@ -1,0 +1,107 @@
+"""The closed loop that the gains make on the reduced model, and what is said of it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj import load_plant, load_scenario, prepare
+from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
+from cmg_mj.inputs.bundled import bundled, folder
+from cmg_mj.scenario.stability_check import Loop, closed_loop
+from tests.command import cmg_mj
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+@pytest.fixture
+def half() -> str:
+    """The bundled rig with flywheels of half the inertia."""
+    for name in ("scissored_pair.xml", "cube.xml"):
+        text = (folder("models") / name).read_text()
+        text = text.replace('diaginertia="5.6e-4 11e-4 5.6e-4"', 'diaginertia="2.8e-4 5.5e-4 2.8e-4"')
+        Path(name.replace("scissored_pair", "half")).write_text(text)
+    return "plant.model='half.xml'"
+
+
+def loop(*overrides: str, name: str = "push_recovery") -> Loop:
+    experiment = prepare(load_scenario(name, overrides))
+    assert isinstance(experiment.law, StateFeedback)
+    return closed_loop(experiment.scenario, experiment.law, experiment.plant.reduced)
+
+
+@pytest.mark.parametrize("name", bundled("scenarios"))
+def test_the_bundled_scenarios_give_no_hint(name: str) -> None:
+    assert loop(name=name).hint is None
+    assert "hint" not in cmg_mj("check", name).out
+
+
+def test_without_sampling_and_delay_the_poles_are_those_of_the_law() -> None:
+    sampled = loop("controller.rate_hz=2000", "sensors.accelerometer.rate_hz=2000", "sensors.encoder.rate_hz=2000")
+    model, gains = load_plant().reduced, (35.0, 4.0, -1.0, 0.3)
+    np.testing.assert_allclose(
+        np.sort(np.real(sampled.poles))[1:], np.sort(np.real(closed_loop_poles(model, gains))), rtol=5e-3
+    )
+    assert sampled.distance == pytest.approx(1.0, abs=0.01)  # Table 2's gains are an LQR's, as good as
+
+
+def test_an_lqr_keeps_its_distance() -> None:
+    assert loop("controller.lqr.state_cost=[1, 1, 1, 1]", "controller.rate_hz=1000").distance > 0.9
+
+
+@pytest.mark.parametrize("latency", [0.04, 0.06])
+def test_stable_is_what_the_loop_step_by_step_is(latency: float) -> None:
+    """The linearisation stepped finely, with the command held and the signals late."""
+    said = loop(f"sensors.accelerometer.latency_s={latency}")
+    model, K, h = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3]), 1e-4
+    steps, period, late = int(6.0 / h), round(0.005 / h), round(latency / h)
+    x = np.zeros((steps + 1, 4))
+    x[0, 0], u = 0.01, 0.0
+    for k in range(steps):
+        if k % period == 0:
+            u = -K @ x[max(k - late, 0)]
+        x[k + 1] = x[k] + h * (model.A_e @ x[k] + model.B_e[:, 0] * u)
+    fades = abs(x[-1, 0]) < 0.01
+    assert (said.words == "stable") == fades == (latency < 0.05)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["controller.gains=[-35, 4, -1, 0.3]"], "unstable .*; .controller.lqr. solves for gains"),
+        (["controller.rate_hz=10"], "unstable on .*, sampled every 0.1 s .*; a higher rate or less latency is needed"),
+        (["sensors.encoder.rate_hz=10"], "unstable on .*, sampled every 0.1 s"),
+        (["sensors.accelerometer.latency_s=0.045"], "poorly damped on .*, 0.045 s late .damping ratio 0.1"),
+        (["sensors.encoder.latency_s=0.02"], "little margin on .*, 0.02 s late"),
+        (["controller.gains=[17.5, 2.0, -0.5, 0.15]"], "little margin on .* within 0.60 of -1, good is 0.7 or more"),
+        (["sensors.encoder.latency_s=5"], "unstable"),
+    ],
+)
+def test_hints(settings: list[str], words: str) -> None:
+    hint = loop(*settings).hint
+    assert hint is not None
+    assert re.search(words, hint), hint
+
+
+def test_a_latency_of_a_sensor_that_is_not_used_does_not_count() -> None:
+    assert loop("sensors.fog.latency_s=0.1").hint is None
+    assert "unstable" in str(loop("sensors.fog.latency_s=0.1", "controller.feedback='fog'").hint)
+
+
+def test_half_the_flywheel_is_hinted_at_and_solved_for(half: str) -> None:
+    """With Table 2's gains it falls soon after the push; with gains made for it, it stands."""
+    said = cmg_mj("run", "push_recovery", "--set", half, "--set", "duration_s=4", "--out", "it", "--json")
+    assert "cmg-mj: hint: controller: the closed loop has little margin" in said.err
+    assert '"outcome": "fell"' in said.out
+    solved = ["--set", "controller.lqr.state_cost=[1, 1, 1, 1]", "--set", "duration_s=4"]
+    said = cmg_mj("run", "push_recovery", "--set", half, *solved, "--out", "it", "--json")
+    assert (said.err, '"outcome": "done"' in said.out) == ("", True)
+    assert "hint" in cmg_mj("check", "half.xml").out
+
+
+def test_compare_says_it_once(half: str) -> None:
+    options = ["--observers", "linear,ltv", "--worlds", 2, "--set", half, "--set", "duration_s=2.2", "--json"]
+    assert cmg_mj("compare", "push_recovery", *options).err.count("hint") == 1

@@ -1,0 +1,318 @@
+"""What the sensors make of an ideal reading, by closed forms and by statistics with confidence bounds.
+
+Seeds are fixed, so that nothing here fails by chance; the bounds are those a correct sensor meets 999 times of 1000.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from cmg_mj.errors import InputError
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, Ideal, SampledSensor, normals
+from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.simulation.experiment import prepare
+
+G = 9.80665
+STILL = Ideal((0.0, G, 0.0, G), [0.0, 0.0], 0.0, 0.0)
+QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
+N = 20_000
+
+
+def readings(sensor: Any, n: int, seed: int = 0, world: int = 0, ideal: Ideal = STILL) -> np.ndarray:
+    """n samples of one world, (n, channels)."""
+    measure, noise = sensor.meter(), normals(seed, world, 0, sensor.channels)
+    return np.array([np.atleast_1d(measure(ideal, next(noise))) for _ in range(n)])
+
+
+def assert_sigma(values: np.ndarray, sigma: float) -> None:
+    """The sample variance of normal numbers follows chi^2."""
+    n = len(values)
+    low, high = stats.chi2.ppf([0.0005, 0.9995], n - 1) / (n - 1)
+    assert low < np.var(values, ddof=1) / sigma**2 < high
+
+
+def assert_mean(values: np.ndarray, mean: float, sigma: float) -> None:
+    assert abs(np.mean(values) - mean) < stats.norm.ppf(0.9995) * sigma / math.sqrt(len(values))
+
+
+# --- accelerometers ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("density_ug_rthz", "rate_hz", "sigma"),
+    [
+        (400.0, 200.0, 400e-6 * 9.80665 * 10.0),  # 4 mg
+        (400.0, 1000.0, 400e-6 * 9.80665 * math.sqrt(500.0)),
+        (100.0, 50.0, 100e-6 * 9.80665 * 5.0),
+    ],
+)
+def test_accelerometer_noise_is_density_times_root_of_half_the_rate(
+    density_ug_rthz: float, rate_hz: float, sigma: float
+) -> None:
+    sensor = Accelerometer(rate_hz=rate_hz, noise_density_ug_rthz=density_ug_rthz, counts_per_g=0.0)
+    noise = readings(sensor, N) - [0.0, G, 0.0, G]
+    assert noise.shape == (N, 4)
+    for channel in noise.T:
+        assert_sigma(channel, sigma)
+        assert_mean(channel, 0.0, sigma)
+        assert stats.kstest(channel / sigma, "norm").pvalue > 1e-3
+
+
+def test_accelerometer_noise_is_white() -> None:
+    """One-sided density of the mean of two halves of the band: 400 ug/rtHz (MPU-6050) in either."""
+    noise = readings(Accelerometer(counts_per_g=0.0), N)[:, 0]
+    spectrum = 2.0 * np.abs(np.fft.rfft(noise)[1:-1]) ** 2 / (200.0 * N)  # (m/s^2)^2/Hz
+    for half in np.array_split(spectrum, 2):
+        low, high = stats.chi2.ppf([0.0005, 0.9995], 2 * len(half)) / (2 * len(half))
+        assert low < half.mean() / (400e-6 * 9.80665) ** 2 < high
+
+
+def test_accelerometer_counts() -> None:
+    """16384 counts a g (MPU-6050): readings are whole counts, and rounding adds step^2/12 to the variance."""
+    noise = readings(Accelerometer(), N)[:, 0]
+    counts = noise * 16384.0 / G
+    np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
+    coarse = readings(Accelerometer(counts_per_g=100.0, noise_density_ug_rthz=2000.0), N)[:, 0]
+    sigma, step = 2000e-6 * G * 10.0, G / 100.0
+    assert_sigma(coarse, math.sqrt(sigma**2 + step**2 / 12.0))
+
+
+@pytest.mark.parametrize(("force", "shown"), [(5.0, 2.0), (-5.0, -2.0), (1.5, 1.5)])
+def test_accelerometer_saturates_at_its_range(force: float, shown: float) -> None:
+    ideal = Ideal([force * G] * 4, [0.0, 0.0], 0.0, 0.0)
+    for sensor in (Accelerometer(noise_density_ug_rthz=0.0), Accelerometer(range_g=2.0, **QUIET)):
+        np.testing.assert_allclose(readings(sensor, 1, ideal=ideal)[0], shown * G, rtol=1e-12)
+    noisy = readings(Accelerometer(), 500, ideal=ideal)
+    assert np.abs(noisy).max() <= 2.0 * G * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("bias_mg", [(8.0, 0.0), (0.0, 8.0), (-15.0, 20.0)])
+def test_accelerometer_bias_shifts_the_tilt_as_e_does(bias_mg: tuple[float, float]) -> None:
+    """Weights of sites at 1/4 and 3/4: y1 = -atan((1.5 b_inner - 0.5 b_outer)/g) where the tilt is 0."""
+    shown = readings(Accelerometer(bias_mg=bias_mg, **QUIET), 1)[0]
+    tilt = RadialTilt(0.06717514421272202, 0.20152543263816603)(*shown.tolist())
+    assert tilt == pytest.approx(-math.atan(1.5e-3 * bias_mg[0] - 0.5e-3 * bias_mg[1]), rel=1e-12)
+
+
+def test_accelerometer_bias_and_equilibrium_bias_move_the_loop_alike() -> None:
+    """e is what a tilt shift of -e is: the rig ends upright either way, and the integrator at +k_e1/k_e4 e."""
+    e = math.radians(0.5)
+    bias_mg = 1e3 * math.tan(e) / 1.5  # on the inner accelerometer
+    quiet = ["sensors.accelerometer.noise_density_ug_rthz=0", "controller.feedback=truth", "push=[]", "duration_s=25"]
+    ends = []
+    for setting in ("plant.equilibrium_bias_deg=0.5", f"sensors.accelerometer.bias_mg=[{bias_mg}, 0.0]"):
+        other = [] if "equilibrium" in setting else ["plant.equilibrium_bias_deg=0.0"]
+        trajectory = prepare(load_scenario("push_recovery", [setting, *other, *quiet])).run().trajectory
+        assert trajectory is not None
+        ends.append([np.mean(trajectory[name][-400:]) for name in ("x1_rad", "y1_rad", "x_e_rad_times_s")])
+    for x1, y1, x_e in ends:
+        assert x1 == pytest.approx(0.0, abs=0.02 * e)
+        assert y1 == pytest.approx(-e, rel=0.02)
+        assert x_e == pytest.approx(35.0 / 0.3 * e, rel=0.02)
+    assert ends[0] == pytest.approx(ends[1], rel=0.02, abs=0.01 * e)
+
+
+# --- encoders ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("encoder", "counts"), [(Encoder(), 2**12), (Encoder(counts_per_revolution=360.0), 360)])
+def test_encoder_shows_the_nearest_count(encoder: Encoder, counts: int) -> None:
+    """12 bits (AS5045), and another resolution."""
+    step = 2.0 * math.pi / counts
+    measure = encoder.meter()
+    for angle in np.linspace(-2.0, 2.0, 1001).tolist():
+        shown = measure(Ideal((), [angle, 0.5 * angle], 0.0, 0.0), ())
+        for ideal, reading in zip((angle, 0.5 * angle), shown, strict=True):
+            assert abs(reading - ideal) <= step / 2.0 * (1.0 + 1e-9)
+            assert reading / step == pytest.approx(round(reading / step), abs=1e-9)
+
+
+def test_encoder_without_resolution_is_ideal() -> None:
+    assert Encoder(counts_per_revolution=0.0).meter()(Ideal((), [0.1, 0.2], 0.0, 0.0), ()) == [0.1, 0.2]
+
+
+# --- fibre-optic gyro --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("walk_deg_rth", "rate_hz"), [(0.02, 200.0), (0.1, 1000.0)])
+def test_fog_angle_walks_randomly(walk_deg_rth: float, rate_hz: float) -> None:
+    """The integral of a still gyro has the variance N^2 t: 400 gyros of 0.5 s each."""
+    gyros, n = 400, int(0.5 * rate_hz)
+    walk = math.radians(walk_deg_rth) / math.sqrt(3600.0)  # rad/sqrt(s)
+    sensor = Fog(rate_hz=rate_hz, angle_random_walk_deg_rth=walk_deg_rth)
+    angles = np.array([readings(sensor, n, seed=1, world=w)[:, 0].sum() / rate_hz for w in range(gyros)])
+    assert_sigma(angles, walk * math.sqrt(0.5))
+    assert_mean(angles, 0.0, walk * math.sqrt(0.5))
+
+
+def test_fog_noise_of_one_sample() -> None:
+    """0.02 deg/rt(h) (DSP-1750) at 200 Hz: 8.23e-5 rad/s."""
+    rate = readings(Fog(), N)[:, 0]
+    assert_sigma(rate, 0.02 / 60.0 * math.pi / 180.0 * math.sqrt(200.0))
+
+
+def test_fog_bias_and_range() -> None:
+    quiet = {"angle_random_walk_deg_rth": 0.0}
+    assert readings(Fog(bias_deg_h=30.0, **quiet), 1)[0, 0] == pytest.approx(math.radians(30.0 / 3600.0), rel=1e-12)
+    for rate in (20.0, -20.0):
+        fast = Ideal((), [], rate, rate)
+        shown = readings(Fog(**quiet), 1, ideal=fast)[0, 0]
+        assert shown == pytest.approx(math.copysign(math.radians(490.0), rate), rel=1e-12)
+        assert readings(Fog(range_deg_s=2000.0, **quiet), 1, ideal=fast)[0, 0] == pytest.approx(rate)
+
+
+@pytest.mark.parametrize(
+    ("given", "bandwidth_hz", "rate_hz"),
+    [
+        ({"rate_hz": 1000.0}, 440.0, 1000.0),  # DSP-1750
+        ({"bandwidth_hz": 10.0}, 10.0, 200.0),
+        ({"bandwidth_hz": 10.0, "rate_hz": 1000.0}, 10.0, 1000.0),
+    ],
+)
+def test_fog_step_response(given: dict[str, Any], bandwidth_hz: float, rate_hz: float) -> None:
+    """A first-order low-pass: 1 - exp(-2 pi f t), the step coming right after the sample at t = 0."""
+    measure = Fog(angle_random_walk_deg_rth=0.0, **given).meter()
+    shown = [measure(Ideal((), [], 0.0 if k == 0 else 1.0, 0.0), (0.0,)) for k in range(30)]
+    t = np.arange(30) / rate_hz
+    np.testing.assert_allclose(shown, 1.0 - np.exp(-2.0 * math.pi * bandwidth_hz * t), rtol=1e-12, atol=1e-14)
+
+
+def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> None:
+    quick = Fog(bandwidth_hz=0.0, angle_random_walk_deg_rth=0.0).meter()
+    assert [quick(Ideal((), [], rate, rate), (0.0,)) for rate in (0.3, -0.2)] == [0.3, -0.2]
+    assert Fog(angle_random_walk_deg_rth=0.0).meter()(Ideal((), [], 0.3, 0.3), (0.0,)) == 0.3
+
+
+# --- rates and latency -------------------------------------------------------------------------------------
+
+
+def shown_by(sensor: Fog, timestep: float, steps: int, read_every: int) -> list[float]:
+    """Readings of a gyro, at control ticks, of a rate that is the number of the physics step."""
+    sampled = SampledSensor(sensor, timestep, normals(0, 0, 2, 1), "sensors.fog")
+    shown = []
+    for step in range(steps):
+        if step % sampled.period == 0:
+            sampled.sample(step, Ideal((), [], float(step), 0.0))
+        if step % read_every == 0:
+            shown.append(sampled.read(step))
+    return shown
+
+
+COUNTING = {"angle_random_walk_deg_rth": 0.0, "bandwidth_hz": 0.0, "range_deg_s": 1e6}
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "latency_s", "expected"),
+    [
+        pytest.param(200.0, 0.0, [0, 5, 10, 15, 20, 25], id="control rate"),
+        pytest.param(100.0, 0.0, [0, 0, 10, 10, 20, 20], id="slower is held"),
+        pytest.param(1000.0, 0.0, [0, 5, 10, 15, 20, 25], id="faster shows the newest"),
+        pytest.param(125.0, 0.0, [0, 0, 8, 8, 16, 24], id="no multiple of the other"),
+        pytest.param(200.0, 0.005, [0, 0, 5, 10, 15, 20], id="one period late"),
+        pytest.param(200.0, 0.003, [0, 0, 5, 10, 15, 20], id="late by less than a period"),
+        pytest.param(1000.0, 0.003, [0, 2, 7, 12, 17, 22], id="fast and late"),
+        pytest.param(200.0, 0.012, [0, 0, 0, 0, 5, 10], id="late by more than two periods"),
+        pytest.param(50.0, 0.01, [0, 0, 0, 0, 0, 0], id="slow and late"),
+    ],
+)
+def test_newest_delivered_sample_at_each_tick(rate_hz: float, latency_s: float, expected: list[int]) -> None:
+    """At 200 Hz control and 1 ms physics. Before the first delivery the rig stood still."""
+    sensor = Fog(rate_hz=rate_hz, latency_s=latency_s, **COUNTING)
+    assert shown_by(sensor, 0.001, 26, 5) == expected
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("rate_hz", 300.0, r"sensors\.{kind}\.rate_hz = 300 Hz: not a whole number of physics steps of 0\.001 s"),
+        ("rate_hz", 5000.0, r"sensors\.{kind}\.rate_hz = 5000 Hz: not a whole number"),
+        ("latency_s", -0.001, r"sensors\.{kind}\.latency_s = -0\.001: .*greater than or equal to 0"),
+        ("rate_hz", 0.0, r"sensors\.{kind}\.rate_hz = 0\.0: .*greater than or equal to 0\.1"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["accelerometer", "encoder", "fog"])
+def test_what_does_not_fit_the_physics_step_is_refused(kind: str, field: str, value: float, message: str) -> None:
+    with pytest.raises(InputError, match=message.replace("{kind}", kind)):
+        prepare(load_scenario("push_recovery", ["plant.timestep_s=0.001", f"sensors.{kind}.{field}={value}"]))
+
+
+def test_the_loop_sees_late_and_slow_sensors() -> None:
+    """Through the whole runner: a gyro 10 ms late, an encoder at 50 Hz, against the true signals of the record."""
+    settings = ["duration_s=0.5", "push=[]", "plant.initial_tilt_deg=3.0", "controller.feedback=truth"]
+    settings += ["sensors.fog.latency_s=0.01", "sensors.fog.angle_random_walk_deg_rth=0", "sensors.fog.bandwidth_hz=0"]
+    settings += ["sensors.encoder.rate_hz=50", "sensors.encoder.counts_per_revolution=0"]
+    trajectory = prepare(load_scenario("push_recovery", settings)).run().trajectory
+    assert trajectory is not None
+    np.testing.assert_allclose(trajectory["fog_rad_s"][2:], trajectory["x2_rad_s"][:-2], rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(trajectory["fog_rad_s"][:2], trajectory["x2_rad_s"][0], rtol=0.0, atol=1e-13)
+    held = trajectory["x3_rad"][np.arange(100) // 4 * 4]
+    np.testing.assert_allclose(trajectory["y2_rad"], held, rtol=0.0, atol=1e-13)
+
+
+# --- randomness --------------------------------------------------------------------------------------------
+
+
+def drawn(seed: int, worlds: int | list[int], stream: int, n: int, channels: int = 1) -> np.ndarray:
+    return np.array(list(itertools.islice(normals(seed, worlds, stream, channels), n)))
+
+
+def test_noise_depends_on_seed_and_world_alone() -> None:
+    """Not on the batch, nor on the order in it, nor on whether the world runs alone; across blocks of numbers too."""
+    batch = drawn(5, [3, 0, 7], 1, 600, 4)
+    assert batch.shape == (600, 4, 3)
+    for i, world in enumerate((3, 0, 7)):
+        np.testing.assert_array_equal(drawn(5, world, 1, 600, 4), batch[:, :, i])
+    np.testing.assert_array_equal(drawn(5, [7, 3], 1, 600, 4), batch[:, :, [2, 0]])
+    assert all(type(number) is float for number in next(normals(5, 3, 1, 4)))
+
+
+def test_streams_are_uncorrelated_standard_normals() -> None:
+    """Seeds, worlds and sensors: no pair correlates, and neighbours in time do not."""
+    sources = list(itertools.product((0, 1), (0, 1, 2), (0, 2)))
+    streams = [drawn(seed, world, stream, N)[:, 0] for seed, world, stream in sources]
+    correlation = np.corrcoef(np.stack(streams))[np.triu_indices(len(streams), 1)]
+    assert np.abs(correlation).max() < stats.norm.ppf(1.0 - 0.0005 / len(correlation)) / math.sqrt(N)
+    for stream in streams:
+        assert_sigma(stream, 1.0)
+        assert_mean(stream, 0.0, 1.0)
+        assert abs(np.corrcoef(stream[:-1], stream[1:])[0, 1]) < stats.norm.ppf(0.9999) / math.sqrt(N)
+
+
+def test_channels_are_uncorrelated() -> None:
+    correlation = np.corrcoef(drawn(0, 0, 0, N, 4).T)[np.triu_indices(4, 1)]
+    assert np.abs(correlation).max() < stats.norm.ppf(1.0 - 0.0005 / 6.0) / math.sqrt(N)
+
+
+def test_sensors_of_a_run_do_not_share_noise() -> None:
+    """The gyro's noise and the tilt's in the loop, and two worlds' and two seeds'."""
+    settings = ["duration_s=2.5", "push=[]", "controller.feedback=truth", "sensors.fog.bandwidth_hz=0"]
+    noises = []
+    for seed, world in ((0, 0), (0, 1), (1, 0)):
+        experiment = prepare(load_scenario("push_recovery", [*settings, f"seed={seed}"]))
+        trajectory = experiment.run(world=world).trajectory
+        assert trajectory is not None
+        x1, e = trajectory["x1_rad"], experiment.plant.bias
+        noises += [trajectory["fog_rad_s"] - trajectory["x2_rad_s"], trajectory["y1_rad"] - (x1 - e)]
+    noises = np.array(noises)[:, 1:]
+    correlation = np.corrcoef(noises)[np.triu_indices(len(noises), 1)]
+    assert np.abs(correlation).max() < stats.norm.ppf(1.0 - 0.0005 / len(correlation)) / math.sqrt(noises.shape[1])
+    assert_sigma(noises[0], 0.02 / 60.0 * math.pi / 180.0 * math.sqrt(200.0))
+
+
+def test_tilt_noise_in_the_loop_is_that_of_the_two_accelerometers() -> None:
+    """Weights 1.5 and 0.5: sigma(y1) = 4 mg sqrt(1.5^2 + 0.5^2) = 6.3 mrad near the upright position."""
+    settings = ["duration_s=10", "push=[]", "controller.feedback=truth", "plant.initial_tilt_deg=0.0"]
+    experiment = prepare(load_scenario("push_recovery", settings))
+    trajectory = experiment.run().trajectory
+    assert trajectory is not None
+    noise = (trajectory["y1_rad"] - trajectory["x1_rad"] + experiment.plant.bias)[1:]
+    sigma = 400e-6 * 9.80665 / 9.81 * 10.0 * math.sqrt(1.5**2 + 0.5**2)
+    print(f"tilt noise {np.std(noise) * 1e3:.3f} mrad, expected {sigma * 1e3:.3f}")
+    assert_sigma(noise, sigma)

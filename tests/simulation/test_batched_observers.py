@@ -1,0 +1,113 @@
+"""Runs that share a batch though their observers differ are, to the last bit, what each is by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.results.result import Result
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation import batched_observers as side_by_side
+from cmg_mj.simulation.batched_observers import Run, run_of, run_side_by_side
+from cmg_mj.simulation.experiment import Experiment, prepare, run_together
+
+
+def experiment(observer: str, *more: str) -> Experiment:
+    return prepare(load_scenario("push_recovery", ["duration_s=2.4", *more], observer))
+
+
+def same(a: Result, b: Result) -> None:
+    assert (a.observers, list(a.worlds), a.seconds, a.outcomes) == (b.observers, list(b.worlds), b.seconds, b.outcomes)
+    assert a.summaries == b.summaries
+    if a.trajectory is not None:
+        assert b.trajectory is not None
+        assert list(a.trajectory.columns) == list(b.trajectory.columns)
+        assert a.trajectory.layout == b.trajectory.layout
+        for name in a.trajectory.columns:
+            np.testing.assert_array_equal(a.trajectory[name], b.trajectory[name], name)
+
+
+class Batches:
+    """Counts them."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.sizes: list[int] = []
+        run = Experiment.simulate
+
+        def counted(self_: Experiment, plants: list, *args: object, **options: object) -> Result:
+            self.sizes.append(len(plants))
+            return run(self_, plants, *args, **options)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(Experiment, "simulate", counted)
+
+
+def test_every_observer_beside_the_others_is_as_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = [run_of(experiment(name), 3) for name in OBSERVERS]
+    alone = [run_together(*run) for run in runs]
+    batches = Batches(monkeypatch)
+    for a, b in zip(run_side_by_side(runs), alone, strict=True):
+        same(a, b)
+    kinds = {experiment(name).controller().extra_signals[0] for name in OBSERVERS}
+    assert sorted(batches.sizes) != [3] * len(OBSERVERS)
+    assert len(batches.sizes) == len(kinds)  # what is estimated beyond x is the same in a batch
+
+
+def test_parameters_noise_and_rigs_may_differ_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    noise = "sensors.accelerometer.noise_density_ug_rthz=800"
+    runs = [
+        run_of(experiment("homogeneous"), 2),
+        run_of(experiment("homogeneous", "observer.k1=30.0", noise), 2),
+        Run(experiment("gyro_free").varied({"equilibrium_bias_deg": [0.0, 1.0, 1.0]}), [4, 4, 2]),
+        run_of(experiment("gyro_free", noise), 1),
+        run_of(experiment("homogeneous"), 1),
+    ]
+    alone = [run_together(*run, keep_trajectory=False) for run in runs]
+    batches = Batches(monkeypatch)
+    for a, b in zip(run_side_by_side(runs, keep_trajectory=False), alone, strict=True):
+        same(a, b)
+    assert batches.sizes == [9]
+
+
+def test_what_a_batch_has_in_common_keeps_runs_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = [
+        run_of(experiment("linear", *more), 2)
+        for more in ((), ("controller.angles=estimated",), ("seed=3",), ("controller.rate_hz=100",), ())
+    ]
+    alone = [run_together(*run) for run in runs]
+    batches = Batches(monkeypatch)
+    for a, b in zip(run_side_by_side(runs), alone, strict=True):
+        same(a, b)
+    assert sorted(batches.sizes) == [2, 2, 2, 4]
+
+
+def test_a_batch_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(side_by_side, "MOST_WORLDS", 5)
+    batches = Batches(monkeypatch)
+    run_side_by_side([run_of(experiment(name, "duration_s=0.1", "push=[]"), 2) for name in ("linear", "ltv", "kalman")])
+    assert batches.sizes == [4, 2]
+
+
+class Raises:
+    """An observer that gives up."""
+
+    def __init__(self, dt: float, model: object) -> None: ...
+
+    def init(self, y: tuple) -> int:
+        return 0
+
+    def step(self, state: int, y: tuple, u: float) -> tuple:
+        if state > 50:
+            raise ValueError("enough")
+        return state + 1, (y[0], 0.0 * y[0], y[1])
+
+
+def test_an_observer_that_raises_stops_its_own_run_alone() -> None:
+    runs = [run_of(experiment(name), 2) for name in ("linear", f"{__name__}:Raises", "ltv")]
+    found = run_side_by_side(runs)
+    assert [[outcome.kind for outcome in result.outcomes] for result in found] == [
+        ["done"] * 2,
+        ["stopped"] * 2,
+        ["done"] * 2,
+    ]
+    assert "raised ValueError: enough" in found[1].outcomes[0].reason

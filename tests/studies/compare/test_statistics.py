@@ -1,0 +1,189 @@
+"""A comparison in numbers: whose mean, over which worlds, and against whom."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+import statistics
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pyarrow.compute as pc
+import pytest
+from scipy import stats
+
+from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.result import Outcome, Result
+from cmg_mj.results.terminal_tables import comparison_markdown
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.studies.compare.comparison import Compared, compare, prepare_comparison
+from cmg_mj.studies.compare.plot import _Panel
+from cmg_mj.studies.compare.statistics import best, rows_of, standings, worlds_table
+
+ERROR, PUSH_ERROR, FIT = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "velocity_fit"
+
+
+def entry(
+    kind: str, errors: list[float | None], lost: tuple[int, ...] = (), more: dict[str, Any] | None = None
+) -> Compared:
+    """An observer with these errors in its worlds, some of which fell."""
+    one = {"settle_time_s": 1.0, "tilt_rms_deg": 0.5, PUSH_ERROR: None, FIT: None} | (more or {})
+    rate = {ERROR: 0.2, PUSH_ERROR: None, FIT: 0.0}
+    references = dict.fromkeys(REFERENCES, rate) | {"mems_gyro": rate | {ERROR: 0.01}}
+    summaries = [{**one, ERROR: error, "references": copy.deepcopy(references)} for error in errors]
+    outcomes = [Outcome("fell" if i in lost else "done", 3.0 if i in lost else 9.0) for i in range(len(errors))]
+    (experiment,) = prepare_comparison(load_scenario("push_recovery", ["seed=7"]), [kind])
+    return Compared(experiment, Result(outcomes, summaries, observers=[kind], seed=7), Result(outcomes, summaries))
+
+
+def by_name(compared: list[Compared]) -> dict[str, dict[str, Any]]:
+    return {row["observer"]: row for row in standings(compared)}
+
+
+def student(values: list[float]) -> list[float]:
+    low, high = stats.t.interval(0.95, len(values) - 1, np.mean(values), stats.sem(values))
+    return [low, high]
+
+
+def test_means_have_students_intervals() -> None:
+    errors = [0.1, 0.13, 0.12, 0.2]
+    row = by_name([entry("ltv", [*errors])])["ltv"]
+    assert row[ERROR] == pytest.approx(np.mean(errors))
+    assert row["intervals"][ERROR] == pytest.approx(student(errors))
+    assert row["less_best"] == {}  # it is the best itself, in every figure
+
+
+def test_differences_are_taken_world_by_world() -> None:
+    """The worlds differ far more than the observers."""
+    first, second = [0.1, 0.5, 0.9], [0.11, 0.52, 0.90]
+    rows = by_name([entry("ltv", [*second]), entry("linear", [*first])])
+    less = rows["ltv"]["less_best"][ERROR]
+    assert (less["best"], less["worlds"]) == ("linear", 3)
+    assert less["mean"] == pytest.approx(0.01)
+    assert less["interval"] == pytest.approx(student([0.01, 0.02, 0.0]))
+    assert ERROR not in rows["linear"]["less_best"]
+
+
+def test_fallen_worlds_are_in_no_mean_and_no_difference() -> None:
+    rows = by_name([entry("ltv", [0.1, 0.2, 0.3, 0.4]), entry("linear", [0.2, 9.0, 0.4, 0.6], lost=(1,))])
+    assert rows["linear"][ERROR] == pytest.approx(0.4)
+    assert rows["linear"]["fell_fraction"] == 0.25
+    less = rows["linear"]["less_best"][ERROR]
+    assert (less["worlds"], less["mean"]) == (3, pytest.approx((0.1 + 0.1 + 0.2) / 3))
+
+
+def test_the_best_is_sought_among_those_that_stood_most_often() -> None:
+    steady, reckless = entry("ltv", [0.3, 0.3]), entry("linear", [0.1, 0.1], lost=(0,))
+    assert best([reckless, steady], ERROR) is steady
+    nobody = entry("linear", [0.1, 0.1], lost=(0, 1))
+    assert best([nobody], ERROR) is None
+    assert [row.name for row in rows_of([nobody])] == ["linear"]
+
+
+def test_more_of_a_fit_is_better() -> None:
+    good, bad = entry("ltv", [0.1, 0.1], more={FIT: 0.7}), entry("linear", [0.1, 0.1], more={FIT: -0.3})
+    assert best([bad, good], FIT) is good
+    assert by_name([bad, good])["linear"]["less_best"][FIT]["mean"] == pytest.approx(-1.0)
+
+
+def test_a_plot_of_fits_shows_the_best() -> None:
+    """One that is far off on the worse side is at the edge; one on the better side is not."""
+    fits = {"linear": -0.06, "ltv": -0.1, "homogeneous": 0.13, "high_gain": 0.05, "finite_difference": -10.0}
+    compared = [entry(kind, [0.1, 0.2], more={FIT: fit}) for kind, fit in fits.items()]
+    for of in compared:
+        for summary in of.result.summaries:
+            summary["references"]["mems_gyro"][FIT] = 0.96
+    low, high = _Panel(FIT, rows_of(compared)).limits
+    assert -5.0 < low < -0.1
+    assert 0.96 < high < 1.1
+
+
+def test_references_ride_along_with_the_best_in_the_push_window() -> None:
+    """And with the best over the whole run, where there is no push."""
+    slow = entry("ltv", [0.1, 0.1], more={PUSH_ERROR: 0.4})
+    quick = entry("linear", [0.2, 0.2], more={PUSH_ERROR: 0.3})
+    rows = by_name([slow, quick])
+    assert list(rows) == ["ltv", "linear", *REFERENCES]
+    assert {rows[name]["rides_along_in"] for name in REFERENCES} == {"linear"}
+    assert "rides_along_in" not in rows["linear"]
+    calm = by_name([entry("ltv", [0.1, 0.1]), entry("linear", [0.2, 0.2])])
+    assert calm["zero"]["rides_along_in"] == "ltv"
+    assert calm["zero"][ERROR] == 0.2
+    assert calm["mems_gyro"]["less_best"][ERROR]["mean"] == pytest.approx(-0.09)
+
+
+def test_a_reference_has_no_loop_of_its_own() -> None:
+    zero = by_name([entry("ltv", [0.1, 0.1])])["zero"]
+    for key in ("fell", "fell_fraction", "settle_time_s", "tilt_rms_deg"):
+        assert zero[key] is None
+    assert (zero["seed"], zero["worlds"]) == (7, 2)
+
+
+def test_one_world_has_no_intervals() -> None:
+    row = by_name([entry("ltv", [0.1]), entry("linear", [0.3])])["linear"]
+    assert row["intervals"][ERROR] is None
+    assert row["less_best"][ERROR]["interval"] is None
+    example = [dataclasses.replace(compared()[0], result=compared()[0].example)]
+    assert "Less the best" not in comparison_markdown(standings(example))
+    assert "±" not in comparison_markdown(standings(example)).split("\n\n")[0]
+
+
+def test_a_figure_that_is_missing_in_a_world() -> None:
+    """One that did not settle: it counts neither in the mean nor in a difference."""
+    of = entry("linear", [0.2, 0.2, 0.2])
+    of.result.summaries[1]["settle_time_s"] = None
+    less = by_name([entry("ltv", [0.1, 0.1, 0.1], more={"settle_time_s": 0.5}), of])["linear"]["less_best"][
+        "settle_time_s"
+    ]
+    assert (less["worlds"], less["mean"]) == (2, 0.5)
+
+
+# --- every world kept ----------------------------------------------------------------------------------------
+
+
+@cache
+def compared() -> tuple[Compared, ...]:
+    """Two observers, of which one falls in all worlds within the time."""
+    scenario = load_scenario("push_recovery", ["duration_s=4.0", "push.0.start_s=0.5", "seed=3"])
+    return tuple(compare(prepare_comparison(scenario, ["ltv", "luenberger"]), 3))
+
+
+def test_the_table_has_every_world_of_every_row() -> None:
+    table = worlds_table(compared())
+    assert table.num_rows == (2 + len(REFERENCES)) * 3
+    assert table["observer"].to_pylist() == [n for n in ("ltv", "luenberger", *REFERENCES) for _ in range(3)]
+    assert table["world"].to_pylist() == [0, 1, 2] * (2 + len(REFERENCES))
+    assert set(table["seed"].to_pylist()) == {3}
+    assert table["outcome"].to_pylist() == ["done"] * 3 + ["fell"] * 3 + ["done"] * 3 * len(REFERENCES)
+    assert table["rides_along_in"].to_pylist() == [None] * 6 + ["ltv"] * 3 * len(REFERENCES)
+    assert set(compared()[0].result.summaries[0]) - {"references"} <= set(table.column_names)
+
+
+def test_what_stood_averages_to_what_is_printed() -> None:
+    """And the figures of those that fell are there, marked."""
+    table = worlds_table(compared())
+    for row in standings(compared()):
+        of = table.filter(pc.field("observer") == row["observer"])
+        stood = of.filter(pc.field("stood"))
+        for key in row["intervals"]:
+            known = [value for value in stood[key].to_pylist() if value is not None]
+            assert (row[key] is None) == (not known), key
+            assert not known or statistics.fmean(known) == pytest.approx(row[key], rel=1e-12), key
+    fell = table.filter(pc.field("observer") == "luenberger")
+    assert not any(fell["stood"].to_pylist())
+    assert all(0.5 < end < 4.0 for end in fell["end_time_s"].to_pylist())
+    assert all(math.isfinite(value) for value in fell[ERROR].to_pylist())
+    assert set(fell["settle_time_s"].to_pylist()) == {None}
+
+
+def test_a_world_is_that_of_a_run_of_its_own() -> None:
+    ltv = compared()[0]
+    table = worlds_table(compared())
+    alone = ltv.experiment.run(world=2, keep_trajectory=False)
+    (row,) = alone.rows()
+    (kept,) = table.filter((pc.field("observer") == "ltv") & (pc.field("world") == 2)).to_pylist()
+    assert row["world"] == 2
+    for key, value in row.items():
+        assert kept[key] == (pytest.approx(value, rel=1e-9) if isinstance(value, float) else value), key

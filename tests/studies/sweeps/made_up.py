@@ -1,0 +1,32 @@
+"""Trials whose figures are known, without a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.studies.sweeps.axes import parse_axis
+from cmg_mj.studies.sweeps.cells import Trials
+from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.trials import table_of
+
+VELOCITY, PUSH = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
+BIAS, NOISE, RATE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz", "controller.rate_hz"
+
+Error = Callable[[dict[str, Any], str, int], float | None]
+"""Point, observer, world -> the velocity error; None for a fall."""
+
+
+def made_up(varied: dict[str, str], observers: tuple[str, ...], worlds: int, error: Error, **options: Any) -> Trials:
+    """A sweep whose velocity errors are given."""
+    axes = tuple(parse_axis(field, said, field) for field, said in varied.items())
+    study = Study(load_scenario("push_recovery"), axes, observers, worlds, **options)
+    rows = []
+    for number, point in enumerate(study.points):
+        for observer in observers:
+            for world in range(worlds):
+                found = error(point, observer, world)
+                row = {"point": number, **point, "observer": observer, "world": world, "seed": 0}
+                rows.append(row | {"outcome": "fell" if found is None else "done", VELOCITY: found})
+    return Trials(study, [table_of(study, rows)])

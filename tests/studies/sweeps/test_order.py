@@ -1,0 +1,114 @@
+"""How often a named order of observers holds."""
+
+from __future__ import annotations
+
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.studies.sweeps.order import by_quarters, order_of_points, order_rows
+from cmg_mj.studies.sweeps.report_sections import order as said
+from tests.studies.sweeps.made_up import BIAS, NOISE, VELOCITY, made_up
+
+NAMES = ("linear", "ltv", "homogeneous")
+ORDER = ("homogeneous", "ltv", "linear")
+
+
+def counted(*worlds: tuple[float | None, float | None, float | None]) -> tuple[int, int]:
+    """Of one point, with the errors of the order's observers in each world."""
+    trials = made_up(
+        {BIAS: "0"}, NAMES, len(worlds), lambda _, name, world: worlds[world][ORDER.index(name)], order=ORDER
+    )
+    (row,) = order_rows(trials)
+    return row["held"], row["worlds"]
+
+
+@pytest.mark.parametrize(
+    ("errors", "held"),
+    [
+        ((1.0, 2.0, 3.0), (1, 1)),
+        ((1.0, 3.0, 2.0), (0, 1)),
+        ((1.0, 1.0, 2.0), (0, 1)),
+        ((1.0, 2.0, None), (1, 1)),
+        ((None, 1.0, 2.0), (0, 1)),
+        ((1.0, None, None), (0, 0)),
+        ((None, None, None), (0, 0)),
+        ((None, None, 1.0), (0, 1)),  # the two that are to be better fell: that breaks it
+        ((2.0, 1.0, None), (0, 1)),
+    ],
+)
+def test_a_world(errors: tuple[float | None, float | None, float | None], held: tuple[int, int]) -> None:
+    assert counted(errors) == held
+
+
+@pytest.mark.parametrize("stopped", range(3))
+@pytest.mark.parametrize("others", [(1.0, 2.0, 3.0), (3.0, 2.0, 1.0), (None, 2.0, 3.0)])
+@pytest.mark.parametrize("how", ["stopped", "refused"])
+def test_a_stop_cannot_tell(others: tuple[float | None, ...], stopped: int, how: str) -> None:
+    """It is no error of the observer's that loses, and none of the others' that wins."""
+    errors = {0: others, 1: (1.0, 2.0, 3.0)}
+    trials = made_up({BIAS: "0"}, NAMES, 2, lambda _, name, world: errors[world][ORDER.index(name)], order=ORDER)
+    trials.outcome[0, NAMES.index(ORDER[stopped]), 0] = how
+    trials.stood = trials.outcome == "done"
+    (row,) = order_rows(trials)
+    assert (row["held"], row["worlds"]) == (1, 1)
+    assert order_of_points(trials, VELOCITY, ORDER) == (0, 0)
+    apart = [name for name in ORDER if name != ORDER[stopped]]
+    assert order_of_points(trials, VELOCITY, apart).of == 1
+
+
+def test_the_share_has_wilsons_interval() -> None:
+    trials = made_up({BIAS: "0,1"}, NAMES, 10, lambda p, name, w: ORDER.index(name) * (w < 8 or p[BIAS]), order=ORDER)
+    first, second = order_rows(trials)
+    assert (first["held"], first["worlds"], first["share"]) == (8, 10, 0.8)
+    assert (first["low"], first["high"]) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    assert (second["held"], second["share"]) == (10, 1.0)
+    first, whole, *_ = said(trials, order_rows(trials), 60)[2].splitlines()[::2]
+    assert first.split("|")[1].strip() == "counted by"
+    assert [cell.strip() for cell in whole.split("|")[2:-1]] == ["homogeneous < ltv < linear", "2 of 2", "18 of 20"]
+
+
+def test_points_by_their_means() -> None:
+    """One bad world of three turns the mean, and a fall does so whatever the others are."""
+    of = {0: {"ltv": 10.0}, 1: {"ltv": None}, 2: {}}
+    trials = made_up(
+        {BIAS: "0,1,2"},
+        NAMES,
+        3,
+        lambda p, name, w: of[p[BIAS]].get(name, ORDER.index(name)) if w == 0 else float(ORDER.index(name)),
+        order=ORDER,
+    )
+    assert order_of_points(trials, VELOCITY, ORDER) == (1, 3)
+    assert order_of_points(trials, VELOCITY, ("homogeneous", "ltv")) == (3, 3)  # a fall is worse
+    assert order_of_points(trials, VELOCITY, ("ltv", "linear")) == (1, 3)
+
+
+def test_by_quarters_of_a_range_and_values_of_a_list() -> None:
+    """It holds where a field is above its lower half; the other one does not matter."""
+    trials = made_up(
+        {BIAS: "0:4", NOISE: "100,200"},
+        NAMES,
+        2,
+        lambda p, name, _: float(ORDER.index(name) if p[BIAS] > 2.0 else -ORDER.index(name)),
+        order=ORDER,
+        design="sample",
+        n=64,
+    )
+    rows = by_quarters(trials, VELOCITY)
+    assert [row[0] for row in rows] == [BIAS] * 4 + [NOISE] * 2
+    assert [row[3] for row in rows[:4]] == [(0, 16), (0, 16), (16, 16), (16, 16)]
+    assert rows[0][2] <= 1.0 <= rows[1][1]
+    assert [(row[1], row[2], row[3].of) for row in rows[4:]] == [(100, 100, 32), (200, 200, 32)]
+    assert "quarter" in said(trials, order_rows(trials), 60)[-3]
+
+
+@pytest.mark.parametrize(
+    ("order", "complaint"),
+    [
+        (("ltv",), "write two observers or more"),
+        (("ltv", "ltv"), "each once"),
+        (("ltv", "kalman"), "kalman does not run here; --observers are linear, ltv, homogeneous"),
+    ],
+)
+def test_what_is_no_order(order: tuple[str, ...], complaint: str) -> None:
+    with pytest.raises(InputError, match=f"--order .*{complaint}"):
+        made_up({BIAS: "0"}, NAMES, 1, lambda *_: 1.0, order=order)

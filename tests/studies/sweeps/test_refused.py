@@ -1,0 +1,158 @@
+"""What a sweep refuses before anything is computed, in one line, whoever asks: the command, a study file, Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.studies.sweeps import api as swept
+from cmg_mj.studies.sweeps.axes import parse_axis
+from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.trials import table_of
+from tests.command import cmg_mj
+
+BIAS, NOISE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz"
+INNER, OUTER = "plant.accelerometer_inner_m", "plant.accelerometer_outer_m"
+SHORT = ("duration_s=0.1", "push=[]")
+BROKEN = """
+class Broken:
+    def __init__(self, dt, model):
+        raise ValueError("never")
+
+    def init(self, y):
+        pass
+
+    def step(self, state, y, u):
+        pass
+"""
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Until something is refused."""
+    for module in ("store", "swept", "plan"):
+        monkeypatch.setattr(f"cmg_mj.studies.sweeps.{module}.compute", lambda *_, **__: pytest.fail("computed"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--vary", f"{BIAS}=0:1", "--sobol", "4"], "--sobol: indices part what several fields do; vary two or more"),
+        (["--vary", "seed=1,2"], "--vary seed: is not varied: .* --worlds says how many, --seed which"),
+        (["--vary", "observer.kind=linear,ltv"], "--vary observer.kind: is not varied: --observers names them"),
+        (["--vary", "title=a,b"], "--vary title: is not varied: no trial depends on it"),
+        (["--vary", "based_on=a,b"], "--vary based_on: is not varied"),
+        (["--vary", "versions.mujoco=a,b"], "--vary versions.mujoco: is not varied"),
+        (["--vary", f"{BIAS}+compare.worlds=1,2"], "--vary compare.worlds: is not varied"),
+        (["--vary", 'companions=["ltv"],[]'], "--vary companions: is not varied: a sweep runs without them"),
+        (["--vary", f"{BIAS}=0,1", "--observers", "linear,ltv,linear"], "observers: 'linear' is there twice"),
+        (["--vary", f"{BIAS}=0,1", "--observers", "linear,broken:Broken"], "observer broken:Broken: ValueError: never"),
+        (
+            ["--vary", f"{BIAS}=0,1", "--observers", "linear,broken:None"],
+            "observer.kind = 'broken:None': cannot be imported",
+        ),
+        (["--vary", f"{INNER}=0.05,0.5"], f"--vary {INNER}=0.5: .* the inner accelerometer must lie nearer"),
+        (["--vary", "plant.model=nope.xml"], "--vary plant.model: plant.model = 'nope.xml': no such file"),
+        (["--vary", "plant.model=cube,nope.xml", "--vary", f"{BIAS}=0,1"], "'nope.xml': no such file"),
+        (["--vary", f"{BIAS}=0,1", "--plan", "--cluster", "nonsense"], "--cluster nonsense: write tcp://HOST:PORT"),
+    ],
+)
+@pytest.mark.usefixtures("elsewhere")
+def test_on_the_command_line(arguments: list[str], complaint: str) -> None:
+    Path("broken.py").write_text(BROKEN)
+    assert_in(complaint, cmg_mj("sweep", "push_recovery", *arguments, "--out", "out").complaint)
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(
+    ("sweep", "complaint"),
+    [
+        ("worlds = 0", "worlds = 0: must be a whole number, 1 or more"),
+        ("worlds = -3", "worlds = -3: must be"),
+        ('design = "sample"\nn = -4', "n = -4: must be a whole number of points, 1 or more"),
+        ('design = "sample"', "n = 0: must be a whole number of points"),
+        ('design = "sobol"', "--sobol 0: must be a power of two"),
+        ("n = 4", "n = 4: is for the designs sample and sobol"),
+        ("observers = [1]", "observers: 1: must be an observer's name"),
+        ("observers = []", "observers: there must be one at least"),
+        ('observers = ["linar"]', "observers: 'linar': no such observer; did you mean 'linear'"),
+        ('observers = ["ltv", "ltv"]', "observers: 'ltv' is there twice"),
+        ("order = [1, 2]", "--order 1,2: must be observers' names"),
+    ],
+)
+@pytest.mark.usefixtures("elsewhere")
+def test_in_a_study_file(sweep: str, complaint: str) -> None:
+    Path("s.toml").write_text(f'scenario = "push_recovery"\n[sweep]\n{sweep}\n[vary]\n"{BIAS}" = [0, 1]\n')
+    assert_in(complaint, cmg_mj("sweep", "s.toml", "--out", "out").complaint)
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"worlds": 0}, "worlds = 0: must be"),
+        ({"worlds": 1.5}, "worlds = 1.5: must be"),
+        ({"worlds": True}, "worlds = true: must be"),
+        ({"sample": 0}, "n = 0: must be a whole number of points"),
+        ({"sample": -2}, "n = -2: must be"),
+        ({"sobol": 0}, "--sobol 0: must be a power of two"),
+        ({"sobol": 2.0}, "--sobol 2.0: must be a power of two"),
+        ({"observers": [1]}, "observers: 1: must be an observer's name"),
+        ({"observers": "linear"}, "observers = 'linear': must be a list of observers' names, such as"),
+        ({"order": "linear"}, "order = 'linear': must be a list"),
+        ({"vary": {BIAS: {"a": 1}}}, "must be a list of values, or text"),
+        ({"vary": {BIAS: None}}, "must be a list of values, or text"),
+    ],
+)
+def test_from_python(options: dict[str, Any], complaint: str) -> None:
+    given: dict[str, Any] = {"vary": {BIAS: [0, 1]}} | options
+    with pytest.raises(InputError) as refused:
+        swept.sweep("push_recovery", **given)
+    assert_in(complaint, str(refused.value))
+
+
+def test_values_from_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One alone, and numpy's: a column of numbers."""
+    monkeypatch.undo()
+    worlds: Any = np.int64(1)
+    vary = {BIAS: 0.5, NOISE: np.array([200.0, 400.0]), "controller.rate_hz": [np.int64(100)]}
+    found = swept.sweep(load_scenario("push_recovery", SHORT), vary, ["linear"], worlds=worlds)
+    columns = ["point", *vary]
+    assert [str(found.trials.schema.field(name).type) for name in columns] == ["int64", "double", "double", "int64"]
+    assert found.trials.select(columns).to_pylist()[1] == {
+        "point": 1,
+        BIAS: 0.5,
+        NOISE: 400.0,
+        "controller.rate_hz": 100,
+    }
+
+
+def test_what_fits_only_with_another_value_is_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
+    found = swept.sweep(load_scenario("push_recovery", SHORT), {INNER: [0.05, 0.5], OUTER: [0.2, 0.6]}, worlds=1)
+    assert found.trials["outcome"].to_pylist() == ["done", "done", "refused", "done"]
+
+
+def test_a_whole_number_that_no_column_of_them_holds() -> None:
+    """Which scenarios take such a number depends on pydantic's version, so it stands in a table without a run."""
+    axis = parse_axis("push.0.torque_n_m", "0,99999999999999999999", "--vary push.0.torque_n_m")
+    study = Study(load_scenario("push_recovery"), (axis,), ("linear",), 1)
+    rows = [
+        {"point": number, **point, "observer": "linear", "world": 0, "seed": 0, "outcome": "done"}
+        for number, point in enumerate(study.points)
+    ]
+    column = table_of(study, rows)["push.0.torque_n_m"]
+    assert (str(column.type), column.to_pylist()) == ("double", [0.0, 1e20])
+
+
+def assert_in(pattern: str, said: str) -> None:
+    """The parts of a pattern, with ` .* ` between, stand in a line one after the other."""
+    at = 0
+    for part in pattern.split(" .* "):
+        at = said.find(part, at)
+        assert at >= 0, f"{part!r} is not in {said!r}"

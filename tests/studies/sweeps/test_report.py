@@ -1,0 +1,108 @@
+"""A sweep's report and what the terminal says: read as somebody who has not seen the tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmg_mj.studies.sweeps.cells import Trials
+from cmg_mj.studies.sweeps.report import found_of, report, summary
+from tests.studies.sweeps.made_up import BIAS, NOISE, made_up
+
+RATES = "controller.rate_hz+sensors.accelerometer.rate_hz"
+
+
+def row_of(text: str, first: str) -> list[str]:
+    """The cells of a table's row that begins so."""
+    (line,) = (line for line in text.splitlines() if line.startswith(f"| {first} "))
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def sampled() -> Trials:
+    """At 24 points an error that is the bias, and 0.1 more in world 1, in which ltv falls at half of them."""
+
+    def error(point: dict[str, Any], name: str, world: int) -> float | None:
+        return None if name == "ltv" and world == 1 and point[BIAS] > 0.5 else point[BIAS] + 0.1 * world
+
+    varied = {BIAS: "0:1", NOISE: "log:100:800", RATES: "100,200"}
+    return made_up(varied, ("linear", "ltv", "kalman"), 2, error, design="sample", n=24)
+
+
+def test_of_a_design_an_observer_has_a_row() -> None:
+    trials = sampled()
+    trials.outcome[:, 2] = "refused"
+    trials.stood = trials.outcome == "done"
+    found = found_of(trials)
+    bias = np.array([point[BIAS] for point in trials.study.points])
+    fell = bias > 0.5
+    for text in (report(found, []), summary(found)):
+        for name, means in (("linear", bias + 0.05), ("ltv", bias + 0.05 * ~fell)):
+            figures = [means.mean(), *np.quantile(means, (0.1, 0.5, 0.9))]
+            assert row_of(text, name)[1:6] == ["24 of 24", *(f"{figure:.4f}" for figure in figures)]
+        assert row_of(text, "linear")[6] == "0 of 48 (0.0 %)"
+        assert row_of(text, "ltv")[6] == f"{fell.sum()} of 48 ({100 * fell.sum() / 48:.1f} %)"
+        assert row_of(text, "kalman")[1:] == ["0 of 24", "-", "-", "-", "-", "0 of 0"]
+        assert "Every point is in cells.parquet." in text
+        assert max(len(line) for line in text.splitlines() if line.startswith("|")) < 120
+        assert f"{trials.study.points[0][BIAS]:g}" not in text
+
+
+def test_a_report_of_a_design_says_what_is_varied() -> None:
+    lines = report(found_of(sampled()), []).splitlines()
+    assert f"- {BIAS}: 0 to 1" in lines
+    assert f"- {NOISE}: 100 to 800, evenly in the logarithm" in lines
+    assert f"- {RATES}: 100, 200" in lines
+    many = made_up({BIAS: "0:1:30"}, ("linear",), 1, lambda *_: 1.0, design="sample", n=4)
+    assert any(line.endswith(", ..., 1 (30 values)") for line in report(found_of(many), []).splitlines())
+
+
+def test_of_a_grid_a_point_has_a_row() -> None:
+    trials = made_up({RATES: "100,200"}, ("linear", "ltv"), 2, lambda _, name, w: None if w and name == "ltv" else 0.5)
+    for text in (report(found_of(trials), []), summary(found_of(trials))):
+        assert [cell.strip() for cell in text.splitlines()[-1].strip("|").split("|")] == [
+            "200",
+            "0.5000",
+            "0.5000 [1 fell]",
+        ]
+    assert "With controller.rate_hz go, alike: sensors.accelerometer.rate_hz." in report(found_of(trials), [])
+
+
+@pytest.mark.parametrize("order", [(), ("ltv", "linear")])
+def test_the_terminal_says_why_there_are_no_indices(order: tuple[str, ...]) -> None:
+    """Of everything, or of one observer and its ratio alone."""
+    names = ("linear", "ltv")
+
+    def sobol(fallen: tuple[str, ...]) -> str:
+        def error(point: dict[str, Any], name: str, _: int) -> float | None:
+            return None if name in fallen else point[BIAS] + point[NOISE]
+
+        return summary(
+            found_of(made_up({BIAS: "0:1", NOISE: "1:2"}, names, 1, error, design="sobol", n=16, order=order))
+        )
+
+    said = sobol(names)
+    assert "total index" not in said
+    for name in names:
+        assert f"No indices of {name}, velocity RMS error, error in push window: no value at 64 of 64 points: " in said
+    said = sobol(("ltv",))
+    lines = [line for line in said.splitlines() if line.startswith("| linear ") and BIAS in line]
+    assert len(lines) == 1
+    assert "No indices of ltv, velocity RMS error: no value at 64 of 64 points: of 64 trials 64 fell." in said
+    assert ("No indices of log(ltv / linear), velocity RMS error: no value at 64 of 64 points" in said) == bool(order)
+
+
+def test_the_terminal_has_the_indices_of_a_ratio() -> None:
+    trials = made_up(
+        {BIAS: "0:1", NOISE: "1:2"},
+        ("linear", "ltv"),
+        1,
+        lambda point, name, _: float(np.exp(point[BIAS] if name == "ltv" else point[NOISE])),
+        design="sobol",
+        n=16,
+        order=("ltv", "linear"),
+    )
+    rows = [line for line in summary(found_of(trials)).splitlines() if line.startswith("| log(ltv / linear) ")]
+    assert [row.split("|")[2].strip() for row in rows] == [BIAS, NOISE]
+    assert all("[" in row for row in rows)

@@ -1,0 +1,232 @@
+"""Ctrl-C: a run ends between two ticks and is written whole; a second one ends it at once."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.trajectory import Trajectory
+from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj_process, environment
+from tests.run_folders import assert_whole, names, write
+
+pytestmark = pytest.mark.usefixtures("elsewhere", "ctrl_c")
+
+OBSERVER = """
+import signal, time
+from pathlib import Path
+from cmg_mj import Estimate
+
+class Interrupts:
+    '''Presses Ctrl-C at the 600th sample, once or more often.'''
+    def __init__(self, dt, model, times=1, signal="SIGINT"):
+        self.times, self.signal = times, signal
+    def init(self, y):
+        return 0
+    def step(self, k, y, u):
+        if k == 598:
+            for _ in range(self.times):
+                self.press()
+        return k + 1, Estimate(y.y1, 0.0 * y.y1, y.y2)
+    def press(self):
+        signal.raise_signal(getattr(signal, self.signal))
+
+class Waits(Interrupts):
+    '''Waits at the 600th sample until somebody else has pressed it.'''
+    def press(self):
+        Path('waiting').touch()
+        while not Path('pressed').exists():
+            time.sleep(0.01)
+
+class Slow(Interrupts):
+    '''Takes 0.1 s a sample; presses it at the fourth.'''
+    def step(self, k, y, u):
+        time.sleep(0.1)
+        if k == 2:
+            Path('after').write_text('')
+            self.press()
+        elif k > 2:
+            with Path('after').open('a') as after:
+                after.write('.')
+        return k + 1, Estimate(y.y1, 0.0 * y.y1, y.y2)
+"""
+LONG = "duration_s = 600.0\n[controller]\nfeedback = 'truth'\n[observer]\nkind = 'pressing:Interrupts'"
+
+
+@pytest.mark.parametrize("driver", ["native", "callback"])
+def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
+    """The class is found in the current folder."""
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process("run", write(LONG), "--out", "it", "--json", "--driver", driver, cwd=Path())
+    assert said.status == 130, said
+    assert said.err == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it\n"
+    assert len(assert_whole("it")) == 600
+    assert json.loads(said.out)["outcome"] == "interrupted"
+
+
+def test_ends_a_measurement_of_speed() -> None:
+    """The run that hears it ends as a result; no other is started."""
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process("bench", "--observers", "pressing:Interrupts", "--worlds", "2", cwd=Path())
+    assert (said.status, said.out, said.err) == (130, "", "cmg-mj: interrupted\n")
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_what_ends_a_process_from_outside_counts_as_ctrl_c(name: str) -> None:
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process("run", write(LONG), "--out", "it", "--set", f"observer.signal={name}", cwd=Path())
+    assert said.status == 130, said
+    assert said.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+    assert len(assert_whole("it")) == 600
+
+
+def test_twice_ends_a_run_at_once() -> None:
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process("run", write(LONG), "--out", "it", "--set", "observer.times=2", cwd=Path())
+    assert said.status == 130, said
+    assert said.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+    assert len(assert_whole("it")) == 599
+
+
+@pytest.mark.parametrize("command", [["run"], ["compare", "--observers", "pressing:Slow", "--worlds", 2]])
+def test_is_heard_after_the_tick_however_slow_an_observer_is(command: list) -> None:
+    """An observer of 0.1 s a sample: not one more sample is taken."""
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process(
+        command[0], write(LONG.replace("Interrupts", "Slow")), *command[1:], "--out", "it", cwd=Path()
+    )
+    assert said.status == 130, said
+    assert Path("after").read_text() == ""
+    if command == ["run"]:
+        assert said.err.splitlines()[-1].startswith("cmg-mj: interrupted at 0.015 s; ")
+        assert len(assert_whole("it")) == 4
+
+
+WRITING = """
+import signal
+from cmg_mj import cli
+from cmg_mj.studies import save as runs
+def pressed(record, times=({times})):
+    def press(*arguments):
+        for _ in range(times):
+            signal.raise_signal(signal.SIGINT)
+        record(*arguments)
+    return press
+runs._write_json = pressed(runs._write_json)
+cli.main(["run", "my.toml", "--out", "it"])
+"""
+
+
+def run_python(program: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", program],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=HANGS_AFTER_S,
+        check=False,
+    )
+
+
+def test_while_files_are_written_lets_them_be_finished() -> None:
+    write("duration_s = 0.2")
+    done = run_python(WRITING.format(times=1))
+    assert done.returncode == 130, done
+    assert done.stderr.splitlines()[-1] == "cmg-mj: interrupted when all was done; it is in it"
+    assert_whole("it")
+
+
+def test_twice_while_files_are_written_leaves_no_broken_one() -> None:
+    write("duration_s = 0.2")
+    done = run_python(WRITING.format(times=2))
+    assert done.returncode == 130, done
+    assert done.stderr == "cmg-mj: interrupted\n"
+    assert names("it") == ["trajectory.parquet"]
+    assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 40
+
+
+def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
+    write(OBSERVER, "pressing.py")
+    file = write("duration_s = 3.0\n[controller]\nfeedback = 'truth'")
+    said = cmg_mj_process(
+        "compare", file, "--observers", "linear,pressing:Interrupts,ltv", "--worlds", 1, "--out", "it", cwd=Path()
+    )
+    assert said.status == 130, said
+    assert said.err.splitlines()[-1] == "cmg-mj: interrupted; 1 of 3 observers are in it"
+    assert names("it") == [
+        "recording.rrd",
+        "scenario.toml",
+        "summary.json",
+        "trajectory-linear.parquet",
+        "worlds.parquet",
+    ]
+    observers = [entry["observer"] for entry in json.loads(Path("it/summary.json").read_text())]
+    assert observers == ["linear", *REFERENCES]
+
+
+def test_before_the_first_observer_is_done_leaves_nothing() -> None:
+    write(OBSERVER, "pressing.py")
+    said = cmg_mj_process(
+        "compare", write(LONG), "--observers", "pressing:Interrupts", "--worlds", 1, "--out", "it", cwd=Path()
+    )
+    assert (said.status, said.out) == (130, "")
+    assert said.err == "cmg-mj: interrupted before the first observer was done; nothing was written\n"
+    assert not Path("it").exists()
+
+
+def test_from_outside() -> None:
+    """From another process, while the run waits for it in the middle of a tick: nothing depends on who is faster."""
+    write(OBSERVER, "pressing.py")
+    file = write(LONG.replace("Interrupts", "Waits"))
+    with subprocess.Popen(
+        [*COMMAND, "run", file, "--out", "it"],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as running:
+        try:
+            while not Path("waiting").exists():
+                assert running.poll() is None, running.communicate()
+                time.sleep(0.01)
+            running.send_signal(signal.SIGINT)
+            Path("pressed").touch()
+            _, err = running.communicate(timeout=HANGS_AFTER_S)
+        finally:
+            running.kill()
+    assert running.returncode == 130, err
+    assert err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+    assert len(assert_whole("it")) == 600
+    verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", "it/recording.rrd"], capture_output=True)
+    assert verified.returncode == 0, verified
+
+
+def test_leaves_the_complete_result_of_a_run_before() -> None:
+    write(OBSERVER, "pressing.py")
+    assert cmg_mj_process("run", write("duration_s = 0.1"), "--out", "it", cwd=Path()).status == 0
+    said = cmg_mj_process("run", write(LONG), "--out", "it", cwd=Path())
+    assert said.err.splitlines()[-1] == (
+        "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it/incomplete; "
+        "what it has held stays as it was"
+    )
+    assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 20
+    assert len(assert_whole("it/incomplete")) == 600
+
+
+def test_a_study_that_cannot_begin_leaves_no_folder() -> None:
+    said = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "a/b", cwd=Path())
+    assert said.status == 2
+    assert not Path("a").exists()
+
+
+def test_a_folder_that_was_there_stays() -> None:
+    Path("mine").mkdir()
+    said = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "mine", cwd=Path())
+    assert said.status == 2
+    assert Path("mine").is_dir()

@@ -1,0 +1,30 @@
+"""Killed at any moment, a run leaves the old result or the new one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.command import HANGS_AFTER_S, environment
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+@pytest.mark.parametrize(
+    ("what", "kills"),
+    [("whole", 30), ("moved", 25), ("random", 20)],
+    ids=["while folders change names", "while files are moved", "whole runs, at random moments"],
+)
+def test_kills(what: str, kills: int) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.system.kill_writers", what],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=HANGS_AFTER_S,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout.split()[0]) >= kills, done.stdout

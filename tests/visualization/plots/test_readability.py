@@ -1,0 +1,128 @@
+"""The best few, and axes that one bad line cannot take."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from cmg_mj.visualization.plots.readability import FEW, MARGIN, REACH, axis_range, best, free_corner, shortened
+
+TRUE = 0.5 * np.sin(np.linspace(0.0, 20.0, 2001))
+"""From -0.5 to 0.5."""
+
+
+def seen(low: float, high: float) -> object:
+    room = MARGIN * (high - low)
+    return pytest.approx((low - room, high + room), rel=1e-3)
+
+
+def noise(size: float) -> np.ndarray:
+    return size * np.random.default_rng(0).standard_normal(len(TRUE))
+
+
+def test_what_must_be_seen_is_seen_whole() -> None:
+    spike = TRUE.copy()
+    spike[7] = 4.0
+    assert axis_range([spike]) == seen(-0.5, 4.0)
+    assert axis_range([TRUE, spike]) == seen(-0.5, 4.0)
+
+
+def test_an_outlier_of_an_estimate_is_not() -> None:
+    spike = TRUE.copy()
+    spike[7] = 1e6
+    assert axis_range([TRUE], [spike]) == seen(-0.5, 0.5)
+
+
+@pytest.mark.parametrize("bad", [noise(100.0), np.geomspace(1.0, 1e300, 2001), np.geomspace(1.0, 1e300, 2001) * -1.0])
+def test_a_noisy_or_diverging_estimate_leaves_room_for_the_truth(bad: np.ndarray) -> None:
+    found = axis_range([TRUE], [bad])
+    assert found is not None
+    assert found[1] - found[0] <= (1.0 + 2.0 * REACH) * (1.0 + 2.0 * MARGIN) * 1.001
+    assert found[0] < -0.5
+    assert found[1] > 0.5
+
+
+def test_a_moderate_estimate_has_its_noise_shown() -> None:
+    found = axis_range([TRUE], [noise(0.4)])
+    assert found is not None
+    assert found[0] < -0.8
+    assert found[1] > 0.8
+
+
+def test_values_that_are_none_are_passed_over() -> None:
+    broken = np.array([math.nan, math.inf, -math.inf])
+    assert axis_range([TRUE, broken], [broken]) == seen(-0.5, 0.5)
+    assert axis_range([broken], [TRUE]) == axis_range([], [TRUE])
+
+
+@pytest.mark.parametrize("nothing", [[], [np.empty(0)], [np.full(3, math.nan)], [np.zeros(3)], [np.ones((2, 2))]])
+def test_no_range_where_there_is_none(nothing: list[np.ndarray]) -> None:
+    assert axis_range(nothing) is None
+
+
+def summary(error: float | None, *, push: float | None = None, fell: bool = False) -> dict[str, object]:
+    return {"velocity_rms_error_rad_s": error, "velocity_rms_error_push_rad_s": push, "fell": fell}
+
+
+def test_the_best_in_the_order_given() -> None:
+    errors = {"a": 0.4, "b": 0.1, "c": 0.3, "d": 0.2, "e": None, "f": math.nan}
+    summaries = {name: summary(error) for name, error in errors.items()}
+    assert best(summaries) == ["b", "c", "d"]
+    assert best(summaries, ["e"]) == ["b", "d", "e"]
+    assert best(summaries, list("acef")) == ["a", "c", "e", "f"]
+    assert best({name: summaries[name] for name in "fa"}) == ["f", "a"]
+
+
+def test_one_that_fell_is_not_among_the_best() -> None:
+    summaries = {name: summary(i / 10.0) for i, name in enumerate("abcde")}
+    summaries["a"]["fell"] = True
+    assert best(summaries) == ["b", "c", "d"]
+
+
+def test_the_push_decides_where_it_is_known() -> None:
+    summaries = {
+        name: summary(error, push=1.0 - error) for name, error in zip("abcd", (0.1, 0.2, 0.3, 0.4), strict=True)
+    }
+    assert best(summaries) == ["b", "c", "d"]
+
+
+def test_what_observers_are_compared_with_is_not_among_the_best() -> None:
+    summaries = {name: summary(i / 10.0) for i, name in enumerate(("zero", "mems_gyro", "a", "b", "c", "d"))}
+    assert best(summaries) == ["a", "b", "c"]
+    assert len(best(dict.fromkeys(("zero", "mems_gyro", "a"), summary(0.1)))) == FEW
+
+
+TIME = np.linspace(0.0, 10.0, 1001)
+PEAK = np.exp(-np.square((TIME - 2.0) / 0.1))
+
+
+@pytest.mark.parametrize(
+    ("values", "corner"),
+    [
+        (PEAK, ("right", "top")),
+        (PEAK[::-1], ("left", "top")),
+        (PEAK + 0.02 * noise(1.0)[:1001], ("right", "top")),
+        (np.exp(TIME), ("left", "top")),
+        (1.0 - np.exp(-TIME), ("right", "bottom")),
+        (np.ones_like(TIME), ("right", "top")),
+        (np.full_like(TIME, math.nan), ("right", "top")),
+        (np.stack([PEAK, -PEAK], axis=1), ("right", "top")),
+    ],
+)
+def test_a_legend_hides_no_excursion(values: np.ndarray, corner: tuple[str, str]) -> None:
+    side, end = free_corner([(TIME, values)], axis_range([values]))
+    assert (side, end) == corner or (corner == ("right", "top") and side == "right")
+
+
+def test_a_legend_where_there_is_no_line() -> None:
+    assert free_corner([], None) == ("right", "top")
+    assert free_corner([(np.empty(0), np.empty(0))], None) == ("right", "top")
+    assert free_corner([(np.array([1.0, 1.0]), np.array([1e300, -1e300]))], (-1.0, 1.0)) == ("right", "top")
+
+
+def test_names_are_shortened_where_they_stay_apart() -> None:
+    names = ["linear", "mine:Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
+    assert list(shortened(names).values()) == ["linear", "Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
+    assert list(shortened(["mine:linear", "linear"]).values()) == ["mine:linear", "linear"]

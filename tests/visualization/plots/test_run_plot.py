@@ -1,0 +1,132 @@
+"""Plots: what is on plot.png, that no line takes an axis for itself, colours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import matplotlib.figure
+import numpy as np
+import pytest
+
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import prepare
+from cmg_mj.visualization.plots.colours import colour, hexadecimal
+from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.visualization.plots.run_plot import PAGE, draw, plot_run
+
+BAND, LIMIT = 1.0, 4.7
+
+
+@pytest.fixture(scope="module")
+def ridden() -> tuple[Trajectory, dict[str, Any]]:
+    """A short run in which every observer rides along."""
+    short = ("duration_s=0.6", "push.0.start_s=0.2")
+    result = prepare(load_scenario("observer_tuning", short)).run()
+    assert result.trajectory is not None
+    return result.trajectory, result.summaries[0]
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[matplotlib.figure.Figure]:
+    """The figures that are saved, as they are then."""
+    saved: list[matplotlib.figure.Figure] = []
+    save = matplotlib.figure.Figure.savefig
+
+    def keep(figure: matplotlib.figure.Figure, *args: Any, **kwargs: Any) -> None:
+        saved.append(figure)
+        save(figure, *args, **kwargs)
+
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", keep)
+    return saved
+
+
+def plotted(path: Path, trajectory: Trajectory, summary: dict[str, Any], figures: list[Any]) -> Any:
+    plot_run(path / "plot.png", trajectory, "A title", summary, settle_band_deg=BAND, rate_limit_rad_s=LIMIT)
+    assert (path / "plot.png").read_bytes().startswith(b"\x89PNG")
+    return figures[-1]
+
+
+def labels(axes: Any) -> list[str]:
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def test_eleven_lines_on_one_page(
+    ridden: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+) -> None:
+    trajectory, summary = ridden
+    figure = plotted(tmp_path, trajectory, summary, figures)
+    width, height = figure.get_size_inches()
+    assert width <= PAGE[0]
+    assert height <= PAGE[1]
+    tilt, rate, error, _, command, *small = figure.axes
+    assert len(small) == len(OBSERVERS) - 3
+    assert min(axes.get_position().height * height for axes in figure.axes) > 0.7
+    assert "settle band" in labels(tilt)
+    assert "push" in labels(tilt)
+    assert "rate limit" in labels(command)
+    assert [line.get_ydata()[0] for line in command.lines[-2:]] == [LIMIT, -LIMIT]
+    assert len(error.lines) == 1 + 3
+    np.testing.assert_allclose(
+        error.lines[1].get_ydata(), trajectory["estimate/homogeneous/x2_rad_s"] - trajectory["x2_rad_s"]
+    )
+    shown = [text.split(" ")[0] for text in labels(rate)[2:]]
+    assert shown[0] == trajectory.observers[0]
+    assert shown == [name for name in trajectory.observers if name in shown]
+    named = {axes.get_title(loc="left") for axes in small}
+    assert named | set(shown) == set(trajectory.observers)
+    for line, name in zip(rate.lines[2:], shown, strict=True):
+        assert line.get_color() == hexadecimal(colour(name))
+
+
+def test_an_estimate_that_goes_astray_takes_no_axis(
+    ridden: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+) -> None:
+    trajectory, summary = ridden
+    columns = dict(trajectory.columns)
+    astray = columns["x2_rad_s"].copy()
+    astray[50:] = [*[1e300, -np.inf], *[np.nan] * (len(trajectory) - 52)]
+    for name in trajectory.observers[:3]:
+        columns[f"estimate/{name}/x2_rad_s"] = astray
+    layout = replace(
+        trajectory.layout, observers=trajectory.observers[:3], extra_signals=trajectory.layout.extra_signals[:3]
+    )
+    few = replace(trajectory, columns=columns, layout=layout)
+    true = trajectory["x2_rad_s"]
+    for axes in plotted(tmp_path, few, summary, figures).axes[1:3]:
+        low, high = axes.get_ylim()
+        assert low <= true.min()
+        assert true.max() <= high
+        assert high - low < 8.0 * np.ptp(true)
+
+
+def test_long_names_do_not_narrow_the_panels(
+    ridden: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+) -> None:
+    trajectory, summary = ridden
+    longest = sorted(OBSERVERS, key=len)[-3:]
+    figures_of = summary["companions"] | {"homogeneous": summary}
+    companions = {name: dict.fromkeys(figures_of[name], 0.0) for name in longest[1:]}
+    signals = tuple(trajectory.extra_signals(name) for name in longest)
+    layout = replace(trajectory.layout, observers=tuple(longest), extra_signals=signals)
+    few = replace(trajectory, layout=layout)
+    figure = plotted(tmp_path, few, {**figures_of[longest[0]], "companions": companions}, figures)
+    assert figure.axes[0].get_position().x0 < 0.15
+
+
+def test_a_picture_has_the_observers_colours(tmp_path: Path, figures: list[matplotlib.figure.Figure]) -> None:
+    lines = [Line([0.0, 1.0], [0.0, 1.0], "(10) ltv", color="ltv"), Line([0.0, 1.0], [1.0, 0.0], "other", color=3)]
+    draw(tmp_path / "it.png", Picture("it", "A title", [Panel("y", lines)]))
+    assert [line.get_color() for line in figures[-1].axes[0].lines] == [hexadecimal(colour("ltv")), "C3"]
+
+
+@pytest.mark.parametrize("ticks", [0, 1, 2])
+def test_a_run_of_no_length(
+    ridden: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure], ticks: int
+) -> None:
+    trajectory, _ = ridden
+    columns = {name: values[:ticks] for name, values in trajectory.columns.items()}
+    plotted(tmp_path, replace(trajectory, columns=columns), {}, figures)

@@ -1,0 +1,260 @@
+"""How a recording opens, read from its blueprint: what is switched on, axes, order, and whether the rig is in view."""
+
+from __future__ import annotations
+
+import copy
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.results.result import Outcome
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.studies.compare.comparison import prepare_comparison
+from cmg_mj.studies.save import summary_of
+from cmg_mj.visualization.recording import Run, write_recording
+from cmg_mj.visualization.recording.camera import FARTHEST, ball
+from cmg_mj.visualization.recording.run import best_observers, best_runs
+from cmg_mj.visualization.recording.signals import numbered
+from cmg_mj.visualization.recording.summary import ROW_TABLES, page
+from cmg_mj.visualization.recording.views import EYE
+
+SHORT = ("duration_s=0.6", "push.0.start_s=0.2")
+FIELD_OF_VIEW = math.radians(55.0)
+"""The viewer's, from top to bottom; views of the rig are wider than high."""
+
+
+@dataclass
+class View:
+    """One view of a blueprint.
+
+    Attributes:
+        name: Its title.
+        contents: The entities asked for.
+        hidden: Entities that are switched off, out of the legend.
+        grey: Entities that are switched off in the legend.
+        listed: Entities whose line is overridden in the legend, whether on or off.
+        axis: Range of y.
+        eye: Position and target of the camera.
+    """
+
+    name: str = ""
+    contents: list[str] = field(default_factory=list)
+    hidden: set[str] = field(default_factory=set)
+    grey: set[str] = field(default_factory=set)
+    listed: set[str] = field(default_factory=set)
+    axis: tuple[float, float] | None = None
+    eye: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+def views(path: Path) -> list[View]:
+    reader = RrdReader(path)
+    (store,) = reader.blueprints()
+    found: dict[str, View] = {}
+    for chunk in reader.stream(store=store):
+        matched = re.match(r"/view/([^/]+)/?(.*)", chunk.entity_path)
+        if not matched:
+            continue
+        view, below = found.setdefault(matched[1], View()), matched[2]
+        batch = chunk.to_record_batch()
+        values: dict[str, Any] = {name: batch.column(name).to_pylist()[0] for name in batch.schema.names if ":" in name}
+        overridden = re.sub(r"^ViewContents/overrides(/.*?)/visualizers.*", r"\1", below)
+        if "ViewBlueprint:display_name" in values:
+            (view.name,) = values["ViewBlueprint:display_name"]
+        if "ViewContents:query" in values:
+            view.contents = values["ViewContents:query"]
+        if values.get("EntityBehavior:visible") == [False]:
+            view.hidden.add(overridden)
+        if "SeriesLines:visible_series" in values:
+            view.listed.add(overridden)
+            if values["SeriesLines:visible_series"] == [False]:
+                view.grey.add(overridden)
+        if "ScalarAxis:range" in values:
+            (view.axis,) = values["ScalarAxis:range"]
+        for name in ("position", "look_target"):
+            if values.get(f"EyeControls3D:{name}"):
+                view.eye[name] = np.array(values[f"EyeControls3D:{name}"][0])
+    return list(found.values())
+
+
+def named(found: Sequence[View], name: str) -> list[View]:
+    return [view for view in found if view.name == name]
+
+
+def recorded(experiment: Experiment) -> Run:
+    result = experiment.run()
+    assert result.trajectory is not None
+    summary = summary_of(experiment, result)
+    return Run(experiment.scenario.observer.kind, result.trajectory, summary, result.outcomes[0])
+
+
+def write(path: Path, experiment: Experiment, runs: Sequence[Run]) -> Path:
+    write_recording(path, experiment.plant, runs, pushes=experiment.scenario.push, rate_limit_rad_s=4.7)
+    return path
+
+
+@pytest.fixture(scope="module")
+def ridden() -> tuple[Experiment, Run]:
+    """Every observer rides along."""
+    experiment = prepare(load_scenario("observer_tuning", SHORT))
+    return experiment, recorded(experiment)
+
+
+@pytest.fixture(scope="module")
+def compared() -> tuple[Experiment, list[Run]]:
+    """Every observer closes the loop."""
+    experiments = prepare_comparison(load_scenario("push_recovery", SHORT), list(OBSERVERS))
+    return experiments[0], [recorded(experiment) for experiment in experiments]
+
+
+# --- many observers ------------------------------------------------------------------------------------------
+
+
+def test_the_best_of_those_riding_along_are_on(ridden: tuple[Experiment, Run], tmp_path: Path) -> None:
+    experiment, run = ridden
+    found = views(write(tmp_path / "it.rrd", experiment, [run]))
+    few = best_observers(run)
+    assert few[0] == "homogeneous"
+    assert len(few) == 3
+    names = list(run.observers)
+    off = {f"{i:02}_{name}" for i, name in enumerate(names, 1) if name not in few}
+    for title, folder in (
+        ("Tilt rate [rad/s]", "rate_estimate"),
+        ("Estimation error of the tilt rate [rad/s]", "rate_error"),
+    ):
+        first, second = sorted(named(found, title), key=lambda view: len(view.grey))
+        assert first.hidden == {f"/homogeneous/{folder}/{part}" for part in off}
+        assert second.grey == first.hidden
+        assert f"/homogeneous/{folder}/**" in first.contents
+        assert not first.grey | second.hidden
+
+
+def test_the_best_runs_are_on(compared: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
+    experiment, runs = compared
+    found = views(write(tmp_path / "it.rrd", experiment, runs))
+    few = best_runs(runs)
+    on = {f"{i:02}_{run.name}" for i, run in enumerate(runs, 1) if run.name in few}
+    for title in ("Tilt, true [deg]", "Command, gimbal rate [rad/s]"):
+        first, second = sorted(
+            (view for view in named(found, title) if len(view.contents) > 2), key=lambda v: len(v.grey)
+        )
+        assert len(first.contents) == len(runs)
+        assert first.contents == second.contents == sorted(first.contents)
+        assert {entity.split("/")[1] for entity in set(first.contents) - first.hidden} == on
+        assert second.listed == set(second.contents)
+        assert {entity.split("/")[1] for entity in second.listed - second.grey} == on
+    lanes = {len(view.contents) for view in named(found, "Phase")}
+    assert lanes == {1, len(few), len(runs)}
+    text = page("", runs, experiment.scenario.push, experiment.scenario.metrics, "")
+    names = [line.split("|")[1].strip().strip("*") for line in text.splitlines() if line.startswith("| ")]
+    assert [name for name in names if name] == [run.name for run in runs] * len(ROW_TABLES)
+
+
+def test_tables_fit_their_view(compared: tuple[Experiment, list[Run]]) -> None:
+    """As wide as those that were looked at, in a window of 1400 pixels."""
+    experiment, runs = compared
+    text = page("", runs, experiment.scenario.push, experiment.scenario.metrics, "")
+    tables = [part.splitlines() for part in text.split("\n\n") if part.startswith("|")]
+    assert len(tables) == len(ROW_TABLES)
+    for lines in tables:
+        widths = [[len(cell.strip(" *")) for cell in line.split("|")] for line in lines if line.startswith("| ")]
+        assert np.max(widths, axis=0).sum() <= 76
+
+
+def test_a_noisy_observer_takes_no_axis(ridden: tuple[Experiment, Run], tmp_path: Path) -> None:
+    experiment, run = ridden
+    noisy = run.trajectory["estimate/finite_difference/x2_rad_s"]
+    for view in named(views(write(tmp_path / "it.rrd", experiment, [run])), "Tilt rate [rad/s]"):
+        assert view.axis is not None
+        low, high = view.axis
+        true = run.trajectory["x2_rad_s"]
+        assert low < true.min()
+        assert true.max() < high
+        assert high - low < 3.0 * np.ptp(true)
+        assert high - low < 0.15 * np.ptp(noisy)
+
+
+def test_a_fall_takes_no_axis_from_those_that_stand(compared: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
+    experiment, runs = compared
+    columns = {**runs[0].trajectory.columns, "x1_rad": runs[0].trajectory["x1_rad"] + 0.5}
+    trajectory = replace(runs[0].trajectory, columns=columns)
+    fallen = replace(runs[0], trajectory=trajectory, outcome=Outcome("fell", 0.6))
+    two = [fallen, runs[1]]
+    (view,) = named(views(write(tmp_path / "it.rrd", experiment, two)), "Tilt, true [deg]")
+    assert view.axis is not None
+    assert view.axis[1] < np.degrees(0.3)
+
+
+def test_numbers_put_paths_into_the_order_given() -> None:
+    names = [f"observer_{letter}" for letter in "zyxwvutsrqp"]
+    parts = numbered(names)
+    assert parts == sorted(parts)
+    assert numbered(["alone"]) == ["alone"]
+    assert numbered(["b", "a"]) == ["1_b", "2_a"]
+
+
+# --- the camera ----------------------------------------------------------------------------------------------
+
+
+def moved(model: mujoco.MjModel, scale: float, by: np.ndarray) -> mujoco.MjModel:
+    """The same rig, larger or smaller, elsewhere."""
+    for name in ("body_pos", "geom_pos", "geom_size", "geom_aabb", "site_pos", "jnt_pos", "body_ipos"):
+        getattr(model, name)[:] *= scale
+    model.body_pos[1] += by
+    return model
+
+
+def corners(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
+    """Of all boxes around geoms of moving bodies, (n, 3) [m]."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    signs = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0
+    boxes = [
+        data.geom_xpos[i]
+        + (model.geom_aabb[i, :3] + model.geom_aabb[i, 3:] * signs) @ data.geom_xmat[i].reshape(3, 3).T
+        for i in range(model.ngeom)
+        if model.geom_bodyid[i]
+    ]
+    return np.concatenate(boxes)
+
+
+@pytest.mark.parametrize("scenario", ["push_recovery", "single_gimbal"])
+@pytest.mark.parametrize(("scale", "by"), [(1.0, (0, 0, 0)), (10.0, (0, 0, 0)), (0.1, (0, 0, 0)), (1.0, (5, -3, 1))])
+def test_a_rig_is_framed_whole(
+    monkeypatch: pytest.MonkeyPatch, scenario: str, scale: float, by: tuple[float, float, float]
+) -> None:
+    plant = prepare(load_scenario(scenario, ())).plant
+    model = moved(copy.copy(plant.drawn_model), scale, np.array(by, float))
+    monkeypatch.setitem(plant.__dict__, "drawn_model", model)
+    qpos = plant.new_data().qpos[None]
+    rig = ball(plant, qpos)
+    points = corners(model, qpos[0])
+    eye = rig.centre + rig.radius * np.array(EYE)
+    gaze = (rig.centre - eye) / np.linalg.norm(rig.centre - eye)
+    to_points = points - eye
+    angles = np.arccos(to_points @ gaze / np.linalg.norm(to_points, axis=1))
+    assert angles.max() < FIELD_OF_VIEW / 2.0
+    assert angles.max() > 0.6 * FIELD_OF_VIEW / 2.0
+
+
+def test_a_rig_is_framed_where_it_goes() -> None:
+    plant = prepare(load_scenario("push_recovery", ())).plant
+    start = plant.new_data().qpos
+    fallen = start.copy()
+    fallen[plant.tilt] += math.radians(60.0)
+    seen = ball(plant, np.stack([start, fallen]))
+    for qpos in (start, fallen):
+        distance = np.linalg.norm(corners(plant.drawn_model, qpos) - seen.centre, axis=1)
+        assert distance.max() <= seen.radius * (1.0 + 1e-9)
+    assert ball(plant, np.full((3, len(start)), math.nan)).radius == ball(plant, start[None]).radius
+    assert ball(plant, start[None]).radius < seen.radius < FARTHEST * ball(plant, start[None]).radius

@@ -1,0 +1,307 @@
+"""What a user changes while it runs: observer, law, noise, e, pushes by button and by mouse; and what goes wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.studio import (
+    messages,
+    sim,  # pyright: ignore[reportAttributeAccessIssue]
+)
+
+from cmg_mj import load_scenario, prepare
+from cmg_mj.inputs.bundled import folder
+from cmg_mj.observers import OBSERVERS, Estimate
+from cmg_mj.visualization.studio.messages import Choose, PushNow, StartAgain
+from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, laws_of
+from tests.visualization.studio.session import Session, session
+from tests.visualization.studio.test_session import of_runner, same
+
+TIME, RATE, U, PUSH = 0, 1, 5, 7
+
+
+# --- pushes ------------------------------------------------------------------------------------------------
+
+
+def test_a_push_by_button_is_a_push_of_the_scenario() -> None:
+    with session("push=[]") as studio:
+        studio.run(1.0)
+        studio.send(PushNow(-0.8, 0.2))
+        studio.run(2.0)
+        pushed = ("duration_s=3.0", "push.0.start_s=1.0", "push.0.duration_s=0.2", "push.0.torque_n_m=-0.8")
+        expected = of_runner(*pushed)
+        same(studio.rows, expected)
+        assert np.count_nonzero(studio.rows[:, PUSH]) == 40
+
+
+def test_pushes_add_up() -> None:
+    with session("push.0.start_s=0.5", "push.0.torque_n_m=0.5") as studio:
+        studio.run(0.55)
+        studio.send(PushNow(0.3, 0.1), PushNow(0.3, 0.1))
+        studio.run(0.45)
+        rows = studio.rows
+        assert rows[rows[:, TIME] > 0.499][:, PUSH][:31].round(12).tolist() == [0.5] * 10 + [1.1] * 10 + [0.6] * 10 + [
+            0.0
+        ]
+
+
+def test_studios_mouse_reaches_the_rig_and_adds_up_with_a_push() -> None:
+    """The viewer sends a force on a body with every frame; the same torque from both sides is no torque."""
+
+    def tilts(button: float, mouse: float) -> np.ndarray:
+        with session("push=[]") as studio:
+            force = np.zeros((studio.live.model.nbody, 6))
+            force[studio.live.plant.frame, 4] = mouse  # about y, the tilt's axis, in the world's directions
+            state = int(mujoco.mjtState.mjSTATE_XFRC_APPLIED)
+            studio.run(0.5)
+            if button:
+                studio.send(PushNow(button, 0.2))
+            studio.send(messages.PerturbSnapshot(state=force.ravel(), state_sig=state))
+            studio.run(0.2)
+            studio.send(messages.PerturbSnapshot(state=0.0 * force.ravel(), state_sig=state))
+            studio.run(0.5)
+            assert not studio.live.stopped
+            return studio.rows[:, RATE]
+
+    nothing = tilts(0.0, 0.0)
+    by_mouse = tilts(0.0, 0.5)
+    assert np.abs(by_mouse - nothing).max() > 0.05
+    by_button = tilts(0.5, 0.0)
+    assert np.abs(by_mouse - by_button).max() < 0.3 * np.abs(by_button - nothing).max()
+    assert np.abs(tilts(-0.5, 0.5) - nothing).max() < 0.3 * np.abs(by_button - nothing).max()
+
+
+# --- observer, law, sensors, bias --------------------------------------------------------------------------
+
+
+def test_every_observer_takes_over_without_a_bump() -> None:
+    """In the middle of the push's swing: the command goes on as if nothing had been until the new one has converged."""
+    with session("push.0.start_s=0.5") as studio:
+        studio.run(0.62)
+        assert abs(studio.rows[-1, RATE]) > 0.3
+        undisturbed = of_runner("push.0.start_s=0.5")
+        for i, kind in enumerate(OBSERVERS):
+            studio.send(messages.LoadModelEvent())
+            studio.stepping.rows.clear()
+            studio.run(0.62)
+            studio.send(Choose({OBSERVER: kind}))
+            studio.run(2.0)
+            rows = studio.rows
+            same(rows[: 124 + 20], undisturbed)
+            alone = i == list(OBSERVERS).index("homogeneous")
+            assert np.array_equal(rows[:, U], undisturbed[: len(rows), U]) == alone, kind
+            assert studio.standing().settings[OBSERVER] == kind
+
+
+def test_the_scenarios_observer_has_its_parameters_again() -> None:
+    with session("observer.k1=40.0") as studio:
+        for kind in ("linear", "homogeneous"):
+            studio.run(0.3)
+            studio.send(Choose({OBSERVER: kind}))
+        assert studio.live.now.scenario.observer.parameters == {"k1": 40.0}
+        assert vars(studio.live.controller.parts[0].observer)["k1"] == 40.0
+
+
+def test_gains_and_feedback() -> None:
+    with session() as studio:
+        laws = laws_of(studio.live.base)
+        studio.send(Choose(laws["LQR"]), Choose({FEEDBACK: "truth"}))
+        studio.run(1.0)
+        said = studio.standing()
+        assert (said.law, said.settings[FEEDBACK]) == ("LQR", "truth")
+        same(studio.rows, of_runner("controller.lqr.state_cost=[1,1,1,1]", "controller.feedback=truth"))
+        studio.send(Choose(laws["Table 2"]))
+        assert studio.standing().gains == (35.0, 4.0, -1.0, 0.3)
+        studio.run(4.0)
+        studio.send(Choose(laws["LQG"]))
+        assert "lqg takes nothing of the observer" in studio.standing().note
+        studio.send(Choose({FEEDBACK: "observer"}), Choose(laws["LQG"]))
+        said = studio.standing()
+        assert (said.law, said.note) == ("LQG", "")
+        assert np.isfinite(studio.rows[-1, U + 1])
+        before = studio.rows[-2:, U + 1]
+        assert abs(before[1] - before[0]) < 1e-3  # the integrator goes on
+        studio.run(4.0)
+        assert not studio.live.stopped
+
+
+def test_noise_and_bias() -> None:
+    with session("push=[]", "plant.initial_tilt_deg=0.0") as studio:
+        studio.run(3.0)
+        studio.send(Choose({NOISE: 0.0}))
+        studio.run(3.0)
+        rows = studio.rows
+        noisy, quiet = (np.ptp(part[:, U]) for part in (rows[400:600], rows[-200:]))
+        assert quiet < 0.1 * noisy
+        studio.send(Choose({BIAS: 1.5}))
+        studio.run(12.0)
+        tilt = studio.data.qpos[studio.live.plant.tilt] - studio.live.plant.tilt_zero
+        assert np.degrees(tilt) == pytest.approx(-1.5, abs=0.1)
+
+
+def test_what_is_refused_changes_nothing_and_is_said() -> None:
+    with session() as studio:
+        studio.run(0.5)
+        for values, said in (
+            ({OBSERVER: "no_such"}, "no such observer"),
+            ({BIAS: 60.0}, "less than 45"),
+            ({NOISE: -1.0}, "noise_density_ug_rthz"),
+            ({OBSERVER: "tests.no_such_module:Observer"}, "cannot be imported"),
+            ({"controller.rate_hz": 100.0}, "stays 200 Hz"),
+        ):
+            studio.send(Choose(values))
+            assert said in studio.standing().note
+        studio.run(1.0)
+        same(studio.rows, of_runner("duration_s=2.5"))
+
+
+def test_studios_physics_settings_cannot_change_the_step() -> None:
+    with session() as studio:
+        studio.run(0.5)
+        opt = mujoco.MjSpec().compile().opt
+        opt.timestep = 0.001
+        studio.send(messages.MjOptionSnapshot(opt=opt))
+        assert studio.live.model.opt.timestep == 0.005
+        assert "the physics step stays 0.005 s" in studio.standing().note
+        assert [said.opt.timestep for said in studio.heard(messages.MjOptionSnapshot)][-1:] in ([], [0.005])
+        studio.send(messages.StepControlSnapshot(noise_scale=0.1))
+        assert "noise on the controls is not applied" in studio.standing().note
+
+
+# --- what goes wrong ---------------------------------------------------------------------------------------
+
+
+class Fragile:
+    """A user's observer that works for two seconds."""
+
+    def __init__(self, dt: float, **others: object) -> None:
+        self.dt = dt
+
+    def init(self, y: object) -> int:
+        return 0
+
+    def step(self, state: int, y: tuple, u: float) -> tuple[int, Estimate]:
+        if state == 400:
+            raise KeyError("gone")
+        return state + 1, Estimate(y[0], 0.0, y[1])
+
+
+FRAGILE = "tests.visualization.studio.test_changes:Fragile"
+
+
+def failed(studio: Session) -> None:
+    studio.run(0.5)
+    studio.send(Choose({OBSERVER: FRAGILE, FEEDBACK: "truth"}))
+    studio.run(3.0, every_s=0.004)
+
+
+def test_an_observer_that_raises_stops_the_controller_and_nothing_else() -> None:
+    with session() as studio:
+        failed(studio)
+        said = studio.standing()
+        assert said.stopped == "observer Fragile raised KeyError: 'gone' at t = 2.505 s"
+        assert studio.data.time == pytest.approx(3.5, abs=0.05)
+        assert np.all(studio.data.ctrl[studio.live.plant.axis.servos] == 0.0)
+        assert studio.rows[-1, TIME] < 2.51
+
+
+def test_history_goes_back_to_before_an_observer_failed() -> None:
+    with session() as studio:
+        failed(studio)
+        rows = studio.rows
+        studio.scrub(-160)  # 1.9 s
+        assert studio.standing().stopped == ""
+        del studio.stepping.rows[:]
+        studio.send(Choose({OBSERVER: "homogeneous"}))
+        studio.pause(False)
+        studio.run(3.0)
+        assert not studio.live.stopped
+        assert len(studio.rows) > 500
+        first = np.searchsorted(rows[:, TIME], studio.rows[0, TIME] - 1e-9)
+        same(studio.rows[:20], rows[first : first + 20])
+
+
+def test_a_stopped_controller_starts_again_with_another_observer() -> None:
+    with session("push=[]") as studio:
+        failed(studio)
+        studio.scrub(-100)  # 2.5 s: before its last sample
+        studio.pause(False)
+        studio.run(0.02)
+        assert studio.live.stopped
+        studio.send(Choose({OBSERVER: "linear"}))
+        assert studio.standing().stopped == ""
+        studio.run(1.0)
+        assert not studio.live.stopped
+        assert studio.rows[-1, TIME] > 3.4
+        studio.scrub(-20)
+        studio.pause(False)
+        rows = studio.rows
+        studio.run(0.2)
+        again = studio.rows[len(rows) :]
+        first = np.searchsorted(rows[:, TIME], again[0, TIME] - 1e-9)
+        common = min(len(again), len(rows) - first)
+        assert common > 10
+        same(again[:common], rows[first : first + common])
+
+
+def test_a_fall_is_said_and_reset_stands_up_again() -> None:
+    with session("push.0.start_s=0.5") as studio:
+        studio.send(PushNow(30.0, 0.5))
+        studio.run(3.0)
+        assert studio.standing().stopped.startswith("the rig fell at t = 0.")
+        studio.send(StartAgain())
+        studio.run(0.5)
+        assert "fell" in studio.standing().stopped
+        studio.send(messages.ResetEvent(key=-1))
+        studio.stepping.rows.clear()
+        studio.run(1.0)
+        same(studio.rows, of_runner("push.0.start_s=0.5"))
+
+
+def test_physics_that_diverges_is_paused() -> None:
+    with session() as studio:
+        studio.run(0.5)
+        studio.data.qvel[:] = 1e200
+        for _ in range(20):
+            studio.now += 0.02
+            studio.handle.sync()
+        assert studio.live.stopped == "the physics diverged at t = 0.505 s; reset"
+        paused = studio.heard(messages.StepControlSnapshot)[-1]
+        assert paused.pause_state == sim.PauseState.NORMAL_PAUSED
+        studio.send(messages.ResetEvent(key=-1))
+        studio.pause(False)
+        studio.stepping.rows.clear()
+        studio.run(1.0)
+        same(studio.rows, of_runner("duration_s=2.5"))
+
+
+# --- other rigs --------------------------------------------------------------------------------------------
+
+
+def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> None:
+    """A robot of one's own: here a heavier one, whose numbers the controller learns."""
+    for name in ("scissored_pair.xml", "cube.xml"):
+        (tmp_path / name).write_text((folder("models") / name).read_text(encoding="utf-8"), encoding="utf-8")
+    other = tmp_path / "scissored_pair.xml"
+    other.write_text(other.read_text(encoding="utf-8").replace('gravity="0 0 -9.81"', 'gravity="0 0 -9.6"'))
+    base = prepare(load_scenario("push_recovery"))
+    studio = Session(lambda path: base.with_values({"plant.model": path}) if path else base)
+    with studio.handle:
+        studio.run(0.5)
+        studio.send(messages.LoadModelEvent(path=str(tmp_path / "none.xml")))
+        assert "no such file" in studio.standing().note
+        studio.run(0.5)
+        assert studio.data.time > 1.0
+        studio.stepping.rows.clear()
+        studio.send(messages.LoadModelEvent(path=str(other)))
+        studio.run(3.0)
+        expected = of_runner(f"plant.model={other}")
+        same(studio.rows, expected)
+        assert not np.array_equal(expected, of_runner())
+        other.write_text("<mujoco/>", encoding="utf-8")
+        studio.send(messages.LoadModelEvent(path=str(other)))
+        assert "joint" in studio.standing().note
+        assert studio.data.time > 3.0

@@ -1,0 +1,141 @@
+"""The command: what it refuses, in one line; the web view on loopback alone; and both threads for real."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.visualization.studio import viewers
+from tests.command import COMMAND, cmg_mj, cmg_mj_process
+
+REFUSED = [
+    (["no_such"], "'no_such': no such file, nor a bundled one"),
+    (["push_recovery", "--set", "plant.no_such=1"], "plant.no_such"),
+    (["push_recovery", "--observer", "homogenous"], "did you mean 'homogeneous'"),
+    (["push_recovery", "--set", "plant.model=mine.xml"], "'mine.xml': no such file"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "said"), REFUSED)
+def test_a_bad_scenario_is_one_line(arguments: list[str], said: str, elsewhere: None) -> None:
+    assert said in cmg_mj("studio", *arguments).complaint
+
+
+def test_graphics_that_cannot_be_had_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a screen a window would end the process; Python 3.11 has no windows at all."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    said = cmg_mj("studio", "push_recovery", "--gfx", "native").complaint
+    assert said.startswith("--gfx native: MuJoCo Studio")
+    assert said.endswith("; take --gfx web")
+
+
+@pytest.mark.parametrize(
+    ("returned", "said"),
+    [
+        ((1, "x\nValueError: Target not found: out\nbye"), "(ValueError: Target not found: out)"),
+        ((134, ""), "(a window ends the process, status 134)"),
+    ],
+)
+def test_graphics_are_tried_in_a_process_of_their_own(
+    monkeypatch: pytest.MonkeyPatch, returned: tuple[int, str], said: str
+) -> None:
+    monkeypatch.setattr(sys, "version_info", (3, 12, 0))
+    tried = subprocess.CompletedProcess([], returned[0], "", returned[1])
+    monkeypatch.setattr(viewers.subprocess, "run", lambda *_, **__: tried)
+    with pytest.raises(InputError, match="take --gfx web") as error:
+        viewers.check_graphics("vulkan")
+    assert said in str(error.value)
+
+
+def free_port() -> int:
+    """Not one that another test, in another process, might look for at the same time."""
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return found.getsockname()[1]
+
+
+def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
+    """In a process of its own: Studio hooks into Python's log, warnings and exceptions for as long as one lasts."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        said = cmg_mj_process("studio", "push_recovery", "--port", port, cwd=tmp_path)
+    assert f"Port {port} is already in use" in said.complaint
+
+
+BOTH_THREADS = """
+import sys, time
+from mujoco.studio import app, messages, sim_history, viewer_protocol
+from cmg_mj import load_scenario, prepare
+from cmg_mj.visualization.studio import viewers
+from cmg_mj.visualization.studio.panel import Panel
+from cmg_mj.visualization.studio.stepping import Stepping
+opened = prepare(load_scenario("push_recovery"))
+plugins = [app.App(), Panel(), Stepping(lambda path: opened), sim_history.SimHistory()]
+with viewers.launched(viewer_protocol.ViewerConfig(gfx="web", http_port=int(sys.argv[1])), plugins) as handle:
+    handle.dispatch(messages.LoadModelEvent())
+    start = time.monotonic()
+    while time.monotonic() - start < 1.0:
+        assert handle.is_running()
+        handle.sync()
+    assert 0.3 < handle.data.time < 1.1, handle.data.time
+assert not handle.is_running()
+"""
+
+
+def test_both_threads_and_nobody_looking() -> None:
+    """The viewer in its thread: the simulation keeps the clock's pace, and the viewer ends when it is told."""
+    done = subprocess.run(
+        [sys.executable, "-c", BOTH_THREADS, str(free_port())], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_the_command_listens_on_loopback_alone_and_ends_with_ctrl_c(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [*COMMAND, "studio", "push_recovery", "--port", str(free_port())],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ | {"HOME": str(tmp_path)},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    try:
+        said = []
+        assert process.stdout is not None
+        for line in process.stdout:
+            said.append(line)
+            if "Model changed" in line:
+                break
+        assert any("http://localhost:" in line for line in said)
+        assert set(listening(process.pid)) == {"127.0.0.1"}
+        process.send_signal(signal.SIGINT)
+        rest, _ = process.communicate(timeout=30)
+        assert process.returncode == 0
+        assert "Traceback" not in rest
+    finally:
+        process.kill()
+
+
+def listening(pid: int) -> list[str]:
+    """The addresses at which a process listens."""
+    sockets = {os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir() if entry.is_symlink()}
+    found = []
+    for table in ("tcp", "tcp6"):
+        path = Path(f"/proc/{pid}/net/{table}")
+        for line in path.read_text().splitlines()[1:] if path.exists() else []:
+            fields = line.split()
+            if fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets:
+                address = bytes.fromhex(fields[1].split(":")[0])
+                found.append(socket.inet_ntop(socket.AF_INET, address[::-1]) if table == "tcp" else address.hex())
+    return found

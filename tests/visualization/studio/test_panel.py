@@ -1,0 +1,173 @@
+"""The panel, drawn for nobody: what it sends, and that what goes wrong in it stays in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from mujoco.studio import messages
+from mujoco.studio.dear_imgui import dear_imgui as imgui
+from mujoco.studio.implot import implot
+
+from cmg_mj.visualization.studio import panel as module
+from cmg_mj.visualization.studio.messages import Choose, PushNow, ShowAxis, Standing, StartAgain
+from cmg_mj.visualization.studio.panel import Panel
+from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, LAW, OBSERVER
+from tests.visualization.studio.session import session
+
+LQG = {"rate_hz": 200.0, "rate_limit_rad_s": 4.7, "angles": "measured", "trim_s": 0.0, "kind": "lqg"}
+
+
+class Screen:
+    """Stands in for Studio's viewer: takes what the panel sends, and draws frames that nobody sees."""
+
+    def __init__(self) -> None:
+        self.sent: list[messages.Message] = []
+        self.panel = Panel()
+        vars(self.panel)["_viewer"] = self
+
+    def send_to_sim(self, message: messages.Message) -> None:
+        self.sent.append(message)
+
+    def frame(self) -> None:
+        imgui.NewFrame()
+        self.panel.on_build_gui(messages.BuildGuiEvent())
+        imgui.Render()
+
+
+@pytest.fixture
+def screen() -> Iterator[Screen]:
+    context = imgui.CreateContext()
+    imgui.SetCurrentContext(context)
+    implot.set_imgui_context(context)
+    plots = implot.CreateContext()
+    implot.set_implot_context(plots)
+    io = imgui.GetIO()
+    io.DisplaySize = imgui.Vec2(1400.0, 900.0)
+    io.BackendFlags = int(io.BackendFlags) | int(imgui.BackendFlags.RendererHasTextures)
+    yield Screen()
+    implot.DestroyContext(plots)
+    imgui.DestroyContext(context)
+
+
+@pytest.fixture(scope="module")
+def standing() -> Standing:
+    with session() as studio:
+        studio.run(3.0)
+        return studio.standing()
+
+
+def pressed(label: str) -> Callable[..., bool]:
+    return lambda text, *_: text == label
+
+
+def picked(label: str, choice: str) -> Callable[..., tuple[bool, int]]:
+    def combo(text: str, place: int, options: list[str]) -> tuple[bool, int]:
+        return (True, options.index(choice)) if text == label else (False, place)
+
+    return combo
+
+
+def test_it_is_drawn_from_the_first_frame_on(
+    screen: Screen, standing: Standing, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines: dict[str, int] = {}
+    monkeypatch.setattr(module.implot, "PlotLine", lambda label, xs, ys: lines.update({label: len(xs)}))
+    screen.frame()
+    assert lines == {}
+    screen.panel.on_standing(standing)
+    for _ in range(3):
+        screen.frame()
+    assert not screen.panel._broken
+    assert lines == {"tilt": 607, "true": 607, "estimate": 607, "u": 607}
+    assert screen.sent == []
+
+
+@pytest.mark.parametrize(
+    ("widget", "does", "sends"),
+    [
+        ("Button", pressed("Push +"), PushNow(1.0, 0.1)),
+        ("Button", pressed("Push -"), PushNow(-1.0, 0.1)),
+        ("Combo", picked("observer", "adaptive"), Choose({OBSERVER: "adaptive"})),
+        ("Combo", picked("rate fed back", "the gyro's"), Choose({FEEDBACK: "fog"})),
+        ("Combo", picked("law", "LQG"), Choose({LAW: LQG})),
+    ],
+)
+def test_what_is_pressed_is_sent(
+    screen: Screen, standing: Standing, monkeypatch: pytest.MonkeyPatch, widget: str, does: Any, sends: messages.Message
+) -> None:
+    screen.panel.on_standing(standing)
+    screen.frame()
+    monkeypatch.setattr(module.imgui, widget, does)
+    screen.frame()
+    assert screen.sent == [sends]
+
+
+def test_of_several_axes_one_is_chosen(screen: Screen, standing: Standing, monkeypatch: pytest.MonkeyPatch) -> None:
+    lists: list[str] = []
+    combo = module.imgui.Combo
+
+    def listed(label: str, place: int, options: list[str]) -> tuple[bool, int]:
+        lists.append(label)
+        return combo(label, place, options)
+
+    monkeypatch.setattr(module.imgui, "Combo", listed)
+    screen.panel.on_standing(standing)
+    screen.frame()
+    assert lists == ["observer", "law", "rate fed back"]
+    with session(scenario="two_axes") as studio:
+        studio.run(0.5)
+        screen.panel.on_standing(studio.standing())
+    screen.frame()
+    assert lists[3:] == ["axis shown and pushed", *lists[:3]]
+    monkeypatch.setattr(module.imgui, "Combo", picked("axis shown and pushed", "pitch"))
+    screen.frame()
+    assert screen.sent == [ShowAxis("pitch")]
+    assert not screen.panel._broken
+
+
+def test_a_number_counts_once_it_is_typed_to_the_end(
+    screen: Screen, standing: Standing, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    screen.panel.on_standing(standing)
+    done = {"now": False}
+    typed = iter([1.0, 1.2, 1.25])
+    current = {"label": ""}
+
+    def number(label: str, value: float, *_: Any) -> tuple[bool, float]:
+        current["label"] = label
+        return (True, next(typed)) if label.startswith("e ") else (False, value)
+
+    def is_e() -> bool:
+        return current["label"].startswith("e ")
+
+    monkeypatch.setattr(module.imgui, "InputDouble", number)
+    monkeypatch.setattr(module.imgui, "IsItemActive", lambda: is_e() and not done["now"])
+    monkeypatch.setattr(module.imgui, "IsItemDeactivatedAfterEdit", lambda: is_e() and done["now"])
+    screen.frame()
+    screen.frame()
+    assert screen.sent == []
+    done["now"] = True
+    screen.frame()
+    assert screen.sent == [Choose({BIAS: 1.25})]
+
+
+def test_a_stopped_controller_is_said_and_can_be_started(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(module.imgui, "TextWrapped", said.append)
+    monkeypatch.setattr(module.imgui, "Button", pressed("Start it again"))
+    screen.panel.on_standing(Standing(title="x", stopped="observer Mine raised KeyError: 'gone' at t = 2 s"))
+    screen.frame()
+    assert "The controller has stopped: observer Mine raised KeyError: 'gone' at t = 2 s" in said
+    assert screen.sent == [StartAgain()]
+
+
+def test_what_goes_wrong_in_the_panel_ends_the_panel_alone(
+    screen: Screen, standing: Standing, caplog: pytest.LogCaptureFixture
+) -> None:
+    screen.panel.on_standing(Standing(settings={"observer.kind": "linear"}))  # incomplete
+    screen.frame()
+    assert "the panel has failed and is gone" in caplog.text
+    screen.panel.on_standing(standing)
+    screen.frame()

@@ -1,0 +1,199 @@
+"""The simulation's side of Studio against the runner, through Studio's own messages and with a clock of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mujoco.studio import messages
+
+from cmg_mj import load_scenario, prepare
+from cmg_mj.visualization.studio.messages import Choose, PushNow
+from cmg_mj.visualization.studio.settings import FEEDBACK, NOISE, OBSERVER
+from tests.visualization.studio.session import as_rows, session
+
+
+def of_runner(*settings: str, scenario: str = "push_recovery") -> np.ndarray:
+    trajectory = prepare(load_scenario(scenario, list(settings))).run().trajectory
+    assert trajectory is not None
+    return as_rows(trajectory)
+
+
+def same(rows: np.ndarray, expected: np.ndarray) -> None:
+    """Bit for bit, but for the time: MuJoCo adds steps up."""
+    np.testing.assert_allclose(rows[:, 0], expected[: len(rows), 0], atol=1e-9)
+    np.testing.assert_array_equal(rows[:, 1:], expected[: len(rows), 1:])
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ("duration_s=5.0",),
+        ("duration_s=5.0", "observer.kind=adaptive", "plant.gimbal_friction_n_m=0.05", "seed=3"),
+        ("duration_s=5.0", "plant.flywheel_imbalance_kg_m=1e-5", "plant.equilibrium_bias_deg=1.0"),
+        ("duration_s=5.0", "sensors.accelerometer.latency_s=0.003", "controller.feedback=fog"),
+        ("duration_s=5.0", "sensors.accelerometer.bandwidth_hz=94", "plant.lock_thrust_bearing=true"),
+    ],
+)
+def test_untouched_it_is_the_runners_trajectory(settings: tuple[str, ...]) -> None:
+    with session(*settings) as studio:
+        studio.run(5.0)
+        assert (studio.live.stopped, studio.live.note) == ("", "")
+        assert len(studio.rows) == 1000
+        same(studio.rows, of_runner(*settings))
+
+
+def test_whatever_the_clock_does() -> None:
+    """Large and small pieces of time, and a time in which nothing is due."""
+    with session() as studio:
+        for every in (0.0007, 0.05, 0.09, 0.004):
+            studio.run(1.0, every)
+            studio.handle.sync()
+        same(studio.rows, of_runner("duration_s=4.0"))
+
+
+def test_it_keeps_the_clocks_pace() -> None:
+    with session() as studio:
+        for _ in range(100):
+            studio.now += 0.01
+            studio.handle.sync()
+        assert studio.data.time == pytest.approx(1.0, abs=0.006)
+        studio.send(messages.StepControlSnapshot(speed=10.0))
+        for _ in range(100):
+            studio.now += 0.01
+            studio.handle.sync()
+        assert studio.data.time == pytest.approx(1.1, abs=0.006)
+        (said,) = studio.heard(messages.StepControlSnapshot)
+        assert said.speed_measured == pytest.approx(10.0, abs=5.0)
+        studio.now += 60.0  # a machine that sleeps for a minute does not run it to catch up
+        studio.handle.sync()
+        assert studio.data.time < 1.5
+
+
+def test_pause_and_single_steps_change_nothing() -> None:
+    with session() as studio:
+        studio.run(1.0)
+        studio.pause()
+        here = studio.data.time
+        studio.now += 5.0
+        studio.handle.sync()
+        assert studio.data.time == here
+        for _ in range(3):
+            studio.send(messages.SingleStepEvent())
+            studio.handle.sync()
+        assert studio.data.time == pytest.approx(here + 3 * studio.live.timestep)
+        studio.pause(False)
+        studio.run(2.0)
+        same(studio.rows, of_runner("duration_s=4.0"))
+
+
+@pytest.mark.parametrize("key", [-1, None])
+def test_reset_is_the_scenarios_start_with_the_wheels_at_speed(key: int | None) -> None:
+    with session() as studio:
+        studio.run(1.5)
+        studio.stepping.rows.clear()
+        studio.send(messages.ResetEvent(key=key))
+        assert studio.data.time == 0.0
+        for cube in studio.live.plant.cubes:
+            assert studio.data.qvel[cube.flywheel] == cube.speed != 0.0
+        studio.run(3.0)
+        same(studio.rows, of_runner("duration_s=4.0"))
+
+
+def test_reset_to_a_keyframe_is_that_keyframe() -> None:
+    with session("plant.initial_tilt_deg=3.0") as studio:
+        studio.run(0.5)
+        studio.send(messages.ResetEvent(key=0))
+        assert studio.data.qpos[studio.live.plant.tilt] == studio.live.plant.tilt_zero
+        studio.run(0.5)
+        assert not studio.live.stopped
+
+
+def test_reload_begins_as_the_file_is_now() -> None:
+    settings = ["observer.kind=linear"]
+    with session() as studio:
+        studio.stepping._opened = lambda path: prepare(load_scenario("push_recovery", settings))
+        studio.run(1.0)
+        studio.send(Choose({NOISE: 0.0}))
+        studio.stepping.rows.clear()
+        studio.send(messages.LoadModelEvent(path=""))
+        studio.run(3.0)
+        same(studio.rows, of_runner("duration_s=3.0", *settings))
+        settings[0] = "observer.kind=no_such"
+        studio.send(messages.LoadModelEvent(path=""))
+        assert "no such observer" in studio.standing().note
+        before = studio.data.time
+        studio.run(0.5)
+        assert studio.data.time == pytest.approx(before + 0.5)
+
+
+@pytest.mark.parametrize("back", [-1, -40, -161, -10_000])
+def test_history_brings_the_controller_back(back: int) -> None:
+    """A push has come and gone since; what happens again is what happened, bit for bit."""
+    with session("push.0.start_s=2.0") as studio:
+        studio.run(3.0, every_s=0.004)
+        studio.scrub(back)
+        time = studio.data.time
+        assert time == pytest.approx(max(0.01, 3.0 + 0.01 * back), abs=0.011)  # one step in two is kept
+        assert len(studio.standing().ticks) == round(time / 0.005)
+        studio.pause(False)
+        rows = len([row for row in studio.rows if row[0] < time - 1e-9])
+        del studio.stepping.rows[rows:]
+        studio.run(2.0)
+        assert studio.live.note == ""
+        same(studio.rows, of_runner("duration_s=6.0", "push.0.start_s=2.0"))
+
+
+def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
+    """A push by hand that has not been yet is not to come; what is gone on with has a history of its own."""
+    with session("push=[]") as studio:
+        studio.run(1.0, every_s=0.004)
+        studio.send(PushNow(0.8, 0.1))
+        studio.run(1.0, every_s=0.004)
+        for frames, seconds in ((-150, 1.5), (-50, 1.0)):  # to 0.5 s, then to 1.5 s
+            studio.scrub(frames)
+            time = studio.data.time
+            assert time == pytest.approx(2.0 + 0.01 * frames, abs=0.011)
+            studio.stepping.rows[:] = [row for row in studio.stepping.rows if row[0] < time - 1e-9]
+            studio.pause(False)
+            studio.run(seconds, every_s=0.004)
+        same(studio.rows, of_runner("push=[]"))
+        assert len(studio.rows) == pytest.approx(500, abs=3)
+
+
+def test_history_brings_back_what_was_chosen() -> None:
+    with session() as studio:
+        studio.run(1.0, every_s=0.004)
+        studio.send(Choose({OBSERVER: "adaptive"}))
+        studio.run(1.0, every_s=0.004)
+        studio.send(Choose({FEEDBACK: "truth"}), Choose({"plant.equilibrium_bias_deg": 2.0}), PushNow(0.5, 0.2))
+        ipos = studio.live.model.body_ipos.copy()
+        studio.run(1.0, every_s=0.004)
+        rows = studio.rows
+        studio.scrub(-50)  # 2.5 s
+        assert studio.standing().settings[FEEDBACK] == "truth"
+        studio.scrub(-125)  # 1.75 s
+        time = studio.data.time
+        settings = studio.standing().settings
+        assert (settings[OBSERVER], settings[FEEDBACK]) == ("adaptive", "observer")
+        studio.scrub(-50)
+        assert studio.standing().settings[FEEDBACK] == "truth"  # and forward again: nothing is forgotten by looking
+        studio.scrub(-125)
+        del studio.stepping.rows[:]
+        studio.pause(False)
+        studio.run(0.2)
+        assert not np.array_equal(studio.live.model.body_ipos, ipos)
+        again = studio.rows
+        then = rows[(rows[:, 0] > time - 1e-9) & (rows[:, 0] < 2.0 - 1e-9)]
+        assert len(again) > 30
+        np.testing.assert_array_equal(again[: len(then)], then[: len(again)])
+
+
+def test_what_is_no_longer_remembered_starts_afresh_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmg_mj.visualization.studio.history.MOST_SAMPLES", 300)
+    with session() as studio:
+        studio.run(2.0, every_s=0.004)
+        studio.scrub(-50)
+        studio.pause(False)
+        studio.run(1.0)
+        assert "nothing is remembered of t = 1.5" in studio.standing().note
+        assert studio.live.stopped == ""
