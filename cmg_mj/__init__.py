@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from cmg_mj.errors import InputError, RunStopped
     from cmg_mj.observers import OBSERVERS, Estimate, Measurement, Observer, make_observer
     from cmg_mj.observers.reduced_model import ReducedModel
-    from cmg_mj.plant.mounting import Mounted
+    from cmg_mj.plant.mounting import Mounted, mount
     from cmg_mj.plant.plant import Plant, load_plant
-    from cmg_mj.plant.plant.mounting import mount
     from cmg_mj.replay.log_replay import Replayed, replay_log
     from cmg_mj.replay.logs import Log, read_log
     from cmg_mj.results.result import Outcome, Result

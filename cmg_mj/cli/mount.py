@@ -72,9 +72,9 @@ def mount(
     import mujoco
 
     from cmg_mj.observers.registry import observer_class
+    from cmg_mj.plant.mounting import mount as mounted_on
     from cmg_mj.plant.mounting.mounted import check_target, with_scenario
     from cmg_mj.plant.plant import load_plant
-    from cmg_mj.plant.plant.mounting import mount as mounted_on
     from cmg_mj.studies.push_limits.mount_report import scenario_text, told, write_scenario
     from cmg_mj.studies.push_limits.prospects import LOW_CEILING_DEG, prospects, scale_that_suffices
     from cmg_mj.studies.push_limits.recoverable_states import ceiling

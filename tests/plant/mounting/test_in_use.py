@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cmg_mj.plant.plant.mounting import mount
 
+from cmg_mj.plant.mounting import mount
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.gymnasium_env import ScissoredPair

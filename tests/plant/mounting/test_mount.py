@@ -8,10 +8,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from cmg_mj.plant.plant.mounting import mount
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import find_axis
+from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.plant.tilt_line import SupportLine
 from cmg_mj.simulation.experiment import prepare

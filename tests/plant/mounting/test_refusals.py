@@ -8,9 +8,9 @@ from typing import Any
 
 import mujoco
 import pytest
-from cmg_mj.plant.plant.mounting import mount
 
 from cmg_mj.errors import InputError
+from cmg_mj.plant.mounting import mount
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import EXAMPLES
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from cmg_mj.plant.plant.mounting import mount
 
+from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.mounting.fall_check import falls_with
 from cmg_mj.plant.tilt_line import HingeLine, SupportLine
 from cmg_mj.simulation.experiment import Experiment, prepare

@@ -8,10 +8,9 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from cmg_mj.plant.plant.mounting import mount
 
 from cmg_mj.errors import InputError
-from cmg_mj.plant.mounting import Mounted
+from cmg_mj.plant.mounting import Mounted, mount
 from cmg_mj.plant.mounting.fall_check import falls_with
 from cmg_mj.plant.plant import Plant, load_plant
 

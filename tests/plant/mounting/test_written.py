@@ -8,9 +8,9 @@ from pathlib import Path
 
 import mujoco
 import pytest
-from cmg_mj.plant.plant.mounting import mount
 
 from cmg_mj.errors import InputError
+from cmg_mj.plant.mounting import mount
 from cmg_mj.studies.push_limits.prospects import scale_that_suffices
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import EXAMPLES, ROBOTS

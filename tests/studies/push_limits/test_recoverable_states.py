@@ -8,12 +8,12 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from cmg_mj.plant.plant.mounting import mount
 from scipy.integrate import quad
 
 from cmg_mj.controllers.laws import TABLE_2_GAINS, carried_over_gains
 from cmg_mj.controllers.laws.state_feedback import closed_loop_poles
 from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, bearable
