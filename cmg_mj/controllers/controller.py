@@ -21,10 +21,12 @@ from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.sensors.timing import steps_until, whole_steps
 
 Feedback = Literal["observer", "fog", "truth"]
-Angles = Literal["measured", "estimated"]
+AngleSource = Literal["measured", "estimated"]
 
 
-CONTROLLER_OPTIONS = frozenset({"seed", "worlds", "feedback", "angles", "companions", "trim_s", "axis"})
+CONTROLLER_OPTIONS = frozenset(
+    {"seed", "worlds", "feedback", "angle_source", "open_loop_observers", "bias_trim_s", "axis"}
+)
 """Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
 
 RIDES_ALONG = 20
@@ -44,7 +46,7 @@ class Tick(NamedTuple):
     u: Scalar
     x_e: Scalar
     estimates: Sequence[Sequence[Scalar]]
-    """The observer's estimate (x1, x2, x3, its extra signals), then those of the companions."""
+    """The observer's estimate (x1, x2, x3, its extra signals), then those of the open-loop observers."""
 
 
 class Controller:
@@ -63,15 +65,15 @@ class Controller:
         seed: Seed of the sensors' noise.
         worlds: The number of one world, on floats, or the numbers of many, on arrays.
         feedback: Which rate the law uses: the observer's, the gyro's or the true one.
-        angles: Whether the law uses y1, y2 as (8) says or the estimates, as the text after (10) says.
-        companions: Observers that ride along open loop, by name.
-        trim_s: For so long from the start, the integrator is held at the value that the observer's bias estimate asks
-            for, k_e1/k_e4 e, instead of finding it by integration [s].
+        angle_source: Whether the law uses y1, y2 as (8) says or the estimates, as the text after (10) says.
+        open_loop_observers: Observers that ride along open loop, by name.
+        bias_trim_s: For so long from the start, the integrator is held at k_e1/k_e4 e, the value that the observer's
+            bias estimate asks for, instead of finding it by integration [s].
         backlash: Between the servos' motors and the gimbals, one for all worlds or (n_worlds,) [rad].
         axis: The number of the rig's axis, on which the noise depends.
 
     Attributes:
-        extra_signals: Names of what the observer, then each companion, estimates beyond x.
+        extra_signals: Names of what the observer, then each open-loop observer, estimates beyond x.
         trimmed_until: The physics step from which on the integrator goes free.
         trim_part: Which part of the estimate is the bias that it is trimmed with.
         trim_gain: The gain on it [s].
@@ -93,9 +95,9 @@ class Controller:
         seed: int = 0,
         worlds: int | Sequence[int] = 0,
         feedback: Feedback = "observer",
-        angles: Angles = "measured",
-        companions: Mapping[str, Observer] | None = None,
-        trim_s: float = 0.0,
+        angle_source: AngleSource = "measured",
+        open_loop_observers: Mapping[str, Observer] | None = None,
+        bias_trim_s: float = 0.0,
         backlash: Scalar = 0.0,
         axis: int = 0,
     ) -> None:
@@ -112,16 +114,16 @@ class Controller:
         self.turns_gimbals = True
         """Whether `update` does: with other axes, what a turn couples comes in between."""
         self.feedback: Feedback = feedback
-        self.angles: Angles = angles
-        self.companions = dict(companions or {})
+        self.angle_source: AngleSource = angle_source
+        self.open_loop_observers = dict(open_loop_observers or {})
         self._single = isinstance(worlds, int)
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         self._commanding: Commanding = Commanding(law, self._single, timestep)
-        self._observing: Observing = Observing([observer, *self.companions.values()], self._single, timestep)
+        self._observing: Observing = Observing([observer, *self.open_loop_observers.values()], self._single, timestep)
         self.extra_signals = self._observing.extra_signals
-        self.trim_s = trim_s
-        self.trim_part, self.trim_gain = trim_of(trim_s, law, self.extra_signals[0])
-        self.trimmed_until = steps_until(trim_s, timestep)
+        self.bias_trim_s = bias_trim_s
+        self.trim_part, self.trim_gain = trim_of(bias_trim_s, law, self.extra_signals[0])
+        self.trimmed_until = steps_until(bias_trim_s, timestep)
         self.backlash = backlash
         self.gimbal_angle = GimbalAngle(self.directions, self.gimbal_zero)
         self.reset()
@@ -159,7 +161,7 @@ class Controller:
 
         Args:
             observer: Another one for the loop. It starts from the next tick's sample and takes over `RIDES_ALONG` ticks
-                later; companions start again with it.
+                later; open-loop observers start again with it.
             law: Another law of the same control period, which starts from the next tick's sample.
             sensors: Others, of the same rates. All sensors start afresh, with their noise from its beginning.
             feedback: Which rate the law uses.
@@ -176,7 +178,7 @@ class Controller:
             self._sampled, self.sensors = sampled, sensors
             self.step = None  # all of them sample at the next update, due or not
         if observer is not None:
-            observers = [observer, *self.companions.values()]
+            observers = [observer, *self.open_loop_observers.values()]
             if self.tick is None:
                 self._observing = Observing(observers, self._single, self.timestep)
             else:
@@ -256,7 +258,7 @@ class Controller:
         estimate = estimates[0]
         if step < self.trimmed_until:
             self._commanding.trim(self.trim_gain * estimate[self.trim_part])
-        x1, x2, x3 = (y1, estimate[1], y2) if self.angles == "measured" else estimate[:3]
+        x1, x2, x3 = (y1, estimate[1], y2) if self.angle_source == "measured" else estimate[:3]
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else rate
         if not self._single:

@@ -176,7 +176,7 @@ class Joining(Observing):
 
 
 class _Lost:
-    """A companion that raised: nothing is known any more."""
+    """An open-loop observer that raised: nothing is known any more."""
 
     def __init__(self, width: int) -> None:
         self.width = width

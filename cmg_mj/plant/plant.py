@@ -300,8 +300,8 @@ class Plant:
             tilt: The tilt estimate; by default that for this rig's accelerometers.
             backlash: Between the servos' motors and the gimbals; by default this rig's [rad].
             processor: What takes the decisions in the controller's place, if anything does.
-            **options: Options of `Controller`, such as seed, feedback and companions; whatever else is given is a
-                parameter of the observer, if that is given by name.
+            **options: Options of `Controller`, such as seed and feedback; whatever else is given is a parameter of the
+                observer, if that is given by name.
 
         Returns:
             The controller, a `Controller`; of a rig of several axes an `AxesController` of one an axis, all made alike,

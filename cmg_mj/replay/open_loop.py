@@ -16,7 +16,7 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
     """What the observer makes of the recorded measurements y1, y2, angular acceleration (if recorded) and command u.
 
     The loop may have been closed on anything else: the observer only rides along. From the first row on, its
-    estimates are bitwise those of a companion in the same run.
+    estimates are bitwise those of an open-loop observer in the same run.
 
     Args:
         observer: The observer; its sample period must be the trajectory's.

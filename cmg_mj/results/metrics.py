@@ -17,7 +17,7 @@ class Metrics:
     """Running sums over the ticks of one or many worlds. Rows that are NaN (after a world's end) do not count.
 
     Args:
-        observers: The observer in the loop, then the companions.
+        observers: The observer in the loop, then the open-loop observers.
         n_worlds: How many worlds.
         dt: Control period [s].
         pushes: Torques from outside.
@@ -148,7 +148,7 @@ class Metrics:
         n = self._count[world]
         tilt, command = (_rms(self._squares[name][world], n) for name in ("tilt", "command"))
         loop = self.observers[0]
-        companions = {
+        open_loop_observers = {
             name: {**self._rate_summary(name, world), **self._found_summary(name, world)} for name in self.observers[1:]
         }
         references = {name: self._rate_summary(name, world) for name in self.references}
@@ -162,7 +162,7 @@ class Metrics:
             "command_rms_rad_s": command,
             "command_saturated_fraction": float(self._saturated[world] / n) if n else None,
             **self._found_summary(loop, world),
-            **({"companions": companions} if companions else {}),
+            **({"open_loop_observers": open_loop_observers} if open_loop_observers else {}),
             **({"references": references} if references else {}),
         }
 

@@ -24,7 +24,7 @@ class Ended(Protocol):
 
 FIRST = {
     "observer": "string",
-    "rides_along_in": "string",
+    "in_loop_of": "string",
     "world": "int64",
     "seed": "int64",
     "outcome": "string",
@@ -32,7 +32,7 @@ FIRST = {
     "end_time_s": "float64",
     "reason": "string",
 }
-"""Columns before the figures, and their types. `rides_along_in` names the observer in the loop, for those that are not.
+"""Columns before the figures, and their types. `in_loop_of` names the observer in the loop, for those that are not.
 
 Figures of a world that did not stand to the end are those until then: `stood` is false, and no mean may count them.
 """
@@ -50,7 +50,7 @@ def world_rows(
 
     Args:
         loop: The observer in the loop.
-        who: The same, or one of its companions or references.
+        who: The same, or one of its open-loop observers or references.
         seed: The run's seed.
         worlds: Their numbers, (n_worlds,).
         outcomes: How each ended, (n_worlds,).
@@ -65,7 +65,7 @@ def world_rows(
         rows.append(
             {
                 "observer": who,
-                "rides_along_in": None if who == loop else loop,
+                "in_loop_of": None if who == loop else loop,
                 "world": number,
                 "seed": seed,
                 "outcome": outcome.kind,
@@ -79,7 +79,7 @@ def world_rows(
 
 
 def riding_along(summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Of a summary the figures of everything that rode along, by name: companions, then references."""
+    """Of a summary the figures of everything that rode along, by name: open-loop observers, then references."""
     return {name: figures for nested in RODE_ALONG for name, figures in summary.get(nested, {}).items()}
 
 

@@ -52,7 +52,7 @@ class Result:
         summaries: Each world's numbers, (n_worlds,).
         trajectory: All ticks, if they were kept.
         seconds: Simulated time of the longest world [s].
-        observers: The observer in the loop, then the companions.
+        observers: The observer in the loop, then the open-loop observers.
         seed: Seed of the sensors' noise.
         worlds: The worlds' numbers, (n_worlds,).
         driver: Who called the controller, or was it.
@@ -77,33 +77,33 @@ class Result:
         """Which worlds fell, (n_worlds,)."""
         return np.array([outcome.fell for outcome in self.outcomes])
 
-    def values(self, key: str, companion: str | None = None) -> np.ndarray:
+    def values(self, key: str, estimator: str | None = None) -> np.ndarray:
         """One number of every world's summary.
 
         Args:
             key: The summary's key, such as `velocity_rms_error_rad_s`.
-            companion: Whose, of what rode along: a companion, `zero` or `mems_gyro`; None for the observer in the loop.
+            estimator: An open-loop observer or a baseline (`zero`, `mems_gyro`); None for the observer in the loop.
 
         Returns:
             (n_worlds,); NaN for a world that did not stand to the end, or has no such number.
 
         Raises:
-            InputError: There is no such key or companion.
+            InputError: There is no such key or estimator.
         """
         of = self.summaries
-        if companion is not None:
+        if estimator is not None:
             riding = riding_along(self.summaries[0])
-            if companion not in riding:
-                raise InputError(f"companion {companion!r}: did not ride along; {nearest(companion, riding)}")
-            of = [riding_along(summary)[companion] for summary in of]
+            if estimator not in riding:
+                raise InputError(f"{estimator!r}: no open-loop observer of this run; {nearest(estimator, riding)}")
+            of = [riding_along(summary)[estimator] for summary in of]
         if key not in of[0]:
             raise InputError(f"{key!r}: not in the summary; {nearest(key, of[0])}")
         numbers = np.array([math.nan if s[key] is None else s[key] for s in of], dtype=float)
         return np.where(self.stood, numbers, math.nan)
 
-    def mean(self, key: str, companion: str | None = None) -> float | None:
+    def mean(self, key: str, estimator: str | None = None) -> float | None:
         """Mean of `values` over the worlds that have one; None if no world has."""
-        values = self.values(key, companion)
+        values = self.values(key, estimator)
         known = values[np.isfinite(values)]
         return statistics.fmean(known) if len(known) else None
 
@@ -117,7 +117,7 @@ class Result:
         """Every world kept: a row per observer and world, those that rode along after the one in the loop.
 
         Returns:
-            Columns `observer`, `rides_along_in`, `world`, `seed`, `outcome`, `stood`, `end_time_s`, `reason`, then
+            Columns `observer`, `in_loop_of`, `world`, `seed`, `outcome`, `stood`, `end_time_s`, `reason`, then
             every figure of the summary, null where there is none. Where `stood` is false they are those until the end.
         """
         names = [self.observers[0], *riding_along(self.summaries[0])]

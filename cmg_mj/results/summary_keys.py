@@ -51,7 +51,7 @@ KEYS = {
 
 AXES = "axes"
 """The part of a summary that holds the figures of each axis of several, by name."""
-RODE_ALONG = ("companions", "references")
+RODE_ALONG = ("open_loop_observers", "references")
 """Parts that hold the figures of what rode along, by name."""
 NESTED = (*RODE_ALONG, AXES)
 """Parts that hold figures of others by name."""

@@ -75,11 +75,11 @@ def _markdown(summaries: Sequence[Mapping[str, Any]], columns: Sequence[str], ce
 
 def _judged(summaries: Sequence[Mapping[str, Any]]) -> list[str]:
     """The columns in which one observer is the best."""
-    return [key for key in columns_of(summaries) if any(key in summary["less_best"] for summary in summaries)]
+    return [key for key in columns_of(summaries) if any(key in summary["minus_best"] for summary in summaries)]
 
 
 def _has_differences(summaries: Sequence[Mapping[str, Any]]) -> bool:
-    return any(less["interval"] for summary in summaries for less in summary["less_best"].values())
+    return any(less["interval"] for summary in summaries for less in summary["minus_best"].values())
 
 
 def _mean(summary: Mapping[str, Any], key: str) -> list[str]:
@@ -89,7 +89,7 @@ def _mean(summary: Mapping[str, Any], key: str) -> list[str]:
 
 def _difference(summary: Mapping[str, Any], key: str) -> list[str]:
     """A difference to the best as a table shows it, and half its interval."""
-    less = summary["less_best"].get(key)
+    less = summary["minus_best"].get(key)
     return ["best"] if less is None else _with_half(difference(key, less["mean"]), key, less["interval"])
 
 
@@ -104,7 +104,7 @@ def comparison_note(summaries: Sequence[Mapping[str, Any]]) -> str:
         "Push window: from a push's start to 1 s after its end.",
         "Fit: 1 - RMS error / RMS of the true velocity; 1 is the truth, 0 an estimate of zero.",
     ]
-    riding = next((summary["rides_along_in"] for summary in summaries if "rides_along_in" in summary), None)
+    riding = next((summary["in_loop_of"] for summary in summaries if "in_loop_of" in summary), None)
     if riding:
         lines.append(
             f"What closes no loop rides along in that of {riding}, the best:\n"

@@ -53,7 +53,7 @@ class Layout:
     """Whose columns a trajectory has, in their order.
 
     Attributes:
-        observers: The observer in the loop, then the companions: columns `estimate/<observer>/<signal>`.
+        observers: The observer in the loop, then the open-loop observers: columns `estimate/<observer>/<signal>`.
         extra_signals: For each of them the names of what it estimates beyond x.
         joints: In the order of qpos; a hinge has the columns `angle/<joint>_rad` and `rate/<joint>_rad_s`.
         kinds: Of each joint `hinge`, `slide`, `ball` or `free`: see `POSITIONS` and `RATES`; none if all are hinges.
@@ -132,7 +132,7 @@ class Trajectory:
 
     @property
     def observers(self) -> tuple[str, ...]:
-        """Names of the observers whose estimates are recorded: the one in the loop, then the companions."""
+        """Names of the observers whose estimates are recorded: the one in the loop, then the open-loop observers."""
         return self.layout.observers
 
     def extra_signals(self, observer: str) -> tuple[str, ...]:

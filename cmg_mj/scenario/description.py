@@ -53,7 +53,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: RigFacts, ax
             if ":" in scenario.observer.kind
             else []
         ),
-        ("companions", ", ".join(scenario.companion_names()) or "none"),
+        ("open loop", ", ".join(scenario.open_loop_names()) or "none"),
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
         *([("", f"accelerometer: {assignments(imperfections)}")] if imperfections else []),
         *([("compare", f"{', '.join(compare.names())}; {compare.worlds} worlds")] if compare else []),
@@ -76,7 +76,7 @@ def _law_rows(
     """What the law is, what it is fed, and of the papers' what it makes of the reduced model."""
     controller, law = scenario.controller, design.law
     at = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
-    fed = f"tilt rate from the {controller.feedback}, {controller.angles} angles"
+    fed = f"tilt rate from the {controller.feedback}, {controller.angle_source} angles"
     if isinstance(law, StateFeedback):
         loop = closed_loop(scenario, law, rig.reduced)
         yield "law", f"K_e = {number(law.gains)} {at}"

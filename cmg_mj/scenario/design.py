@@ -53,9 +53,9 @@ class Design:
         """The observer in the loop, fresh."""
         return self.scenario.observer.make(*self.given)
 
-    def companions(self) -> dict[str, Observer]:
+    def open_loop_observers(self) -> dict[str, Observer]:
         """Those that ride along, by name, fresh."""
-        return {name: make_observer(name, *self.given) for name in self.scenario.companion_names()}
+        return {name: make_observer(name, *self.given) for name in self.scenario.open_loop_names()}
 
     def rehearse(self, worlds: int | None = None) -> None:
         """Try the law and every observer once: one that cannot work is found before a run, not at its first sample.
@@ -67,7 +67,7 @@ class Design:
             InputError: One raised an exception or returned something else than it must.
         """
         tried = [("observer.kind =", self.scenario.observer.kind, self.observer())]
-        tried += [("companions:", name, observer) for name, observer in self.companions().items()]
+        tried += [("open_loop_observers:", name, observer) for name, observer in self.open_loop_observers().items()]
         with np.errstate(all="ignore"):
             for field, name, observer in tried:
                 try:
@@ -100,7 +100,7 @@ def design(scenario: Scenario, rig: RigFacts) -> Design:
         _check_law(controller)
         made = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
         made.rehearse()
-        trim_of(controller.trim_s, made.law, extra_signals(made.observer()))
+        trim_of(controller.bias_trim_s, made.law, extra_signals(made.observer()))
     except InputError as error:
         raise InputError(located(scenario._where, str(error))) from error
     return made
@@ -108,7 +108,7 @@ def design(scenario: Scenario, rig: RigFacts) -> Design:
 
 def _check_observers(scenario: Scenario) -> None:
     """The observers exist, and the parameters of the one in the loop are of their types: no text for a number."""
-    named = [("companions", name) for name in scenario.companion_names()]
+    named = [("open_loop_observers", name) for name in scenario.open_loop_names()]
     named += [("compare.observers", name) for name in (scenario.compare.names() if scenario.compare else ())]
     for field, name in named:
         try:
@@ -129,7 +129,7 @@ def _check_law(controller: ControllerSettings) -> None:
     if given and not OF_LAWS.may_take(kind, "gains"):
         raise InputError(f"controller.{given}: {kind} takes no gains; leave it out")
     try:
-        unused = () if needs(law) == NEEDS else ("feedback", "angles")
+        unused = () if needs(law) == NEEDS else ("feedback", "angle_source")
     except InputError as error:
         raise InputError(f"controller.kind = {kind!r}: {error}") from error
     for name in unused:

@@ -183,7 +183,7 @@ def of_axis(scenario: Scenario, axis: str) -> Scenario:
         return scenario.model_copy(update={"axes": {}})
     fields = as_fields(scenario.model_copy(update={"axes": {}}))
     where = f"{scenario._where}, [axes.{axis}]".removeprefix(", ")
-    for whole in ("rate_hz", "against_turning"):
+    for whole in ("rate_hz", "compensate_turning"):
         if whole in own.controller:
             raise InputError(located(where, f"controller.{whole}: is the same on all axes; set it in [controller]"))
     for name, section in as_fields_of(own).items():

@@ -46,7 +46,7 @@ def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float)
         controller.pop("lqr", None)  # they have been solved for
     known = [*ControllerSettings.model_fields, *law]
     fields["controller"] = {name: controller[name] for name in dict.fromkeys(known) if name in controller}
-    fields["companions"] = scenario.companion_names()
+    fields["open_loop_observers"] = scenario.open_loop_names()
     fields["observer"] = {
         "kind": scenario.observer.kind,
         **_parameters(scenario.observer.parameters, design.observer(), GIVEN),
@@ -78,10 +78,10 @@ def with_axes(fields: dict[str, Any], scenario: Scenario, axes: Mapping[str, dic
     found = {name: {section: own[section] for section in OF_AN_AXIS} for name, own in axes.items()}
     for own in found.values():
         own["plant"] = {name: value for name, value in own["plant"].items() if name in AxisPlant.model_fields}
-        whole = ("rate_hz", "against_turning")
+        whole = ("rate_hz", "compensate_turning")
         own["controller"] = {name: value for name, value in own["controller"].items() if name not in whole}
     given = TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
-    as_given = {name: given[name] for name in ("controller", "observer", "companions")}
+    as_given = {name: given[name] for name in ("controller", "observer", "open_loop_observers")}
     return {**fields, **as_given, "axes": found}
 
 

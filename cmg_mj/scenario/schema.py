@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.controllers.controller import Angles, Feedback
-from cmg_mj.controllers.laws import Law, carried_over_gains, lqr_gains, make_law
+from cmg_mj.controllers.controller import AngleSource, Feedback
+from cmg_mj.controllers.laws import Law, lqr_gains, make_law, scaled_gains
 from cmg_mj.inputs.field_types import STRICT, Duration, Instant, Line, NonNegative, Positive, Rate
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
@@ -38,20 +38,20 @@ class ControllerSettings(BaseModel):
     """A name that `cmg-mj list laws` shows, or package.module:Class."""
     rate_hz: Rate = 200.0
     """Control ticks a second; divides the physics rate."""
-    gains: tuple[float, float, float, float] | Literal["carried_over"] | None = None
+    gains: tuple[float, float, float, float] | Literal["scaled"] | None = None
     """K_e on [x1, x2, x3, x_e], of a law that takes gains; Table 2's if neither gains nor lqr is given;
-    `carried_over`: Table 2's by the rig's time scale and authority."""
+    `scaled`: Table 2's by the rig's time scale and authority."""
     lqr: LqrSettings | None = None
     """Weights to solve for the gains instead."""
     rate_limit_rad_s: Positive = 4.7
     """Largest gimbal rate."""
     feedback: Feedback = "observer"
     """Which rate the law uses."""
-    angles: Angles = "measured"
+    angle_source: AngleSource = "measured"
     """Whether the law uses the measured angles, as (8), or the estimated ones, as the text after (10)."""
-    against_turning: bool = True
+    compensate_turning: bool = True
     """Several axes: whether the gimbals also turn against what a turn about the vertical couples."""
-    trim_s: Instant = 0.0
+    bias_trim_s: Instant = 0.0
     """For so long from the start the integrator is held where the observer's bias estimate asks for it."""
 
     @model_validator(mode="after")
@@ -69,8 +69,8 @@ class ControllerSettings(BaseModel):
         """The law for a reduced model and the sensors' noise."""
         parameters = self.parameters
         if self.gains is not None:
-            carried = self.gains == "carried_over"
-            parameters["gains"] = carried_over_gains(model) if carried else self.gains
+            carried = self.gains == "scaled"
+            parameters["gains"] = scaled_gains(model) if carried else self.gains
         elif self.lqr is not None:
             parameters["gains"] = lqr_gains(model, self.lqr.state_cost, self.lqr.input_cost)
         return make_law(self.kind, 1.0 / self.rate_hz, self.rate_limit_rad_s, model, noise, **parameters)
@@ -163,7 +163,7 @@ class Scenario(BaseModel):
     plant: PlantSettings = Field(default_factory=PlantSettings)
     controller: ControllerSettings = Field(default_factory=ControllerSettings)
     observer: ObserverSettings = Field(default_factory=ObserverSettings)
-    companions: list[str] | Literal["all"] = Field(default_factory=list)
+    open_loop_observers: list[str] | Literal["all"] = Field(default_factory=list)
     """Observers that ride along open loop, with their default parameters."""
     sensors: Sensors = Field(default_factory=Sensors)
     axes: dict[str, AxisSettings] = Field(default_factory=dict)
@@ -207,7 +207,7 @@ class Scenario(BaseModel):
         fields: dict[str, Any] = {name: getattr(self.controller, name) for name in ANY_LAWS}
         return self.model_copy(update={"controller": ControllerSettings(**fields, kind=kind), "axes": axes})
 
-    def companion_names(self) -> list[str]:
-        """The companions, spelled out, without the observer itself."""
-        names = list(OBSERVERS) if self.companions == "all" else list(self.companions)
+    def open_loop_names(self) -> list[str]:
+        """The open-loop observers, spelled out, without the observer itself."""
+        names = list(OBSERVERS) if self.open_loop_observers == "all" else list(self.open_loop_observers)
         return [name for name in dict.fromkeys(names) if name != self.observer.kind]

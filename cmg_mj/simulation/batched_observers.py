@@ -122,7 +122,7 @@ def _batches(runs: Sequence[Run]) -> Iterator[list[int]]:
 def _common(run: Run) -> Any:
     """What runs of one batch have in common; None for one that has to be by itself."""
     first = run.experiments[0]
-    if first.axes or first.scenario.companion_names() or len({repr(_structure(e)) for e in _once(run.experiments)}) > 1:
+    if first.axes or first.scenario.open_loop_names() or len({repr(_structure(e)) for e in _once(run.experiments)}) > 1:
         return None
     physics = first.plant.model.opt
     fields = {name: value for name, value in _structure(first).items() if not _of_observer(name)}

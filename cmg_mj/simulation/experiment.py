@@ -70,10 +70,10 @@ class Experiment:
 
     @property
     def observer_names(self) -> list[str]:
-        """The observer in the loop, then the companions; of several axes the first one's."""
+        """The observer in the loop, then the open-loop observers; of several axes the first one's."""
         if self.axes:
             return self.axes[0].observer_names
-        return [self.scenario.observer.kind, *self.scenario.companion_names()]
+        return [self.scenario.observer.kind, *self.scenario.open_loop_names()]
 
     def controller(self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, **others: Any) -> Any:
         """A fresh controller.
@@ -103,9 +103,9 @@ class Experiment:
             seed=self.scenario.seed,
             worlds=worlds,
             feedback=settings.feedback,
-            angles=settings.angles,
-            trim_s=settings.trim_s,
-            companions=self.design.companions(),
+            angle_source=settings.angle_source,
+            bias_trim_s=settings.bias_trim_s,
+            open_loop_observers=self.design.open_loop_observers(),
             processor=processor,
         )
 
@@ -113,7 +113,7 @@ class Experiment:
         """The controllers of the axes as one."""
         if len(controllers) == 1:
             return controllers[0]
-        against = self.scenario.controller.against_turning
+        against = self.scenario.controller.compensate_turning
         return AxesController(controllers, self.plant.turning if against else None, self.scenario.sensors.mems_gyro)
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:

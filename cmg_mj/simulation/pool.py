@@ -66,7 +66,7 @@ def structure(scenario: Scenario, design: Design) -> dict[str, str]:
     }
     _, model, noise = design.given
     found["the reduced model"] = repr(model)
-    for observer in (scenario.observer.kind, *scenario.companion_names()):
+    for observer in (scenario.observer.kind, *scenario.open_loop_names()):
         if takes_noise(observer):
             found[f"the sensors' noise, which {observer} is told,"] = repr(noise)
     if "noise" in OF_LAWS.takes(law):

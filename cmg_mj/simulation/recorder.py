@@ -29,7 +29,7 @@ class Piece(NamedTuple):
     fog: np.ndarray
     u: np.ndarray
     estimates: list[dict[str, np.ndarray]]
-    """Of the observer in the loop and each companion, signal by signal."""
+    """Of the observer in the loop and each open-loop observer, signal by signal."""
     columns: list[np.ndarray]
     """The trajectory's after its time, in its order."""
     ended: np.ndarray | None
@@ -41,7 +41,7 @@ class Rows:
 
     Args:
         plants: The rigs, one a world.
-        observers: The observer in the loop, then the companions.
+        observers: The observer in the loop, then the open-loop observers.
         extras: What each of them estimates beyond x.
         metrics: Takes every piece.
         references: What the estimates are judged beside.

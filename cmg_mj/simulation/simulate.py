@@ -56,7 +56,7 @@ def simulate(
         plant: The rig; or one a world, which may differ in numbers but not in structure.
         controller: A fresh controller, made for one world or for as many as there are plants.
         duration_s: Simulated time [s].
-        observers: Names of the controller's observer and companions; or of each axis' if they differ.
+        observers: Names of the controller's observer and open-loop observers; or of each axis' if they differ.
         pushes: Torques from outside; of many worlds a torque may be an array (n_worlds,).
         swings: Others that swing.
         settings: What counts as settled and fallen.

@@ -26,11 +26,11 @@ ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
 WORDS = {"model": "model", "gimbals": "y2, u", "acceleration": "acceleration"}
 
 
-def errors(result: Result, companion: str | None = None) -> list[str]:
+def errors(result: Result, open_loop_observer: str | None = None) -> list[str]:
     """Error over the run and in the push window, with 95 % intervals."""
     cells = []
     for key in (ERROR, PUSH_ERROR):
-        values = result.values(key, companion)
+        values = result.values(key, open_loop_observer)
         known = values[np.isfinite(values)]
         interval = mean_interval(known) if len(known) else None
         cells.append("-" if interval is None else f"{interval.mean:.4f} ±{interval.half:.4f}")

@@ -108,7 +108,7 @@ def alone() -> Iterator[Case]:
     yield Case("skew half a period", [{"skew_s": PERIOD_S / 2.0}])
     yield Case("skew four fifths of a period", [{"skew_s": 0.8 * PERIOD_S}])
     yield Case("skew one period", [{"skew_s": PERIOD_S}])
-    yield Case("skew one period, estimated angles", [{"skew_s": PERIOD_S}], ("controller.angles=estimated",))
+    yield Case("skew one period, estimated angles", [{"skew_s": PERIOD_S}], ("controller.angle_source=estimated",))
     yield Case("skew one period, inner held back for it", [{"latency_s": PERIOD_S}])
     yield Case(f"bias instability {INSTABILITY_UG:g} ug", [{"bias_instability_ug": INSTABILITY_UG}])
     yield Case("low-pass 94 Hz", [{"bandwidth_hz": 94.0}])
@@ -123,7 +123,7 @@ def together(parts: int) -> Iterator[Case]:
     yield Case("0.2 deg, half a period", small, UNBALANCED)
     yield Case("0.2 deg, half a period, levelled", [levelled(fields) for fields in small], UNBALANCED)
     yield Case("1 deg, one period, levelled", [levelled(fields) for fields in large], UNBALANCED)
-    estimated = (*UNBALANCED, "controller.angles=estimated")
+    estimated = (*UNBALANCED, "controller.angle_source=estimated")
     yield Case("the same, estimated angles", [levelled(fields) for fields in large], estimated)
     late = {"skew_s": 0.0, "latency_s": PERIOD_S}
     yield Case("the same, inner held back", [levelled(fields) | late for fields in large], UNBALANCED)

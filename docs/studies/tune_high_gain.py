@@ -25,7 +25,7 @@ ERROR = "velocity_rms_error_rad_s"
 D_INF = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 PHI2 = (1.0, 3.0, 10.0)
 
-experiment = prepare(load_scenario("observer_tuning", [f"seed={SEED}", "companions=[]"]))
+experiment = prepare(load_scenario("observer_tuning", [f"seed={SEED}", "open_loop_observers=[]"]))
 push = experiment.scenario.push[0]
 whole = experiment.run_many(WORLDS).trajectory
 assert whole is not None

@@ -153,7 +153,7 @@ def loop(worlds: int, observer: str) -> str:
     """The loop closed, roll pushed with 2 N m for 0.1 s: how far yaw goes, and pitch, which nobody pushes."""
     rows = []
     settings = [
-        *("controller.gains=carried_over", "plant.initial_tilt_deg=0", "plant.equilibrium_bias_deg=0", "duration_s=6"),
+        *("controller.gains=scaled", "plant.initial_tilt_deg=0", "plant.equilibrium_bias_deg=0", "duration_s=6"),
         *("push.0.axis=roll", "push.0.start_s=2", "push.0.torque_n_m=2"),
     ]
     for wheels, slow in (("alike", {}), ("one 10 % slow", SLOW)):

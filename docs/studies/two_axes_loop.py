@@ -80,7 +80,7 @@ def fastest_turn(rates: Sequence[float] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.
     ):
         row = [name]
         for rate in rates:
-            experiment = two_axes(f"plant.turn_rate_rad_s={rate}", f"controller.against_turning={against}")
+            experiment = two_axes(f"plant.turn_rate_rad_s={rate}", f"controller.compensate_turning={against}")
             derived = experiment.plant.turning
             experiment.plant.__dict__["turning"] = derived._replace(wheels=sign * derived.wheels)
             outcome = experiment.run(keep_trajectory=False).outcomes[0]

@@ -67,7 +67,7 @@ def ride_along_figures(result: Result, first: int = 0) -> dict[str, float]:
     group = result.summaries[first : first + GROUP]
     figures = {}
     for name in OBSERVERS:
-        parts = [s["companions"][name] if name in s.get("companions", {}) else s for s in group]
+        parts = [s["open_loop_observers"][name] if name in s.get("open_loop_observers", {}) else s for s in group]
         figures[name] = statistics.fmean(part["velocity_rms_error_rad_s"] for part in parts)
         figures[f"{name}, push window"] = statistics.fmean(part["velocity_rms_error_push_rad_s"] for part in parts)
     return figures

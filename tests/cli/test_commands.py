@@ -132,7 +132,7 @@ def test_check_says_what_a_scenario_amounts_to(quick: str) -> None:
         "K_e = [35, 4, -1, 0.3] at 200 Hz, at most 4.7 rad/s",
         "stable with the reduced model and its true state, slowest pole -0.203 1/s",
         "homogeneous  k1=20  k2=150  alpha=0.85",
-        "companions  none",
+        "open loop   none",
         "accelerometer 200 Hz, encoder 200 Hz, fog 200 Hz",
         "1 N m from 0.2 s to 0.3 s",
     ):
@@ -158,7 +158,7 @@ def test_json_is_alone_on_standard_output(quick: str) -> None:
 
 
 def test_a_person_reads_a_table_and_where_the_files_are(quick: str) -> None:
-    said = cmg_mj("run", quick, "--set", "companions=['ltv']")
+    said = cmg_mj("run", quick, "--set", "open_loop_observers=['ltv']")
     assert said.status == 0
     assert said.out.startswith("Quick: homogeneous, seed 0\n")
     assert "\x1b" not in said.out
@@ -178,7 +178,7 @@ def test_a_person_reads_a_table_and_where_the_files_are(quick: str) -> None:
 
 def test_a_plot_and_a_title_that_looks_like_markup() -> None:
     title = r"[/red] [bold]5[/bold] {x} %s $\no$"
-    Path("my.toml").write_text(f"title = '{title}'\nduration_s = 0.3\ncompanions = ['ltv', 'linear']")
+    Path("my.toml").write_text(f"title = '{title}'\nduration_s = 0.3\nopen_loop_observers = ['ltv', 'linear']")
     said = cmg_mj("run", "my.toml", "--plot", "--out", "it")
     assert said.status == 0
     assert said.out.startswith(f"{title}: homogeneous, seed 0\n")

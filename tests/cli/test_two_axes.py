@@ -34,7 +34,7 @@ def test_an_axis_has_what_it_is_given_and_the_rest_of_what_holds_for_all() -> No
     roll, pitch = (of_axis(scenario, name) for name in ("roll", "pitch"))
     assert roll.observer.parameters == {"k1": 25}
     assert (pitch.observer.kind, pitch.observer.parameters) == ("linear", {})
-    assert (roll.controller.gains, pitch.controller.gains) == ("carried_over", (1.0, 2.0, 3.0, 4.0))
+    assert (roll.controller.gains, pitch.controller.gains) == ("scaled", (1.0, 2.0, 3.0, 4.0))
     assert (roll.sensors.accelerometer.latency_s, pitch.sensors.accelerometer.latency_s) == (0.005, 0.0)
     assert (roll.plant.equilibrium_bias_deg, pitch.plant.equilibrium_bias_deg) == (0.5, -0.3)
     assert roll.plant.turn_rate_rad_s == pitch.plant.turn_rate_rad_s == 1.0
@@ -63,9 +63,9 @@ def test_what_a_run_writes_reruns_and_has_every_axis(tmp_path: Path) -> None:
     assert {"plot-roll.png", "plot-pitch.png", "recording.rrd"} <= {path.name for path in place.iterdir()}
 
 
-def test_with_companions_it_reruns_with_the_same_columns(tmp_path: Path) -> None:
-    """An axis' own observer is no companion of its own; of the other axis it may be."""
-    experiment = two_axes("axes.roll.observer.kind=linear", "companions=['homogeneous', 'kalman']")
+def test_with_open_loop_observers_it_reruns_with_the_same_columns(tmp_path: Path) -> None:
+    """An axis' own observer is no open-loop observer of its own; of the other axis it may be."""
+    experiment = two_axes("axes.roll.observer.kind=linear", "open_loop_observers=['homogeneous', 'kalman']")
     experiment.save(tmp_path / "scenario.toml")
     first, again = (
         run.run().trajectory for run in (experiment, prepare(load_scenario(str(tmp_path / "scenario.toml"))))
@@ -184,7 +184,7 @@ def test_the_command_prints_each_axis(tmp_path: Path, monkeypatch: pytest.Monkey
         (["axes.roll=3"], "axes.roll = 3: must be a section"),
         (["axes=3"], "axes = 3: must be a section"),
         (["axes.roll.controller.rate_hz=100"], "[axes.roll]: controller.rate_hz: is the same on all axes"),
-        (["axes.roll.controller.against_turning=false"], "controller.against_turning: is the same on all axes"),
+        (["axes.roll.controller.compensate_turning=false"], "controller.compensate_turning: is the same on all axes"),
         (
             ["swing=[{frequency_hz=15.0, axis='roll'}]", "controller.rate_hz=100"],
             "at most 10 Hz at controller.rate_hz = 100",

@@ -322,7 +322,7 @@ def test_observer_gets_the_sample_and_the_command_held_since_the_last() -> None:
 @pytest.mark.parametrize("feedback", ["observer", "fog", "truth"])
 def test_law_acts_on_the_signals_it_was_told_to(feedback: Any, angles: Any) -> None:
     """(8) with y1, y2 or their estimates; the rate from the observer, the gyro (here off by 0.02) or the truth."""
-    of = controller(Script(ESTIMATES.__getitem__), feedback=feedback, angles=angles)
+    of = controller(Script(ESTIMATES.__getitem__), feedback=feedback, angle_source=angles)
     of.sensors = Sensors(
         IDEAL_SENSORS.accelerometer,
         IDEAL_SENSORS.encoder,
@@ -339,11 +339,11 @@ def test_law_acts_on_the_signals_it_was_told_to(feedback: Any, angles: Any) -> N
         x_e -= DT * x3
 
 
-def test_companions_see_the_same_and_change_nothing() -> None:
-    companion = Script(lambda k: Estimate(9.0, -9.0 * k, 9.0))
+def test_open_loop_observers_see_the_same_and_change_nothing() -> None:
+    open_loop_observer = Script(lambda k: Estimate(9.0, -9.0 * k, 9.0))
     alone, observer = ticks(controller(Script(ESTIMATES.__getitem__))), Script(ESTIMATES.__getitem__)
-    together = ticks(controller(observer, companions={"hers": companion}))
-    assert companion.asked == observer.asked
+    together = ticks(controller(observer, open_loop_observers={"hers": open_loop_observer}))
+    assert open_loop_observer.asked == observer.asked
     assert [tick.u for tick in together] == [tick.u for tick in alone]
     assert [tick.estimates[1].x2 for tick in together] == [0.0, -9.0, -18.0, -27.0]
 
@@ -382,7 +382,7 @@ def test_names_of_signals_are_checked(names: Any) -> None:
 
 def test_trim_holds_the_integrator_where_the_bias_asks_for_it() -> None:
     """u = 0 at y1 = -e needs k_e4 x_e = k_e1 e; from the end of the trim on, x_e' = -x3 as ever."""
-    found = ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, 0.01 * k)), trim_s=2.0 * DT))
+    found = ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, 0.01 * k)), bias_trim_s=2.0 * DT))
     expected = [0.0, 35.0 / 0.3 * 0.01]
     expected += [expected[-1] - DT * found[1].y2, expected[-1] - DT * (found[1].y2 + found[2].y2)]
     assert [tick.x_e for tick in found] == pytest.approx(expected, rel=1e-12)
@@ -391,11 +391,11 @@ def test_trim_holds_the_integrator_where_the_bias_asks_for_it() -> None:
 
 def test_trim_needs_a_bias_and_an_integrator() -> None:
     with pytest.raises(
-        InputError, match=r"controller\.trim_s = 1: needs an observer in the loop that estimates the bias"
+        InputError, match=r"controller\.bias_trim_s = 1: needs an observer in the loop that estimates the bias"
     ):
-        controller(Script(ESTIMATES.__getitem__), trim_s=1.0)
-    with pytest.raises(InputError, match=r"controller\.trim_s = 1: the gain on the integrator is zero"):
-        controller(WithBias(ESTIMATES.__getitem__), trim_s=1.0, law=StateFeedback(DT, (35.0, 4.0, 1.0, 0.0)))
+        controller(Script(ESTIMATES.__getitem__), bias_trim_s=1.0)
+    with pytest.raises(InputError, match=r"controller\.bias_trim_s = 1: the gain on the integrator is zero"):
+        controller(WithBias(ESTIMATES.__getitem__), bias_trim_s=1.0, law=StateFeedback(DT, (35.0, 4.0, 1.0, 0.0)))
 
 
 def test_reset_starts_the_same_run_again() -> None:
@@ -442,7 +442,7 @@ def test_an_estimate_that_is_no_number_stops_the_run(value: float) -> None:
 def test_an_estimated_angle_that_is_no_number_stops_the_run(estimate: Estimate) -> None:
     """If the law uses the estimated angles."""
     with pytest.raises(RunStopped):
-        ticks(controller(Script(lambda k: estimate), angles="estimated"))
+        ticks(controller(Script(lambda k: estimate), angle_source="estimated"))
 
 
 def test_an_observer_that_raises_stops_the_run_by_name() -> None:
@@ -484,7 +484,7 @@ def test_recorded_commands_are_the_papers_law(kind: str) -> None:
 
 def test_a_scenario_may_feed_back_the_estimated_angles() -> None:
     """As the text after (10) has it: the whole estimate, the integrator too."""
-    trajectory = run("duration_s=0.5", "push=[]", "observer.kind=ltv", "controller.angles=estimated")
+    trajectory = run("duration_s=0.5", "push=[]", "observer.kind=ltv", "controller.angle_source=estimated")
     x1, x2, x3 = (trajectory[f"estimate/ltv/{name}"] for name in ("x1_rad", "x2_rad_s", "x3_rad"))
     u, x_e = trajectory["u_rad_s"], trajectory["x_e_rad_times_s"]
     np.testing.assert_allclose(u, -(35.0 * x1 + 4.0 * x2 - 1.0 * x3 + 0.3 * x_e), rtol=0.0, atol=1e-12)

@@ -93,7 +93,11 @@ def test_plant(given: str, fragments: list[str]) -> None:
 
 
 @table(
-    ("typo", "rate = 200", "controller.rate: no such field; did you mean 'rate_hz'? allowed: against_turning, angles"),
+    (
+        "typo",
+        "rate = 200",
+        "controller.rate: no such field; did you mean 'rate_hz'? allowed: compensate_turning, angles",
+    ),
     ("no rate", "rate_hz = 0", f"controller.rate_hz = 0: {RATE}"),
     ("a negative rate", "rate_hz = -200", f"controller.rate_hz = -200: {RATE}"),
     ("nan", "rate_hz = nan", "controller.rate_hz = nan: must be a finite number greater than or equal to 0.1"),
@@ -193,7 +197,7 @@ def test_conditions_of_the_theorems(given: str, complaint: str) -> None:
 
 def test_trimming_without_a_bias_estimate() -> None:
     said = check("[controller]\ntrim_s = 1.0").complaint
-    assert said.startswith("my.toml: controller.trim_s = 1: needs an observer in the loop that estimates the bias")
+    assert said.startswith("my.toml: controller.bias_trim_s = 1: needs an observer in the loop that estimates the bias")
 
 
 @table(
@@ -237,12 +241,24 @@ def test_observer(given: str, fragments: list[str]) -> None:
 
 @table(
     ("observer that is text", "observer = 'ltv'", "observer = 'ltv': must be a section, written under [observer]"),
-    ("companions in words", "companions = 'al'", "companions = 'al': must be a list of names in quotes or 'all'"),
-    ("companions in numbers", "companions = [3]", "companions = [3]: must be a list of names in quotes or 'all'"),
+    (
+        "open-loop observers in words",
+        "open_loop_observers = 'al'",
+        "open_loop_observers = 'al': must be a list of names in quotes or 'all'",
+    ),
+    (
+        "open-loop observers in numbers",
+        "open_loop_observers = [3]",
+        "open_loop_observers = [3]: must be a list of names in quotes or 'all'",
+    ),
     ("no world", "[compare]\nworlds = 0", "compare.worlds = 0: must be a whole number greater than or equal to 1"),
     ("nothing to compare", "[compare]\nobservers = []", "compare.observers = []: must"),
     ("unknown to compare", "[compare]\nobservers = ['lt']", "compare.observers: 'lt': no such observer; did you mean"),
-    ("unknown companion", "companions = ['lt']", "companions: 'lt': no such observer; did you mean 'ltv'?"),
+    (
+        "unknown open-loop observer",
+        "open_loop_observers = ['lt']",
+        "open_loop_observers: 'lt': no such observer; did you mean 'ltv'?",
+    ),
     ("typo in a sensor", "[sensors.encodr]", "sensors.encodr: no such field; did you mean 'encoder'?"),
     ("typo in a sensor's field", "[sensors.fog]\nrate = 1", "sensors.fog.rate: no such field; did you mean 'rate_hz'?"),
     (
@@ -310,7 +326,7 @@ def test_observer(given: str, fragments: list[str]) -> None:
         "metrics.settle_band: no such field; did you mean 'settle_band_deg'?",
     ),
 )
-def test_companions_sensors_metrics(given: str, fragments: list[str]) -> None:
+def test_open_loop_observers_sensors_metrics(given: str, fragments: list[str]) -> None:
     assert_in_order(["my.toml: ", *fragments], check(given).complaint)
 
 

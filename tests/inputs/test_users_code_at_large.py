@@ -91,17 +91,19 @@ def kind(of: type) -> str:
     return f"{__name__}:{of.__name__}"
 
 
-@pytest.mark.parametrize("companion", [ChangesTheTilt, ChangesTheCommand])
-def test_a_companion_cannot_change_what_others_see(companion: type) -> None:
+@pytest.mark.parametrize("open_loop_observer", [ChangesTheTilt, ChangesTheCommand])
+def test_an_open_loop_observer_cannot_change_what_others_see(open_loop_observer: type) -> None:
     """The observer in the loop and all that is recorded are as without it; it itself is lost."""
     settings = ["duration_s=0.4", "push=[]"]
     alone = prepare(load_scenario("push_recovery", settings)).run_many(3).trajectory
-    beside = prepare(load_scenario("push_recovery", [*settings, f"companions=['{kind(companion)}']"])).run_many(3)
+    beside = prepare(
+        load_scenario("push_recovery", [*settings, f"open_loop_observers=['{kind(open_loop_observer)}']"])
+    ).run_many(3)
     assert alone is not None
     assert beside.trajectory is not None
     for name, values in alone.columns.items():
         np.testing.assert_array_equal(beside.trajectory[name], values)
-    assert np.isnan(beside.trajectory[f"estimate/{kind(companion)}/x2_rad_s"][-1]).all()
+    assert np.isnan(beside.trajectory[f"estimate/{kind(open_loop_observer)}/x2_rad_s"][-1]).all()
 
 
 def test_in_the_loop_it_is_told(quick: str) -> None:

@@ -226,7 +226,11 @@ def test_a_law_that_cannot_work(given: type, fragments: list[str], command: str)
         ["kind=lqg", "torque_wlk=1.0"],
         "controller.torque_wlk: no such field; did you mean 'torque_wal",
     ),
-    ("another's field", ["torque_walk=1.0"], "controller.torque_walk: no such field; allowed: against_turning, angles"),
+    (
+        "another's field",
+        ["torque_walk=1.0"],
+        "controller.torque_walk: no such field; allowed: compensate_turning, angles",
+    ),
     (
         "of the wrong type",
         ["kind=lqg", "torque_walk='1'"],
@@ -257,8 +261,12 @@ def test_a_law_that_cannot_work(given: type, fragments: list[str], command: str)
         ["kind=lqg", "feedback=fog"],
         "controller.feedback = 'fog': lqg takes nothing of the observer and has no",
     ),
-    ("angles", ["kind=lqg", "angles=estimated"], "leave it out, or set controller.angles=measured"),
-    ("trim", ["kind=lqg", "trim_s=1.0"], "controller.trim_s = 1: Lqg has no integrator to be trimmed; leave it out"),
+    ("angle_source", ["kind=lqg", "angle_source=estimated"], "leave it out, or set controller.angle_source=measured"),
+    (
+        "trim",
+        ["kind=lqg", "bias_trim_s=1.0"],
+        "controller.bias_trim_s = 1: Lqg has no integrator to be trimmed; leave it out",
+    ),
 )
 def test_fields_that_do_not_fit_the_law(given: list[str], fragments: list[str]) -> None:
     said = cmg_mj("run", "push_recovery", *(part for each in given for part in ("--set", f"controller.{each}")))

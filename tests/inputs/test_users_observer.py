@@ -152,12 +152,12 @@ def test_an_observer_that_cannot_work(given: type, fragments: list[str], place: 
     elif place == "in the loop":
         said = cmg_mj("run", "push_recovery", "--observer", kind)
     else:
-        said = cmg_mj("run", "push_recovery", "--set", f"companions=['{kind}']")
+        said = cmg_mj("run", "push_recovery", "--set", f"open_loop_observers=['{kind}']")
         assert (
             "FailsWhenMade" in kind
             or "TakesNo" in kind
             or "NamesNo" in kind
-            or "companions: 'tests.inputs.test_users_observer:" in said.complaint
+            or "open_loop_observers: 'tests.inputs.test_users_observer:" in said.complaint
         )
     assert_in_order(["push_recovery", *fragments], said.complaint)
     assert list(Path().iterdir()) == []
@@ -205,9 +205,9 @@ def test_an_observer_that_fails_among_others(quick: str) -> None:
     assert Path("runs/quick-compare-0/trajectory-linear.parquet").exists()
 
 
-def test_a_companion_that_gives_nan_harms_nobody(quick: str) -> None:
+def test_an_open_loop_observer_that_gives_nan_harms_nobody(quick: str) -> None:
     kind = f"{__name__}:GivesNan"
-    said = cmg_mj("run", quick, "--set", f"companions=['{kind}']")
+    said = cmg_mj("run", quick, "--set", f"open_loop_observers=['{kind}']")
     assert said.status == 0
     assert re.search(rf"{kind}\s+-\s+-", said.out)
 

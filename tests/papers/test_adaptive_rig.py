@@ -57,11 +57,11 @@ def test_a_gait_and_a_torque_are_found() -> None:
 def test_trimming_spares_the_gimbals_and_the_time_to_settle() -> None:
     """With the integrator held where the estimated bias asks for it, the gimbals need not turn to get it there."""
     found = {}
-    for trim_s in (0.0, 1.0):
-        settings = ["plant.equilibrium_bias_deg=1.0", f"controller.trim_s={trim_s}", "seed=63000"]
+    for bias_trim_s in (0.0, 1.0):
+        settings = ["plant.equilibrium_bias_deg=1.0", f"controller.bias_trim_s={bias_trim_s}", "seed=63000"]
         result = prepare(load_scenario("bias_estimation", settings)).run_many(6, keep_trajectory=False)
-        found[trim_s] = {key: result.values(key) for key in ("gimbal_peak_deg", "tilt_rms_deg", "settle_time_s")}
-    print(f"by trim_s: { {trim_s: {k: v.mean() for k, v in values.items()} for trim_s, values in found.items()} }")
+        found[bias_trim_s] = {key: result.values(key) for key in ("gimbal_peak_deg", "tilt_rms_deg", "settle_time_s")}
+    print(f"by bias_trim_s: { {trim: {k: v.mean() for k, v in values.items()} for trim, values in found.items()} }")
     without, trimmed = found.values()
     assert np.all(trimmed["gimbal_peak_deg"] < 0.75 * without["gimbal_peak_deg"])
     assert np.all(trimmed["tilt_rms_deg"] < without["tilt_rms_deg"])

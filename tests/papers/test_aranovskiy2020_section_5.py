@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.papers.aranovskiy2020 import comparison, figure_4, figures_5_to_7, second_place
-from cmg_mj.papers.aranovskiy2020.comparison import Angles, Measured, order_of
+from cmg_mj.papers.aranovskiy2020.comparison import AngleSource, Measured, order_of
 from cmg_mj.papers.aranovskiy2020.figures_5_to_7 import ANGLES, figure, in_the_loop
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.second_place import ELEVEN, ELEVEN_BY_EULER, TEN, TEN_BY_EULER, TEN_EXACT_GAIN
@@ -69,7 +69,7 @@ def test_an_order_is_one_beyond_chance_in_both_steps() -> None:
 
 
 @pytest.mark.parametrize("angles", ANGLES)
-def test_order_of_the_observers_in_the_loop(angles: Angles) -> None:
+def test_order_of_the_observers_in_the_loop(angles: AngleSource) -> None:
     found = comparison.measured({angles: in_the_loop(list(OBSERVERS), angles, 6, SEED, 8.0)})
     print({m.key: {name: v.mean() for name, v in m.numbers[angles].items()} for m in found})
     orders = {measure.key: measure.orders[angles] for measure in found}
@@ -78,13 +78,13 @@ def test_order_of_the_observers_in_the_loop(angles: Angles) -> None:
     assert comparison.order(found).verdict == "reproduced within stated conditions"
 
 
-def of_measures(velocity: Mapping[Angles, dict], tilt: Mapping[Angles, dict]) -> list[Measured]:
+def of_measures(velocity: Mapping[AngleSource, dict], tilt: Mapping[AngleSource, dict]) -> list[Measured]:
     return [Measured("velocity_rms_error_rad_s", velocity), Measured("tilt_rms_deg", tilt)]
 
 
 def test_the_order_is_judged_by_the_velocity_on_all_angles() -> None:
     right, turned = numbers(0.05, 0.07, 0.11), numbers(0.11, 0.07, 0.05)
-    both: dict[Angles, dict] = {"measured": right, "estimated": right}
+    both: dict[AngleSource, dict] = {"measured": right, "estimated": right}
     claim = comparison.order(of_measures(both, {"measured": turned, "estimated": turned}))
     assert claim.verdict == "reproduced within stated conditions"
     assert "By the velocity RMS error the order holds. By the tilt RMS it is inverted" in claim.why
@@ -100,7 +100,7 @@ def test_the_order_is_judged_by_the_velocity_on_all_angles() -> None:
 # --- Figs 5 to 7 ------------------------------------------------------------------------------------------------
 
 
-def result_of(observer: str, angles: Angles, error: float, *, fell: int = 0, settles: bool = True) -> Result:
+def result_of(observer: str, angles: AngleSource, error: float, *, fell: int = 0, settles: bool = True) -> Result:
     """Runs of three worlds with made-up summaries, and a recording of the observer for the pictures."""
     summary = {
         "velocity_rms_error_rad_s": error,
@@ -117,7 +117,7 @@ def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> Non
     """A number of its own for every observer and kind of angles: each must come out in its own place."""
     sizes = {"linear": 0.11, "ltv": 0.07, "homogeneous": 0.05}
 
-    def made(names: Sequence[str], angles: Angles, worlds: int, seed: int) -> dict[str, Result]:
+    def made(names: Sequence[str], angles: AngleSource, worlds: int, seed: int) -> dict[str, Result]:
         more = 0.001 if angles == "estimated" else 0.0
         return {name: result_of(name, angles, sizes[name] + more) for name in names}
 

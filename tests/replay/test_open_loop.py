@@ -14,7 +14,7 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 
-SETTINGS = ["duration_s=0.8", "push.0.start_s=0.3", 'companions="all"', 'controller.feedback="fog"']
+SETTINGS = ["duration_s=0.8", "push.0.start_s=0.3", 'open_loop_observers="all"', 'controller.feedback="fog"']
 
 
 @cache
@@ -33,7 +33,7 @@ def recorded(worlds: int | None) -> Trajectory:
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_replay_is_bitwise_what_the_run_recorded(name: str, worlds: int | None) -> None:
     controller = experiment().controller()
-    observer = controller.companions.get(name, controller.observer)
+    observer = controller.open_loop_observers.get(name, controller.observer)
     estimate = replay(observer, recorded(worlds))
     for column, value in zip(("x1_rad", "x2_rad_s", "x3_rad"), estimate, strict=True):
         original = recorded(worlds)[f"estimate/{name}/{column}"]

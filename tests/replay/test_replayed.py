@@ -27,7 +27,7 @@ from tests.observers.reference import PAPER
 from tests.replay.logs.motion import COLUMNS, DT, N, sine, write_csv
 
 KEYS = ("velocity_rms_error_rad_s", "velocity_fit", "velocity_rms_error_push_rad_s", "velocity_fit_push")
-SETTINGS = ["duration_s=1.4", "push.0.start_s=0.3", 'companions="all"', "observer.k1=23.0", "seed=5"]
+SETTINGS = ["duration_s=1.4", "push.0.start_s=0.3", 'open_loop_observers="all"', "observer.k1=23.0", "seed=5"]
 SETTINGS += ["sensors.accelerometer.noise_density_ug_rthz=300"]
 
 
@@ -47,14 +47,14 @@ def log(tmp_path: Path, **more: np.ndarray) -> Log:
 
 
 def test_a_run_replays_to_its_figures(run: Path) -> None:
-    """Estimates bit for bit, of the loop's observer (whose k1 is not the default) and of every companion."""
+    """Estimates bit for bit, of the loop's observer (whose k1 is not the default) and of every open-loop observer."""
     replayed = replay_ready(read_log(run))
     summary = json.loads((run / "summary.json").read_text())
     kept = Trajectory.load(run / "trajectory.parquet")
     assert replayed.left_out == {}
     assert set(replayed.estimates) == set(OBSERVERS)
     for name, figures in replayed.summaries.items():
-        of = summary if name == "homogeneous" else {**summary["companions"], **summary["references"]}[name]
+        of = summary if name == "homogeneous" else {**summary["open_loop_observers"], **summary["references"]}[name]
         for key in KEYS:
             assert figures[key] == pytest.approx(of[key], rel=1e-12, abs=1e-13), (name, key)
         for signal, values in replayed.estimates.get(name, {}).items():

@@ -104,12 +104,12 @@ def test_each_observer_has_its_own_errors() -> None:
     assert found["velocity_rms_error_rad_s"] == pytest.approx(0.2)
     errors = {
         name: (of_one["velocity_rms_error_rad_s"], of_one["velocity_rms_error_fog_rad_s"])
-        for name, of_one in found["companions"].items()
+        for name, of_one in found["open_loop_observers"].items()
     }
     assert list(errors) == ["hers", "theirs"]
     assert errors["hers"] == pytest.approx((0.4, 0.5))
     assert errors["theirs"] == pytest.approx((0.0, 0.1))
-    assert "companions" not in summary(metrics())
+    assert "open_loop_observers" not in summary(metrics())
 
 
 # --- what an estimate is worth --------------------------------------------------------------------------------
@@ -120,8 +120,8 @@ def test_fit_is_one_less_error_by_motion() -> None:
     found = summary(metrics(observers=("mine", "hers")), x2=0.5 * np.cos(w * T), rates=(0.4 * np.cos(w * T), 0.0))
     assert found["velocity_rms_rad_s"] == pytest.approx(0.5 / math.sqrt(2.0), rel=1e-12)
     assert found["velocity_fit"] == pytest.approx(0.8, rel=1e-12)
-    assert found["companions"]["hers"]["velocity_fit"] == 0.0  # an estimate of zero
-    assert found["companions"]["hers"]["velocity_rms_rad_s"] == found["velocity_rms_rad_s"]
+    assert found["open_loop_observers"]["hers"]["velocity_fit"] == 0.0  # an estimate of zero
+    assert found["open_loop_observers"]["hers"]["velocity_rms_rad_s"] == found["velocity_rms_rad_s"]
 
 
 def test_fit_is_less_than_zero_where_zero_would_do_better() -> None:
@@ -137,7 +137,7 @@ def push_error(pushes: tuple, error: np.ndarray, n: int = len(T)) -> float | Non
     """Error over the push windows of an estimate that is off by this, with a motion that must not matter."""
     x2 = np.sin(T)[:n]
     found = summary(metrics(pushes=pushes, observers=("a", "b")), n, x2=x2, rates=(x2 + error[:n], x2))
-    assert found["companions"]["b"]["velocity_rms_error_push_rad_s"] in (0.0, None)
+    assert found["open_loop_observers"]["b"]["velocity_rms_error_push_rad_s"] in (0.0, None)
     return found["velocity_rms_error_push_rad_s"]
 
 
@@ -173,7 +173,7 @@ def test_a_run_that_ends_within_the_window_is_judged_until_there() -> None:
     assert push_error((Push(2.0, 0.1),), error, 200) is None
 
 
-def test_references_are_judged_as_companions_are() -> None:
+def test_references_are_judged_as_open_loop_observers_are() -> None:
     of = metrics(references=("zero",), pushes=(Push(2.0, 0.1),))
     x2 = rows(np.sin(T), len(T))
     of.update(**still(len(T)) | {"x2": x2}, estimates=estimates([x2]), references={"zero": 0.0 * x2})
@@ -323,7 +323,7 @@ def test_bias_is_judged_from_its_time_on() -> None:
     assert found["bias_deg"] == pytest.approx(1.0)
     assert found["bias_estimate_deg"] == pytest.approx(1.1, rel=1e-12)
     assert found["bias_rms_error_deg"] == pytest.approx(math.sqrt((0.4**2 + 0.2**2) / 2.0), rel=1e-12)
-    assert "bias_deg" not in found["companions"]["other"]
+    assert "bias_deg" not in found["open_loop_observers"]["other"]
 
 
 def test_a_run_that_ends_before_has_no_bias_figures() -> None:

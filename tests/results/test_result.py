@@ -27,7 +27,7 @@ BIASES = [0.5, 0.5, 40.0, 40.0]  # two worlds that stand, two that fall
 
 @cache
 def experiment() -> Experiment:
-    settings = ["duration_s=1.0", "push=[]", 'companions=["linear"]']
+    settings = ["duration_s=1.0", "push=[]", 'open_loop_observers=["linear"]']
     return prepare(load_scenario("push_recovery", settings, "homogeneous"))
 
 
@@ -47,14 +47,14 @@ def test_worlds_vary_and_those_that_fell_do_not_count() -> None:
     assert np.isnan(values).tolist() == [False, False, True, True]
     assert values[0] == found.summaries[0][ERROR]
     assert found.mean(ERROR) == pytest.approx((values[0] + values[1]) / 2.0)
-    companion = found.values(ERROR, "linear")
-    assert companion[1] == found.summaries[1]["companions"]["linear"][ERROR]
+    open_loop_observer = found.values(ERROR, "linear")
+    assert open_loop_observer[1] == found.summaries[1]["open_loop_observers"]["linear"][ERROR]
 
 
 def test_the_table_has_a_row_per_observer_and_world() -> None:
     table = result().table()
     assert table["observer"].to_pylist() == [name for name in ("homogeneous", "linear", *REFERENCES) for _ in BIASES]
-    assert table["rides_along_in"].to_pylist() == [None] * 4 + ["homogeneous"] * 4 * (1 + len(REFERENCES))
+    assert table["in_loop_of"].to_pylist() == [None] * 4 + ["homogeneous"] * 4 * (1 + len(REFERENCES))
     assert table["world"].to_pylist() == [0, 1, 2, 3] * ROWS
     assert table["stood"].to_pylist() == [True, True, False, False] * ROWS
     assert table["outcome"].to_pylist() == ["done", "done", "fell", "fell"] * ROWS
@@ -62,8 +62,8 @@ def test_the_table_has_a_row_per_observer_and_world() -> None:
     for world, row in enumerate(table.slice(0, 4).to_pylist()):
         summary = result().summaries[world]
         assert {key: row[key] for key in summary if key in row} == {k: v for k, v in summary.items() if k in row}
-        assert set(summary) - set(row) == {"companions", "references"}
-    assert table[ERROR].to_pylist()[4:8] == [s["companions"]["linear"][ERROR] for s in result().summaries]
+        assert set(summary) - set(row) == {"open_loop_observers", "references"}
+    assert table[ERROR].to_pylist()[4:8] == [s["open_loop_observers"]["linear"][ERROR] for s in result().summaries]
     assert set(table["tilt_rms_deg"].to_pylist()[4:]) == {None}  # the loop's alone
 
 

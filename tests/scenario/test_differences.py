@@ -41,7 +41,7 @@ def test_nothing_differs() -> None:
         ("observer.k1=30", "observer.k1", 30, "k1=30"),
         ("push.0.torque_n_m=-1.5", "push.0.torque_n_m", -1.5, "torque_n_m=-1.5"),
         ("push=[]", "push", [], "push=none"),
-        ("companions=[ltv]", "companions", ["ltv"], "companions=ltv"),
+        ("open_loop_observers=[ltv]", "open_loop_observers", ["ltv"], "open_loop_observers=ltv"),
         ("plant.lock_thrust_bearing=true", "plant.lock_thrust_bearing", True, "lock_thrust_bearing=true"),
         ("controller.gains=[30, 4, -1, 0.3]", "controller.gains", [30, 4, -1, 0.3], "gains=30_4_-1_0.3"),
     ],
@@ -106,8 +106,8 @@ def test_folder_title_and_summary_tell(command: list[Any]) -> None:
 
 def test_an_observer_that_the_bundled_scenario_does_not_suit() -> None:
     """No trimming without an estimate of the bias."""
-    found = prepare(load_scenario("bias_estimation", ["controller.trim_s=0"], "linear")).differences
-    assert found == {"controller.trim_s": 0.0}
+    found = prepare(load_scenario("bias_estimation", ["controller.bias_trim_s=0"], "linear")).differences
+    assert found == {"controller.bias_trim_s": 0.0}
 
 
 def test_a_long_name_of_a_users_file() -> None:

@@ -50,9 +50,9 @@ def test_every_field_arrives() -> None:
         "title": "Mine",
         "duration_s": 2,  # a whole number is a number
         "seed": 10**20,
-        "companions": ["linear", "ltv"],
+        "open_loop_observers": ["linear", "ltv"],
         "plant": {"timestep_s": 0.0005, "integrator": "implicit", "gimbal_friction_n_m": 0.25},
-        "controller": {"rate_hz": 500.0, "gains": [1, 2.5, -3, 4], "feedback": "truth", "angles": "estimated"},
+        "controller": {"rate_hz": 500.0, "gains": [1, 2.5, -3, 4], "feedback": "truth", "angle_source": "estimated"},
         "observer": {"kind": "homogeneous", "k1": 30},
         "sensors": {
             "accelerometer": {"bias_mg": [1, -2.5]},
@@ -64,11 +64,11 @@ def test_every_field_arrives() -> None:
     }
     scenario = load_scenario(write(tomli_w.dumps(fields)))
     assert (scenario.title, scenario.duration_s, scenario.seed) == ("Mine", 2.0, 10**20)
-    assert scenario.companion_names() == ["linear", "ltv"]
+    assert scenario.open_loop_names() == ["linear", "ltv"]
     assert (scenario.plant.timestep_s, scenario.plant.integrator) == (0.0005, "implicit")
     assert (scenario.plant.gimbal_friction_n_m, scenario.plant.tilt_friction_n_m) == (0.25, None)
     assert scenario.controller.gains == (1.0, 2.5, -3.0, 4.0)
-    assert (scenario.controller.feedback, scenario.controller.angles) == ("truth", "estimated")
+    assert (scenario.controller.feedback, scenario.controller.angle_source) == ("truth", "estimated")
     assert scenario.observer.parameters == {"k1": 30}
     assert scenario.sensors.accelerometer.bias_mg == (1.0, -2.5)
     assert (scenario.sensors.encoder.latency_s, scenario.sensors.fog.rate_hz) == (0.002, 1000.0)
@@ -78,10 +78,10 @@ def test_every_field_arrives() -> None:
     assert prepare(scenario).law == StateFeedback(1.0 / scenario.controller.rate_hz, (1.0, 2.5, -3.0, 4.0))
 
 
-def test_companions_leave_out_the_observer_itself_and_doubles() -> None:
-    every = parse_scenario({"companions": "all", "observer": {"kind": "ltv"}})
-    assert every.companion_names() == [name for name in OBSERVERS if name != "ltv"]
-    assert parse_scenario({"companions": ["ltv", "linear", "ltv", "homogeneous"]}).companion_names() == [
+def test_open_loop_observers_leave_out_the_observer_itself_and_doubles() -> None:
+    every = parse_scenario({"open_loop_observers": "all", "observer": {"kind": "ltv"}})
+    assert every.open_loop_names() == [name for name in OBSERVERS if name != "ltv"]
+    assert parse_scenario({"open_loop_observers": ["ltv", "linear", "ltv", "homogeneous"]}).open_loop_names() == [
         "ltv",
         "linear",
     ]
@@ -104,7 +104,7 @@ def test_companions_leave_out_the_observer_itself_and_doubles() -> None:
         ("push=[]", lambda s: s.push == []),
         ("title=a = b", lambda s: s.title == "a = b"),
         (" title = spaced ", lambda s: s.title == "spaced"),
-        ("companions=all", lambda s: len(s.companion_names()) == len(OBSERVERS) - 1),
+        ("open_loop_observers=all", lambda s: len(s.open_loop_names()) == len(OBSERVERS) - 1),
         ("observer.kind=ltv", lambda s: s.observer.kind == "ltv"),
         ("seed=7", lambda s: s.seed == 7),
     ],
@@ -198,7 +198,7 @@ class Odd:
 RESOLVED = {
     "defaults": {},
     "lqr": {"controller": {"lqr": {"state_cost": [30, 1, 0.5, 0.1], "input_cost": 0.3}}},
-    "every observer": {"companions": "all", "observer": {"kind": "luenberger"}},
+    "every observer": {"open_loop_observers": "all", "observer": {"kind": "luenberger"}},
     "rational": {"plant": {"timestep_s": 1 / 3000}, "controller": {"rate_hz": 1000 / 3}, "duration_s": 0.3},
     "a user's observer": {"observer": {"kind": f"{__name__}:Odd", "gain": 0.4, "nothing": 2.0}},
     "pushes": {"push": [{"start_s": 0.1}, {"start_s": 0.2, "torque_n_m": -0.1}], "seed": 2**70},

@@ -57,7 +57,11 @@ def test_these_are_all_fields_that_may_differ() -> None:
 
 @pytest.mark.parametrize(
     ("observer", "more"),
-    [("homogeneous", ()), ("adaptive", ("controller.trim_s=1.0", "sensors.accelerometer.skew_s=0.0025")), ("ltv", ())],
+    [
+        ("homogeneous", ()),
+        ("adaptive", ("controller.bias_trim_s=1.0", "sensors.accelerometer.skew_s=0.0025")),
+        ("ltv", ()),
+    ],
 )
 def test_each_world_is_its_own_experiments(observer: str, more: tuple[str, ...]) -> None:
     of = experiment(observer, *more)

@@ -72,7 +72,7 @@ def test_parameters_noise_and_rigs_may_differ_too(monkeypatch: pytest.MonkeyPatc
 def test_what_a_batch_has_in_common_keeps_runs_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [
         run_of(experiment("linear", *more), 2)
-        for more in ((), ("controller.angles=estimated",), ("seed=3",), ("controller.rate_hz=100",), ())
+        for more in ((), ("controller.angle_source=estimated",), ("seed=3",), ("controller.rate_hz=100",), ())
     ]
     alone = [run_together(*run) for run in runs]
     batches = Batches(monkeypatch)

@@ -50,9 +50,9 @@ def test_most_of_the_ceiling_tilt_on_both_axes_at_once_is_recovered_and_more_nev
 
 def test_a_turn_is_borne_by_gimbals_that_turn_against_it_alone() -> None:
     assert two_axes("plant.turn_rate_rad_s=3").run().outcomes[0].kind == "done"
-    without = two_axes("plant.turn_rate_rad_s=2", "controller.against_turning=false")
+    without = two_axes("plant.turn_rate_rad_s=2", "controller.compensate_turning=false")
     assert without.run().outcomes[0].fell
-    assert two_axes("plant.turn_rate_rad_s=0.5", "controller.against_turning=false").run().outcomes[0].kind == "done"
+    assert two_axes("plant.turn_rate_rad_s=0.5", "controller.compensate_turning=false").run().outcomes[0].kind == "done"
 
 
 def test_turned_the_wrong_way_the_gimbals_make_the_rig_fall_at_one_radian_a_second() -> None:

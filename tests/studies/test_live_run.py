@@ -38,7 +38,7 @@ from tests.run_folders import assert_whole
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 SHORT = ("duration_s=3.0", "push.0.start_s=0.4", "push.0.duration_s=0.1")
-TWO_AXES = (*SHORT, "push.1.start_s=0.8", 'companions=["adaptive"]', "axes.pitch.observer.kind=linear")
+TWO_AXES = (*SHORT, "push.1.start_s=0.8", 'open_loop_observers=["adaptive"]', "axes.pitch.observer.kind=linear")
 TWO_ENDS = ("tilt/settle_band", "command/limit", "bias/true")
 """Straight lines, of which a recording has the ends and a stream the ends of every piece."""
 NOT_ALIKE = "/__properties"
@@ -98,7 +98,7 @@ def assert_alike(streamed: Path, saved: Path) -> None:
     ("scenario", "settings"),
     [
         ("push_recovery", SHORT),
-        ("push_recovery", (*SHORT, 'companions=["adaptive", "linear"]', "plant.equilibrium_bias_deg=0.5")),
+        ("push_recovery", (*SHORT, 'open_loop_observers=["adaptive", "linear"]', "plant.equilibrium_bias_deg=0.5")),
         ("push_recovery", (*SHORT, "push.0.torque_n_m=40.0")),  # falls
         (
             "push_recovery",
@@ -109,7 +109,16 @@ def assert_alike(streamed: Path, saved: Path) -> None:
         ("two_axes", (*TWO_AXES, "push.1.torque_n_m=20.0", "plant.model=two_axes_free_base")),  # falls
         ("two_axes", (*SHORT, 'plant.locked_axes=["pitch"]', "push.1.start_s=1.0")),
     ],
-    ids=["push", "companions", "fall", "between ticks", "one tick", "two axes", "fall about pitch", "one is locked"],
+    ids=[
+        "push",
+        "open_loop_observers",
+        "fall",
+        "between ticks",
+        "one tick",
+        "two axes",
+        "fall about pitch",
+        "one is locked",
+    ],
 )
 def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: tuple[str, ...]) -> None:
     """Every entity, every component, every value at its time."""

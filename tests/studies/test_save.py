@@ -63,7 +63,7 @@ KINDS: dict[str, Callable[[], list[str]]] = {
     "a user's model": own_model,
     "a user's observer": lambda: [write(f"duration_s = 0.4\n[observer]\nkind = '{__name__}:Mine'\ngain = 0.4")],
     "lqr": lambda: [write("duration_s = 0.4\n[controller]\nlqr.state_cost = [30, 1, 0.5, 0.1]\nlqr.input_cost = 0.3")],
-    "every observer": lambda: [write("duration_s = 0.4\ncompanions = 'all'\n[controller]\nfeedback = 'fog'")],
+    "every observer": lambda: [write("duration_s = 0.4\nopen_loop_observers = 'all'\n[controller]\nfeedback = 'fog'")],
     "another grid": lambda: [
         write("duration_s = 0.4\n[plant]\ntimestep_s = 0.0005\nmodel = 'single_gimbal'\nlock_thrust_bearing = true")
     ],
@@ -106,7 +106,9 @@ def test_the_callback_writes_the_same() -> None:
 
 
 def test_a_run_folder() -> None:
-    said = cmg_mj("run", write("title = 'Mine'\nduration_s = 0.5\ncompanions = ['ltv']"), "--out", "deep/er", "--json")
+    said = cmg_mj(
+        "run", write("title = 'Mine'\nduration_s = 0.5\nopen_loop_observers = ['ltv']"), "--out", "deep/er", "--json"
+    )
     trajectory = assert_whole("deep/er")
     assert Path("deep/er/summary.json").read_text() == said.out
     assert len(trajectory) == 100
@@ -219,7 +221,7 @@ def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
     """Those without one run untrimmed; alone, they are refused (tests/inputs/)."""
     scenario = load_scenario("bias_estimation", ["duration_s=0.5"])
     experiments = comparison.prepare_comparison(scenario, ["linear", "adaptive", "homogeneous_adaptive"])
-    assert [experiment.scenario.controller.trim_s for experiment in experiments] == [0.0, 1.0, 1.0]
+    assert [experiment.scenario.controller.bias_trim_s for experiment in experiments] == [0.0, 1.0, 1.0]
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def export(
 
     Args:
         controller: What is exported: its observer, law, tilt estimate, the gimbals' directions and zeros. Its sensors'
-            errors, seed and companions do not count.
+            errors, seed and open-loop observers do not count.
         out: Folder to write to; made if need be.
         precision: Of every number in C.
         name: What everything in C begins with; by default the observer's name, or what that of a user's class makes.

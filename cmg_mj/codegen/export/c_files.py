@@ -110,7 +110,7 @@ extern "C" {{
         raw = [f"accelerations[{i}]" for i in range(4)] + [f"encoders[{i}]" for i in range(constants.gimbals)]
         state = [f"state->{member}" for member in traced.state]
         estimate = [f"estimate[{i}]" for i in range(len(self.places))]
-        x1, x3 = ("y1", "y2") if self.controller.angles == "measured" else (estimate[0], estimate[2])
+        x1, x3 = ("y1", "y2") if self.controller.angle_source == "measured" else (estimate[0], estimate[2])
         start = ["0", "y2", *["0"] * (len(estimate) - 3)]
         first = "".join(f"        {place} = {x};\n" for place, x in zip(estimate, ["y1", *start], strict=True))
         trim = f"""    if (controller->updates < {constants.trimmed}) {{ /* while the bias is still being found */

@@ -69,8 +69,8 @@ def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
         directions=controller.directions,
         gimbal_zero=controller.gimbal_zero,
         timestep=controller.timestep,
-        angles=controller.angles,
-        trim_s=controller.trim_s,
+        angle_source=controller.angle_source,
+        bias_trim_s=controller.bias_trim_s,
     )
     rows = []
     for k, row in enumerate(samples.tolist()):
@@ -101,7 +101,7 @@ def in_casadi(controller: Controller, traced: Traced, constants: Constants, samp
             state, estimate = result[: len(state)], result[len(state) :]
         if k < constants.trimmed:
             x_e = constants.trim_gain.value * estimate[constants.trim_part]
-        x1, x3 = (y[0], y[1]) if controller.angles == "measured" else (estimate[0], estimate[2])
+        x1, x3 = (y[0], y[1]) if controller.angle_source == "measured" else (estimate[0], estimate[2])
         u, x_e = values(traced.law, x1, estimate[1], x3, x_e, *law_of)
         rows.append([*estimate, u])
     return np.array(rows)

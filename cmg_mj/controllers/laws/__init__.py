@@ -2,7 +2,7 @@
 
 from cmg_mj.controllers.laws.protocol import Fed, Law
 from cmg_mj.controllers.laws.registry import LAWS, law_class, make_law
-from cmg_mj.controllers.laws.scaled_gains import carried_over_gains
+from cmg_mj.controllers.laws.scaled_gains import scaled_gains
 from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS, StateFeedback, lqr_gains
 
 __all__ = [
@@ -11,8 +11,8 @@ __all__ = [
     "Fed",
     "Law",
     "StateFeedback",
-    "carried_over_gains",
     "law_class",
     "lqr_gains",
     "make_law",
+    "scaled_gains",
 ]

@@ -13,7 +13,7 @@ from cmg_mj.observers.protocol import Estimate, Measurement
 class Fed(Estimate):
     """What is fed back to a law: x1 [rad], x2 [rad/s], x3 [rad], floats for one world, arrays (n_worlds,) for many.
 
-    x1 and x3 are measured or estimated (`controller.angles`), x2 is the observer's, the gyro's or the true one
+    x1 and x3 are measured or estimated (`controller.angle_source`), x2 is the observer's, the gyro's or the true one
     (`controller.feedback`). `extra` has what the observer in the loop estimates beyond x, in the order of its
     `extra_signals`.
     """
@@ -44,7 +44,7 @@ class Law(Protocol):
 
     - A part `x_e` of its state is its integrator, which the trajectory shows; of a law without one it shows NaN.
     - `trim_gain` [s]: its integrator settles at that times the equilibrium bias. Such a law can be trimmed
-      (`controller.trim_s`); its state is a NamedTuple with `x_e`.
+      (`controller.bias_trim_s`); its state is a NamedTuple with `x_e`.
     - `needs`, out of `NEEDS`: () for a law that takes y and nothing of the observer.
     - `arrays`: names of its fields that may be arrays (n_worlds,), so that worlds of one batch may differ in them.
 

@@ -13,7 +13,7 @@ PAPERS_GRAVITY = 3.4531 / 0.061841
 """g0 = (m g l/sqrt(2))/J1 of that rig [1/s^2]."""
 
 
-def carried_over_gains(model: ReducedModel) -> tuple[float, float, float, float]:
+def scaled_gains(model: ReducedModel) -> tuple[float, float, float, float]:
     """The gains that make a rig's linearised loop the papers' own, slowed down or sped up.
 
     With b = J_d omega_d/J1 and g = m g h/J1 of this rig, its time runs tau = sqrt(g0/g) times as slowly as that of the

@@ -18,7 +18,7 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 Numbers = Mapping[str, np.ndarray]
 """Observer -> a measure in the loop, (n_worlds,); NaN for a world that did not stand. Less is better."""
 
-Angles = Literal["measured", "estimated"]
+AngleSource = Literal["measured", "estimated"]
 """Which angles the law is fed with."""
 
 Order = Literal["holds", "is inverted", "does not hold"]
@@ -50,16 +50,16 @@ class Measured(NamedTuple):
     """One measure, with the law on either kind of angles."""
 
     key: str
-    numbers: Mapping[Angles, Numbers]
+    numbers: Mapping[AngleSource, Numbers]
     """Which angles -> observer -> numbers."""
 
     @property
-    def orders(self) -> dict[Angles, Order]:
+    def orders(self) -> dict[AngleSource, Order]:
         """Which angles -> the order."""
         return {angles: order_of(numbers) for angles, numbers in self.numbers.items()}
 
     @property
-    def best(self) -> dict[Angles, str]:
+    def best(self) -> dict[AngleSource, str]:
         """Which angles -> the observer with the least mean over the worlds that stood."""
         return {
             angles: min(numbers, key=lambda name: float(np.nanmean(numbers[name])))
@@ -71,7 +71,7 @@ class Measured(NamedTuple):
         return set(self.orders.values()) == {order}
 
 
-def measured(results: Mapping[Angles, Mapping[str, Result]]) -> list[Measured]:
+def measured(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measured]:
     """Read the measures off the runs.
 
     Args:

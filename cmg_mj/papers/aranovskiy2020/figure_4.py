@@ -37,7 +37,9 @@ class Riding(NamedTuple):
 
 def riding_along(worlds: int, seed: int) -> Riding:
     """Run the tuning experiment with the three observers riding along."""
-    scenario = load_scenario("observer_tuning", [f"seed={seed}", 'companions=["ltv", "homogeneous"]'], "linear")
+    scenario = load_scenario(
+        "observer_tuning", [f"seed={seed}", 'open_loop_observers=["ltv", "homogeneous"]'], "linear"
+    )
     whole = trajectory_of(prepare(scenario).run_many(worlds))
     window = whole.between(*window_of(scenario))
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from cmg_mj.papers.aranovskiy2020 import comparison, second_place
-from cmg_mj.papers.aranovskiy2020.comparison import Angles
+from cmg_mj.papers.aranovskiy2020.comparison import AngleSource
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
@@ -21,22 +21,22 @@ from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 FIGURES = {"linear": "Fig. 5", "ltv": "Fig. 6", "homogeneous": "Fig. 7"}
-ANGLES: tuple[Angles, Angles] = ("measured", "estimated")
+ANGLES: tuple[AngleSource, AngleSource] = ("measured", "estimated")
 """Which angles the law is fed with."""
 SEED = 72_001
 WORLDS = 20
 
 
 def in_the_loop(
-    observers: Sequence[str], angles: Angles, worlds: int, seed: int, duration_s: float = DURATION_S
+    observers: Sequence[str], angles: AngleSource, worlds: int, seed: int, duration_s: float = DURATION_S
 ) -> dict[str, Result]:
     """Each observer's estimate in the law, a push at 2 s."""
-    settings = [f'controller.angles="{angles}"']
+    settings = [f'controller.angle_source="{angles}"']
     runs = [run_of(push_recovery(observer, seed, settings, duration_s), worlds) for observer in observers]
     return dict(zip(observers, run_side_by_side(runs), strict=True))
 
 
-def figure(name: str, results: Mapping[Angles, Result]) -> Claim:
+def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
     """One of Figs 5 to 7."""
     error = {angles: known_interval(result.values("velocity_rms_error_rad_s")) for angles, result in results.items()}
     tilt = {angles: known_interval(result.values("tilt_rms_deg")) for angles, result in results.items()}
@@ -71,7 +71,7 @@ def figure(name: str, results: Mapping[Angles, Result]) -> Claim:
     )
 
 
-def _picture(name: str, examples: Mapping[Angles, Trajectory]) -> Picture:
+def _picture(name: str, examples: Mapping[AngleSource, Trajectory]) -> Picture:
     """Two columns: the law on measured angles, the law on estimated ones."""
     rows: list[list[Panel]] = [[], [], [], []]
     for angles, example in examples.items():
@@ -102,7 +102,7 @@ def _picture(name: str, examples: Mapping[Angles, Trajectory]) -> Picture:
 
 def claims(on_share: OnShare) -> list[Claim]:
     """The three figures, and what Section V concludes from the same runs."""
-    results: dict[Angles, dict[str, Result]] = {}
+    results: dict[AngleSource, dict[str, Result]] = {}
     for i, angles in enumerate(ANGLES):
         results[angles] = in_the_loop(list(OBSERVERS), angles, WORLDS, SEED)
         on_share((i + 1) / 3.0)

@@ -39,7 +39,7 @@ class Case(NamedTuple):
     estimated_angles: bool = False
 
 
-ESTIMATED = ['controller.angles="estimated"']
+ESTIMATED = ['controller.angle_source="estimated"']
 CASES = {
     TRUE_RATE: Case("homogeneous", ['controller.feedback="truth"'], true_rate=True),
     "(10), estimated angles": Case("ltv", ESTIMATED, estimated_angles=True),

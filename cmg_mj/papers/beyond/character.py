@@ -43,7 +43,7 @@ def record_motion(noise_ug: float, worlds: int, seed: int) -> Motion:
         f"sensors.accelerometer.noise_density_ug_rthz={noise_ug}",
         f"seed={seed}",
         "duration_s=5.0",
-        "companions=[]",
+        "open_loop_observers=[]",
     ]
     experiment = prepare(load_scenario("observer_tuning", settings))
     noisy = experiment.run_many(worlds).trajectory

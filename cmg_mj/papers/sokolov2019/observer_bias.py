@@ -32,7 +32,7 @@ class Rest(NamedTuple):
 def rest_of(observer: str, e_deg: float, angles: str) -> Rest:
     """Release the rig with a bias and wait; the law on `estimated` or `measured` angles."""
     settings = [*NO_NOISE, f"plant.equilibrium_bias_deg={e_deg}", "plant.initial_tilt_deg=0.1", "push=[]"]
-    result = experiment([*settings, f"duration_s={REST_S}", f"controller.angles={angles}"], observer).run()
+    result = experiment([*settings, f"duration_s={REST_S}", f"controller.angle_source={angles}"], observer).run()
     if not result.stood.all():
         return Rest(np.full(3, math.inf), math.nan, math.nan)
     last = trajectory_of(result).between(REST_S - 1.0, REST_S)

@@ -40,7 +40,7 @@ def _spikes(angle: np.ndarray) -> np.ndarray:
     leaps = (np.abs(out) > A_TURN) & (np.abs(back) > A_TURN) & (out * back < 0.0)
     if not leaps.any():
         return np.flatnonzero(leaps)
-    # Angles that start again lie within one turn: what leaps out of that, or by less than a turn, has not.
+    # AngleSource that start again lie within one turn: what leaps out of that, or by less than a turn, has not.
     others, middle = np.delete(angle, np.flatnonzero(leaps) + 1), angle[1:-1]
     reach = np.maximum(middle, others.max()) - np.minimum(middle, others.min())
     short = np.abs(np.abs(out) - 2.0 * math.pi) > 5.0 * np.median(np.abs(steps)) + A_FLICKER

@@ -75,7 +75,7 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
         observers: Their names.
 
     Returns:
-        One experiment an observer; `controller.trim_s` counts for those that estimate the bias.
+        One experiment an observer; `controller.bias_trim_s` counts for those that estimate the bias.
 
     Raises:
         InputError: An observer does not exist, or something does not fit.
@@ -91,9 +91,9 @@ def _untrimmed(scenario: Scenario, plant: Plant) -> Scenario:
     """The same without trimming the integrator, if the observer does not estimate the bias that takes."""
     controller, sensors = scenario.controller, scenario.sensors
     given = 1.0 / controller.rate_hz, plant.reduced, plant.facts.noise(sensors)
-    if not controller.trim_s or BIAS in extra_signals(scenario.observer.make(*given)):
+    if not controller.bias_trim_s or BIAS in extra_signals(scenario.observer.make(*given)):
         return scenario
-    return scenario.model_copy(update={"controller": controller.model_copy(update={"trim_s": 0.0})})
+    return scenario.model_copy(update={"controller": controller.model_copy(update={"bias_trim_s": 0.0})})
 
 
 def compare(
@@ -137,10 +137,10 @@ def rerunnable(scenario: Scenario, experiments: Sequence[Experiment], worlds: in
 
     Returns:
         That of the scenario's own observer, whose parameters count, if it is there, and one that keeps
-        `controller.trim_s` otherwise; with the observers and the number of worlds in [compare].
+        `controller.bias_trim_s` otherwise; with the observers and the number of worlds in [compare].
     """
     own = [e for e in experiments if e.scenario.observer.kind == scenario.observer.kind]
-    trimmed = [e for e in experiments if e.scenario.controller.trim_s]
+    trimmed = [e for e in experiments if e.scenario.controller.bias_trim_s]
     kept = (own or trimmed or list(experiments))[0]
     settings = CompareSettings(observers=[e.scenario.observer.kind for e in experiments], worlds=worlds)
     controller = (trimmed or [kept])[0].scenario.controller

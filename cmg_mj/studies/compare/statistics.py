@@ -54,7 +54,7 @@ class Row:
             {
                 **dict.fromkeys(own),
                 "observer": self.reference,
-                "rides_along_in": self.entry.kind,
+                "in_loop_of": self.entry.kind,
                 "seed": own["seed"],
                 "differs": own["differs"],
                 "worlds": own["worlds"],
@@ -89,7 +89,7 @@ def standings(compared: Sequence[Compared]) -> list[dict[str, Any]]:
         compared: What was run.
 
     Returns:
-        For each row its means; `intervals`: key -> ends of the mean's 95 % interval; `less_best`: key -> how much more
+        For each row its means; `intervals`: key -> ends of the mean's 95 % interval; `minus_best`: key -> how much more
         it is than that of the best observer in this figure, over the worlds in which both have it, with its interval.
     """
     rows = rows_of(compared)
@@ -101,7 +101,7 @@ def standings(compared: Sequence[Compared]) -> list[dict[str, Any]]:
             row.summary
             | {
                 "intervals": {key: _ends(row.values(key)) for key in keys},
-                "less_best": {key: _less(row, leader, key) for key, leader in leaders.items() if row != leader},
+                "minus_best": {key: _less(row, leader, key) for key, leader in leaders.items() if row != leader},
             }
         )
         for row in rows

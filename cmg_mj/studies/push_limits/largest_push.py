@@ -85,8 +85,8 @@ def _stood(scenario: Scenario, made: Design, impulses: np.ndarray) -> np.ndarray
         seed=scenario.seed,
         worlds=numbers,
         feedback=settings.feedback,
-        angles=settings.angles,
-        trim_s=settings.trim_s,
+        angle_source=settings.angle_source,
+        bias_trim_s=settings.bias_trim_s,
     )
     after = AFTER_TIME_CONSTANTS / ceiling(model, made.law.rate_limit).pole
     steps = math.ceil((BEFORE_S + PUSH_S + after) / h)

@@ -53,7 +53,7 @@ def scenario_text(model: str, robot: Path, observer: str, can: Prospects | None,
         "title": f"{robot.stem}, balanced",
         "duration_s": DURATION_S,
         "plant": {"model": model, "equilibrium_bias_deg": 0.0, **({} if axis else start)},
-        "controller": {"gains": "carried_over"},
+        "controller": {"gains": "scaled"},
         "observer": {"kind": observer},
     }
     if axis:
@@ -97,8 +97,8 @@ def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -
         f"{figures['ceiling_push_n_m']:.3g} N m for {PUSH_S:g} s"
     )
     yield (
-        f"  this one: bears a push of {figures['borne_push_n_m']:.3g} N m for {PUSH_S:g} s (E = "
-        f"{figures['borne_impulse_n_m_s']:.3g} N m s, {can.share:.0%} of that)"
+        f"  this one: bears a push of {figures['push_margin_torque_n_m']:.3g} N m for {PUSH_S:g} s (E = "
+        f"{figures['push_margin_impulse_n_m_s']:.3g} N m s, {can.share:.0%} of that)"
     )
     if enough is not None:
         yield f"  a pair of this size recovers less than {LOW_CEILING_DEG:g} deg: --scale {enough:g} suffices"

@@ -76,10 +76,10 @@ class Prospects:
             "ceiling_tilt_deg": math.degrees(self.ceiling.tilt),
             "ceiling_impulse_n_m_s": self.ceiling_push,
             "ceiling_push_n_m": self.ceiling_push / PUSH_S,
-            "ceiling_blow_n_m_s": self.ceiling.blow,
-            "borne_impulse_n_m_s": self.bears.impulse,
+            "limit_impulse_n_m_s": self.ceiling.blow,
+            "push_margin_impulse_n_m_s": self.bears.impulse,
             "borne_impulse_least_n_m_s": self.bears.least,
-            "borne_push_n_m": self.bears.impulse / PUSH_S,
+            "push_margin_torque_n_m": self.bears.impulse / PUSH_S,
         }
 
 

@@ -17,7 +17,7 @@ TOLD_OTHERWISE = {
     "seed": "worlds differ in it already: --worlds says how many, --seed which",
     "observer": "--observers names them",
     "observer.kind": "--observers names them",
-    "companions": "a sweep runs without them; --observers puts each in the loop",
+    "open_loop_observers": "a sweep runs without them; --observers puts each in the loop",
     **dict.fromkeys(sorted(UNUSED), "no trial depends on it"),
 }
 """Fields that a sweep does not vary, and why; all below them neither, but for an observer's own."""

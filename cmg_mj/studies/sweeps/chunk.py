@@ -43,7 +43,7 @@ def compute(
         A row a trial, in the chunk's order: its point's number, what is varied, and the figures of its run.
     """
     at = study.points if points is None else points
-    base = prepare(study.scenario.with_observer(chunk.observer).model_copy(update={"companions": []}))
+    base = prepare(study.scenario.with_observer(chunk.observer).model_copy(update={"open_loop_observers": []}))
     found: dict[tuple[int, int], dict[str, Any]] = {}
     pools: dict[str, list[tuple[int, int]]] = {}
     experiments: dict[int, Experiment] = {}
@@ -129,7 +129,7 @@ def _run_once(
         return [_unfinished("stopped", raised(error)) if alone else None for _ in worlds]
     if any(outcome.kind == "interrupted" for outcome in result.outcomes):
         raise KeyboardInterrupt
-    taken = {"observer", "rides_along_in", "world", "seed"}
+    taken = {"observer", "in_loop_of", "world", "seed"}
     return [
         None if outcome.with_others else {key: value for key, value in row.items() if key not in taken}
         for outcome, row in zip(result.outcomes, result.rows(), strict=True)
@@ -169,5 +169,5 @@ def _plain(point: Point) -> Point:
     }
 
 
-COLUMNS = [name for name in FIRST if name != "rides_along_in"]
+COLUMNS = [name for name in FIRST if name != "in_loop_of"]
 """Of a trial, beside what is varied, before its figures."""

@@ -190,7 +190,7 @@ def check_values(study: Study) -> None:
         InputError: One does not.
     """
     plant = load_rig(study.scenario)
-    base = study.scenario.model_copy(update={"companions": []})
+    base = study.scenario.model_copy(update={"open_loop_observers": []})
     for observer in study.observers:
         prepare(base.with_observer(observer), plant)
     fields = as_fields(base)

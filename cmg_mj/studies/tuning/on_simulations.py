@@ -109,13 +109,13 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     feedback = scenario.controller.feedback
     if feedback == "observer" and needs(law_class(scenario.controller.kind)):
         feedback = "fog"
-    loop = {"feedback": feedback, "trim_s": 0.0}
+    loop = {"feedback": feedback, "bias_trim_s": 0.0}
     return scenario.model_copy(
         update={
             "duration_s": duration,
             "controller": scenario.controller.model_copy(update=loop),
             "observer": ObserverSettings(kind="finite_difference"),  # its angles are the measured ones
-            "companions": [],
+            "open_loop_observers": [],
             "sensors": sensors,
         }
     )

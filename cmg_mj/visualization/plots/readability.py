@@ -47,13 +47,13 @@ def by_observer(observers: Sequence[str], summary: Mapping[str, Any]) -> dict[st
 
     Args:
         observers: The one in the loop, then those riding along.
-        summary: The run's, with the others' in `companions`.
+        summary: The run's, with the others' in `open_loop_observers`.
 
     Returns:
         Observer -> its numbers, in that order; empty for one that has none.
     """
     in_loop, *others = observers
-    riding = summary.get("companions") or {}
+    riding = summary.get("open_loop_observers") or {}
     return {in_loop: summary, **{name: riding.get(name, {}) for name in others}}
 
 

@@ -78,7 +78,9 @@ def _dashboard(branch: Branch, names: Sequence[str]) -> rrb.Container:
     return _columns(
         branch.label,
         [9, 8, 6],
-        rrb.Vertical(mechanism, pages(names, "Observers" if branch.run.companions else "Summary"), row_shares=[1, 1]),
+        rrb.Vertical(
+            mechanism, pages(names, "Observers" if branch.run.open_loop_observers else "Summary"), row_shares=[1, 1]
+        ),
         _below_lanes([branch], tilt, [plot(what, branch, _best_of(what, branch)) for what in tilt]),
         _stack(ACTUATOR_PLOTS, [plot(what, branch, _best_of(what, branch)) for what in ACTUATOR_PLOTS]),
     )
@@ -133,7 +135,7 @@ def _has_bias(branch: Branch) -> bool:
 
 def _page_names(branches: Sequence[Branch]) -> list[str]:
     """The pages there are."""
-    riding = len(branches) == 1 or any(branch.run.companions for branch in branches)
+    riding = len(branches) == 1 or any(branch.run.open_loop_observers for branch in branches)
     return ["Summary", *(["Observers"] if riding else []), "Scenario"]
 
 

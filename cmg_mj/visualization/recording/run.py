@@ -48,7 +48,7 @@ class Run:
         return by_observer(self.trajectory.observers, self.summary)
 
     @property
-    def companions(self) -> tuple[str, ...]:
+    def open_loop_observers(self) -> tuple[str, ...]:
         """Those riding along."""
         return self.trajectory.observers[1:]
 

@@ -209,7 +209,7 @@ class _GrowingBranch:
     def _so_far(self, trajectory: Trajectory, now: float) -> Run:
         named = self.named
         bias = {"bias_deg": named.bias_deg}
-        summary = {**bias, "companions": dict.fromkeys(trajectory.observers[1:], bias)}
+        summary = {**bias, "open_loop_observers": dict.fromkeys(trajectory.observers[1:], bias)}
         return Run(named.name, trajectory, summary, Outcome("done", now), named.axis)
 
     def _lines(self, run: Run) -> Lines:

@@ -45,8 +45,8 @@ def page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: Metr
 
 
 def observers_page(runs: Sequence[Run]) -> str:
-    """What is estimated in a run, by all that ride along; of several runs, of those with companions."""
-    return _paragraphs(*(part for run in runs if len(runs) == 1 or run.companions for part in _estimates(run)))
+    """What is estimated in a run, by all that ride along; of several runs, of those with open-loop observers."""
+    return _paragraphs(*(part for run in runs if len(runs) == 1 or run.open_loop_observers for part in _estimates(run)))
 
 
 def _estimates(run: Run) -> list[str]:

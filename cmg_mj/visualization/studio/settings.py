@@ -14,9 +14,9 @@ OBSERVER, FEEDBACK = "observer.kind", "controller.feedback"
 BIAS, NOISE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz"
 LAW = "controller"
 """All of the law but what is no law's."""
-NO_LAWS = ("feedback", "against_turning")
+NO_LAWS = ("feedback", "compensate_turning")
 """Fields of [controller] that stay whatever the law."""
-ANY_LAWS = ("rate_limit_rad_s", "angles", "trim_s")
+ANY_LAWS = ("rate_limit_rad_s", "angle_source", "bias_trim_s")
 """Fields of [controller] that every law has as the scenario has them."""
 
 WEIGHTS = {"state_cost": [1.0, 1.0, 1.0, 1.0], "input_cost": 1.0}

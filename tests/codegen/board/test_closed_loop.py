@@ -125,7 +125,7 @@ def test_super_twisting_is_chaotic_by_itself() -> None:
 
 @pytest.mark.parametrize(
     ("observer", "settings"),
-    [("gyro_free", ()), ("adaptive", ("controller.trim_s=0.2", "controller.angles=estimated"))],
+    [("gyro_free", ()), ("adaptive", ("controller.bias_trim_s=0.2", "controller.angle_source=estimated"))],
 )
 def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
     """Tick by tick, without the sensors' counts: a reading just between two of them may fall to either side."""
@@ -140,8 +140,8 @@ def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
     assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
 
 
-def test_companions_ride_along_on_the_host() -> None:
-    experiment = short("linear", "companions=['ltv']")
+def test_open_loop_observers_ride_along_on_the_host() -> None:
+    experiment = short("linear", "open_loop_observers=['ltv']")
     host, board = experiment.run(), experiment.run(driver="board")
     key = "velocity_rms_error_rad_s"
     assert board.values(key, "ltv") == pytest.approx(host.values(key, "ltv"), rel=1e-3)
@@ -217,7 +217,9 @@ def test_ctrl_c_ends_the_board_too() -> None:
     Path("pressing.py").write_text(COMPANION)
     others = children()
     said = cmg_mj(
-        *["run", "push_recovery", "--driver", "board", "--out", "here"], "--set", "companions=['pressing:Presses']"
+        *["run", "push_recovery", "--driver", "board", "--out", "here"],
+        "--set",
+        "open_loop_observers=['pressing:Presses']",
     )
     assert said.status == 130
     assert said.err.endswith("cmg-mj: interrupted at 0.095 s; what was recorded until then is in here\n")

@@ -30,8 +30,8 @@ def test_double_precision_is_bit_for_bit(kind: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "settings",
     [
-        pytest.param(("controller.trim_s=0.52",), id="trimmed"),
-        pytest.param(("controller.angles=estimated", "controller.rate_hz=400"), id="estimated angles"),
+        pytest.param(("controller.bias_trim_s=0.52",), id="trimmed"),
+        pytest.param(("controller.angle_source=estimated", "controller.rate_hz=400"), id="estimated angles"),
         pytest.param(("controller.gains=[30, 3.5, -1.2, 0.5]", "controller.rate_limit_rad_s=0.6"), id="limited"),
         pytest.param(("observer.torque=true", "observer.bias=false", "observer.sinusoid_hz=1.5"), id="a sinusoid"),
     ],

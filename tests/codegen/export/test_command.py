@@ -130,7 +130,7 @@ def test_files_of_the_users_stay_and_an_earlier_export_is_replaced() -> None:
         (["linear", "--precision", "half"], "'half' is not one of 'double', 'single'"),
         (["linear", "--scenario", "pish"], "scenario 'pish': no such file"),
         (["linear", "--set", "observer.tau=0"], "observer.tau = 0: must be a number greater than 0"),
-        (["linear", "--set", "controller.trim_s=1"], "needs an observer in the loop that estimates the bias"),
+        (["linear", "--set", "controller.bias_trim_s=1"], "needs an observer in the loop that estimates the bias"),
         (["linear", "--set", "controller.feedback=fog"], "set controller.feedback=observer"),
         (["linear", "--set", "controller.kind=lqg"], "law Lqg: cannot be exported: C has the law (8) alone; set"),
         ([], "Missing argument 'OBSERVER'"),

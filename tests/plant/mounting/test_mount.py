@@ -199,7 +199,10 @@ def test_the_command_prints_what_the_pair_can_do() -> None:
     assert figures["ceiling_tilt_deg"] < 2.0
     assert figures["scale_that_suffices"] == 1.21
     assert (
-        0.0 < figures["borne_impulse_least_n_m_s"] <= figures["borne_impulse_n_m_s"] < figures["ceiling_impulse_n_m_s"]
+        0.0
+        < figures["borne_impulse_least_n_m_s"]
+        <= figures["push_margin_impulse_n_m_s"]
+        < figures["ceiling_impulse_n_m_s"]
     )
     words = cmg_mj(*given, "-o", "b.xml")
     assert (words.status, "--scale 1.21 suffices" in words.out) == (0, True)

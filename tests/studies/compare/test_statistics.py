@@ -52,25 +52,25 @@ def test_means_have_students_intervals() -> None:
     row = by_name([entry("ltv", [*errors])])["ltv"]
     assert row[ERROR] == pytest.approx(np.mean(errors))
     assert row["intervals"][ERROR] == pytest.approx(student(errors))
-    assert row["less_best"] == {}  # it is the best itself, in every figure
+    assert row["minus_best"] == {}  # it is the best itself, in every figure
 
 
 def test_differences_are_taken_world_by_world() -> None:
     """The worlds differ far more than the observers."""
     first, second = [0.1, 0.5, 0.9], [0.11, 0.52, 0.90]
     rows = by_name([entry("ltv", [*second]), entry("linear", [*first])])
-    less = rows["ltv"]["less_best"][ERROR]
+    less = rows["ltv"]["minus_best"][ERROR]
     assert (less["best"], less["worlds"]) == ("linear", 3)
     assert less["mean"] == pytest.approx(0.01)
     assert less["interval"] == pytest.approx(student([0.01, 0.02, 0.0]))
-    assert ERROR not in rows["linear"]["less_best"]
+    assert ERROR not in rows["linear"]["minus_best"]
 
 
 def test_fallen_worlds_are_in_no_mean_and_no_difference() -> None:
     rows = by_name([entry("ltv", [0.1, 0.2, 0.3, 0.4]), entry("linear", [0.2, 9.0, 0.4, 0.6], lost=(1,))])
     assert rows["linear"][ERROR] == pytest.approx(0.4)
     assert rows["linear"]["fell_fraction"] == 0.25
-    less = rows["linear"]["less_best"][ERROR]
+    less = rows["linear"]["minus_best"][ERROR]
     assert (less["worlds"], less["mean"]) == (3, pytest.approx((0.1 + 0.1 + 0.2) / 3))
 
 
@@ -85,7 +85,7 @@ def test_the_best_is_sought_among_those_that_stood_most_often() -> None:
 def test_more_of_a_fit_is_better() -> None:
     good, bad = entry("ltv", [0.1, 0.1], more={FIT: 0.7}), entry("linear", [0.1, 0.1], more={FIT: -0.3})
     assert best([bad, good], FIT) is good
-    assert by_name([bad, good])["linear"]["less_best"][FIT]["mean"] == pytest.approx(-1.0)
+    assert by_name([bad, good])["linear"]["minus_best"][FIT]["mean"] == pytest.approx(-1.0)
 
 
 def test_a_plot_of_fits_shows_the_best() -> None:
@@ -106,12 +106,12 @@ def test_references_ride_along_with_the_best_in_the_push_window() -> None:
     quick = entry("linear", [0.2, 0.2], more={PUSH_ERROR: 0.3})
     rows = by_name([slow, quick])
     assert list(rows) == ["ltv", "linear", *REFERENCES]
-    assert {rows[name]["rides_along_in"] for name in REFERENCES} == {"linear"}
-    assert "rides_along_in" not in rows["linear"]
+    assert {rows[name]["in_loop_of"] for name in REFERENCES} == {"linear"}
+    assert "in_loop_of" not in rows["linear"]
     calm = by_name([entry("ltv", [0.1, 0.1]), entry("linear", [0.2, 0.2])])
-    assert calm["zero"]["rides_along_in"] == "ltv"
+    assert calm["zero"]["in_loop_of"] == "ltv"
     assert calm["zero"][ERROR] == 0.2
-    assert calm["mems_gyro"]["less_best"][ERROR]["mean"] == pytest.approx(-0.09)
+    assert calm["mems_gyro"]["minus_best"][ERROR]["mean"] == pytest.approx(-0.09)
 
 
 def test_a_reference_has_no_loop_of_its_own() -> None:
@@ -124,7 +124,7 @@ def test_a_reference_has_no_loop_of_its_own() -> None:
 def test_one_world_has_no_intervals() -> None:
     row = by_name([entry("ltv", [0.1]), entry("linear", [0.3])])["linear"]
     assert row["intervals"][ERROR] is None
-    assert row["less_best"][ERROR]["interval"] is None
+    assert row["minus_best"][ERROR]["interval"] is None
     example = [dataclasses.replace(compared()[0], result=compared()[0].example)]
     assert "Less the best" not in comparison_markdown(standings(example))
     assert "±" not in comparison_markdown(standings(example)).split("\n\n")[0]
@@ -134,7 +134,7 @@ def test_a_figure_that_is_missing_in_a_world() -> None:
     """One that did not settle: it counts neither in the mean nor in a difference."""
     of = entry("linear", [0.2, 0.2, 0.2])
     of.result.summaries[1]["settle_time_s"] = None
-    less = by_name([entry("ltv", [0.1, 0.1, 0.1], more={"settle_time_s": 0.5}), of])["linear"]["less_best"][
+    less = by_name([entry("ltv", [0.1, 0.1, 0.1], more={"settle_time_s": 0.5}), of])["linear"]["minus_best"][
         "settle_time_s"
     ]
     assert (less["worlds"], less["mean"]) == (2, 0.5)
@@ -157,7 +157,7 @@ def test_the_table_has_every_world_of_every_row() -> None:
     assert table["world"].to_pylist() == [0, 1, 2] * (2 + len(REFERENCES))
     assert set(table["seed"].to_pylist()) == {3}
     assert table["outcome"].to_pylist() == ["done"] * 3 + ["fell"] * 3 + ["done"] * 3 * len(REFERENCES)
-    assert table["rides_along_in"].to_pylist() == [None] * 6 + ["ltv"] * 3 * len(REFERENCES)
+    assert table["in_loop_of"].to_pylist() == [None] * 6 + ["ltv"] * 3 * len(REFERENCES)
     assert set(compared()[0].result.summaries[0]) - {"references"} <= set(table.column_names)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from cmg_mj.controllers.laws import TABLE_2_GAINS, carried_over_gains
+from cmg_mj.controllers.laws import TABLE_2_GAINS, scaled_gains
 from cmg_mj.controllers.laws.state_feedback import closed_loop_poles
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.mounting import mount
@@ -103,7 +103,7 @@ def test_no_controller_bears_more(fast: Experiment, fed: dict[str, Any]) -> None
 
 
 def test_carried_over_gains_are_table_2_on_the_papers_rig() -> None:
-    gains = carried_over_gains(load_plant().reduced)
+    gains = scaled_gains(load_plant().reduced)
     np.testing.assert_allclose(gains, TABLE_2_GAINS, rtol=1e-3)
 
 
@@ -111,5 +111,5 @@ def test_carried_over_gains_are_table_2_on_the_papers_rig() -> None:
 def test_carried_over_gains_make_the_papers_loop_at_the_robots_pace(model: ReducedModel) -> None:
     papers = load_plant().reduced
     tau = math.sqrt(papers.gravity_torque / papers.J1 / (model.gravity_torque / model.J1))
-    poles = np.sort_complex(closed_loop_poles(model, carried_over_gains(model)) * tau)
+    poles = np.sort_complex(closed_loop_poles(model, scaled_gains(model)) * tau)
     np.testing.assert_allclose(poles, np.sort_complex(closed_loop_poles(papers, TABLE_2_GAINS)), rtol=2e-3)

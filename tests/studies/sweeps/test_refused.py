@@ -49,7 +49,10 @@ def nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
         (["--vary", "based_on=a,b"], "--vary based_on: is not varied"),
         (["--vary", "versions.mujoco=a,b"], "--vary versions.mujoco: is not varied"),
         (["--vary", f"{BIAS}+compare.worlds=1,2"], "--vary compare.worlds: is not varied"),
-        (["--vary", 'companions=["ltv"],[]'], "--vary companions: is not varied: a sweep runs without them"),
+        (
+            ["--vary", 'open_loop_observers=["ltv"],[]'],
+            "--vary open_loop_observers: is not varied: a sweep runs without them",
+        ),
         (["--vary", f"{BIAS}=0,1", "--observers", "linear,ltv,linear"], "observers: 'linear' is there twice"),
         (["--vary", f"{BIAS}=0,1", "--observers", "linear,broken:Broken"], "observer broken:Broken: ValueError: never"),
         (

@@ -169,4 +169,4 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
 
 
 def test_columns_are_those_of_a_worlds_table() -> None:
-    assert [name for name in trials().schema.names if name in FIRST] == [n for n in FIRST if n != "rides_along_in"]
+    assert [name for name in trials().schema.names if name in FIRST] == [n for n in FIRST if n != "in_loop_of"]

@@ -34,7 +34,7 @@ def test_what_is_between_two_pushes_is_not_scored() -> None:
 def test_no_observer_takes_part_in_the_loop_of_the_recording() -> None:
     """Whatever the scenario closes its loop on, the motion recorded is the gyro's loop's."""
     gyro = record(load_scenario("observer_tuning", ["seed=5"]), range(3))
-    settings = ["seed=5", "duration_s=10", 'controller.angles="estimated"']
+    settings = ["seed=5", "duration_s=10", 'controller.angle_source="estimated"']
     other = record(load_scenario("push_recovery", settings, "luenberger"), range(3))
     for name in ("y1_rad", "y2_rad", "u_rad_s", "fog_rad_s"):
         np.testing.assert_array_equal(gyro.trajectory[name], other.trajectory[name])
@@ -42,8 +42,8 @@ def test_no_observer_takes_part_in_the_loop_of_the_recording() -> None:
 
 
 def test_scores_are_those_of_the_scenario_itself() -> None:
-    """The companions of an ordinary run, summed up by hand, have the errors that the tuning minimises."""
-    scenario = load_scenario("observer_tuning", ["seed=5", 'companions=["ltv"]', "duration_s=3.2"], "linear")
+    """The open-loop observers of an ordinary run, summed up by hand, have the errors that the tuning minimises."""
+    scenario = load_scenario("observer_tuning", ["seed=5", 'open_loop_observers=["ltv"]', "duration_s=3.2"], "linear")
     run = prepare(scenario).run_many(3).trajectory
     assert run is not None
     inside = (run["time_s"] > 1.9999) & (run["time_s"] < 3.0999)

@@ -108,12 +108,12 @@ def test_long_names_do_not_narrow_the_panels(
 ) -> None:
     trajectory, summary = ridden
     longest = sorted(OBSERVERS, key=len)[-3:]
-    figures_of = summary["companions"] | {"homogeneous": summary}
-    companions = {name: dict.fromkeys(figures_of[name], 0.0) for name in longest[1:]}
+    figures_of = summary["open_loop_observers"] | {"homogeneous": summary}
+    open_loop_observers = {name: dict.fromkeys(figures_of[name], 0.0) for name in longest[1:]}
     signals = tuple(trajectory.extra_signals(name) for name in longest)
     layout = replace(trajectory.layout, observers=tuple(longest), extra_signals=signals)
     few = replace(trajectory, layout=layout)
-    figure = plotted(tmp_path, few, {**figures_of[longest[0]], "companions": companions}, figures)
+    figure = plotted(tmp_path, few, {**figures_of[longest[0]], "open_loop_observers": open_loop_observers}, figures)
     assert figure.axes[0].get_position().x0 < 0.15
 
 

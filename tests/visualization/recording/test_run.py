@@ -33,7 +33,7 @@ from cmg_mj.visualization.recording.summary import ROW_TABLES
 from cmg_mj.visualization.recording.timeline import column as time_column
 from cmg_mj.visualization.recording.timeline import instant
 
-SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1", 'companions=["linear"]')
+SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1", 'open_loop_observers=["linear"]')
 NANOSECONDS = 1e9
 RERUN = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
 
@@ -170,7 +170,9 @@ def test_an_observer_keeps_its_colour(path: Path) -> None:
 
 def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
     """In degrees, in the loop and riding along; the summary has its figures."""
-    of = prepare(scenario("observer.kind=adaptive", "companions=['homogeneous_adaptive']", "metrics.bias_from_s=0.1"))
+    of = prepare(
+        scenario("observer.kind=adaptive", "open_loop_observers=['homogeneous_adaptive']", "metrics.bias_from_s=0.1")
+    )
     ran = recorded(of)
     where = write(tmp_path / "bias.rrd", of, [ran])
     assert {"/adaptive/bias/1_adaptive", "/adaptive/bias/2_homogeneous_adaptive", "/adaptive/bias/true"} <= entities(
@@ -468,7 +470,7 @@ def test_a_fall_in_the_first_tick(tmp_path: Path) -> None:
     np.testing.assert_allclose(matrix(quaternion), body.xmat.reshape(3, 3), atol=1e-6)
 
 
-def test_a_companion_that_diverged(run: Run, experiment: Experiment, tmp_path: Path) -> None:
+def test_an_open_loop_observer_that_diverged(run: Run, experiment: Experiment, tmp_path: Path) -> None:
     columns = dict(run.trajectory.columns)
     columns["estimate/linear/x2_rad_s"] = columns["x2_rad_s"].copy()
     columns["estimate/linear/x2_rad_s"][50:] = [*[1e300, -np.inf], *[np.nan] * (len(run.trajectory) - 52)]

@@ -16,7 +16,7 @@ from cmg_mj.visualization.studio.panel import Panel
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, LAW, OBSERVER
 from tests.visualization.studio.session import session
 
-LQG = {"rate_hz": 200.0, "rate_limit_rad_s": 4.7, "angles": "measured", "trim_s": 0.0, "kind": "lqg"}
+LQG = {"rate_hz": 200.0, "rate_limit_rad_s": 4.7, "angle_source": "measured", "bias_trim_s": 0.0, "kind": "lqg"}
 
 
 class Screen:
