@@ -1,4 +1,4 @@
-"""The house's one rule: a lower room may use a higher one, and nothing above the line imports MuJoCo."""
+"""The rule of the packages: a lower one may use a higher one, and nothing above the line imports MuJoCo."""
 
 from __future__ import annotations
 
@@ -16,118 +16,156 @@ import cmg_mj
 from tests.observers.reference import PAPER
 
 PACKAGE = Path(cmg_mj.__file__).parent
+ROOT = PACKAGE.parent
 
-HOUSE = (PACKAGE.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+ARCHITECTURE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+TABLE = ARCHITECTURE.split("## The packages")[1].split("\n\n| library |")[0]
 ABOVE, BELOW = (
-    re.findall(r"^\| `(\w+)(?:\.py|/)` \|", part, re.MULTILINE)
-    for part in HOUSE.split("nothing above this line imports MuJoCo")
+    re.findall(r"^\| `(\w+)` \|", part, re.MULTILINE) for part in TABLE.split("nothing above this line imports MuJoCo")
 )
-"""The rooms from top to bottom, as docs/architecture.md lists them."""
+"""The packages from top to bottom, as docs/architecture.md lists them."""
 ORDER = [*ABOVE, *BELOW]
+MOST_ENTRIES = 18
 
-REAL_LOG = PACKAGE.parent / "examples" / "data" / "stepper_encoder_gyro.csv"
-
-HEAVY = {
-    "rerun": "recording",
-    "matplotlib": "plots",
-    "casadi": "export",
-    "distributed": "sweeps",
-    "mujoco.studio": "studio",
-    "gymnasium": "environment",
-}
-"""Imported by one room each, because it costs time."""
-AT_ONCE = ("recording", "environment")
-"""Rooms that import theirs when they are imported; the others when they need it."""
+HEAVY = dict(re.findall(r"^\| ([\w.]+) \| `([\w/]+)` \|$", ARCHITECTURE, re.MULTILINE))
+"""Library -> the only sub-package or module that imports it, because it costs time."""
+AT_ONCE = ("cmg_mj.visualization.recording", "cmg_mj.replay.recording", "cmg_mj.simulation.gymnasium_env")
+"""These import theirs when they are imported; the others when they need it."""
 
 
 @cache
-def rooms() -> list[str]:
-    """Modules and packages of cmg_mj."""
-    return sorted(
-        {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
-        - {"__init__"}
-    )
+def modules() -> dict[str, Path]:
+    """Full name -> file of every module; a package's is its `__init__.py`."""
+    paths = sorted(PACKAGE.rglob("*.py"))
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in paths]
+    return dict(zip(names, paths, strict=True))
 
 
-def depth(room: str) -> int:
-    return ORDER.index(room)
+def package_of(module: str) -> str:
+    return module.split(".")[1] if "." in module else ""
 
 
-def files(room: str) -> list[Path]:
-    one = PACKAGE / f"{room}.py"
-    return [one] if one.exists() else sorted((PACKAGE / room).rglob("*.py"))
+def of_package(package: str) -> list[str]:
+    return [name for name in modules() if package_of(name) == package]
 
 
-@cache
-def imports(path: Path) -> list[tuple[int, str]]:
-    """Line and full name of everything that a file imports, inside functions too."""
-    found = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+def imported_names(tree: ast.AST, where: str) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            found += [(node.lineno, alias.name) for alias in node.names]
+            yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}:{node.lineno}: write the whole name"
-            found += [(node.lineno, f"{node.module}.{alias.name}") for alias in node.names]
-    return found
+            assert node.level == 0, f"{where}:{node.lineno}: write the whole name"
+            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
 
 
-def used_rooms(room: str) -> Iterator[tuple[str, str]]:
-    """Where a room imports which other room."""
-    for path in files(room):
-        for line, name in imports(path):
-            parts = name.split(".")
-            if parts[0] == "cmg_mj" and len(parts) > 1 and parts[1] in rooms() and parts[1] != room:
-                yield f"{path.name}:{line}", parts[1]
+@cache
+def imports(module: str) -> list[tuple[int, str]]:
+    """Line and full name of everything that a module imports, inside functions too."""
+    return list(imported_names(ast.parse(modules()[module].read_text(encoding="utf-8")), module))
+
+
+def at_import(module: str) -> Iterator[str]:
+    """Modules of the package that a module imports when it is imported itself."""
+    tree = ast.parse(modules()[module].read_text(encoding="utf-8"))
+    outside = [node for node in tree.body if not _is_for_types(node)]
+    for _, name in imported_names(ast.Module([node for node in outside if not _defines(node)], []), module):
+        yield from _module_in(name)
+
+
+def _is_for_types(node: ast.stmt) -> bool:
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+def _defines(node: ast.stmt) -> bool:
+    return isinstance(node, ast.FunctionDef | ast.ClassDef)
+
+
+def _module_in(name: str) -> Iterator[str]:
+    while name and name not in modules():
+        name = name.rpartition(".")[0]
+    if name:
+        yield name
 
 
 def in_a_fresh_interpreter(code: str) -> list[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
 
 
-def test_every_room_is_in_the_list_once() -> None:
-    assert sorted(ORDER) == rooms()
+def test_the_top_is_small() -> None:
+    entries = sorted(path.name for path in PACKAGE.iterdir() if path.name not in ("__pycache__", "models", "scenarios"))
+    files = [name for name in entries if (PACKAGE / name).is_file()]
+    assert files == ["__init__.py", "elementwise.py", "errors.py", "py.typed"]
+    assert len(entries) <= MOST_ENTRIES
 
 
-@pytest.mark.parametrize("room", rooms())
-def test_imports_run_upward_only(room: str) -> None:
-    below = [f"{where} imports {other}" for where, other in used_rooms(room) if depth(other) > depth(room)]
+def test_every_package_is_in_the_table_once() -> None:
+    assert len(ORDER) == 16
+    assert sorted(ORDER) == sorted({package_of(name) for name in modules()} - {""})
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_a_package_says_its_job_in_a_sentence(package: str) -> None:
+    path = PACKAGE / package / "__init__.py"
+    text = ast.get_docstring(ast.parse((path if path.exists() else PACKAGE / f"{package}.py").read_text("utf-8")))
+    assert text
+    assert text.splitlines()[0].endswith(".")
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_imports_run_upward_only(package: str) -> None:
+    depth = ORDER.index(package)
+    below = [
+        f"{module}:{line} imports {name}"
+        for module in of_package(package)
+        for line, name in imports(module)
+        if name.startswith("cmg_mj.") and (other := package_of(name)) in ORDER and ORDER.index(other) > depth
+    ]
     assert not below
 
 
 def test_a_downward_import_would_be_seen() -> None:
     """The order is not trivially held: the loop does use the controller, the command line the scenario."""
-    assert "controller" in {other for _, other in used_rooms("simulate")}
-    assert "scenario" in {other for _, other in used_rooms("cli")}
-    assert depth("controller") < depth("scenario") < depth("simulate") < depth("cli")
+    used = {
+        package: {package_of(name) for module in of_package(package) for _, name in imports(module)}
+        for package in ORDER
+    }
+    assert "controllers" in used["simulation"]
+    assert "scenario" in used["cli"]
+    assert ORDER.index("controllers") < ORDER.index("scenario") < ORDER.index("simulation") < ORDER.index("cli")
+
+
+def test_no_circle_of_modules() -> None:
+    """Among the imports that are made when a module is imported; those inside functions are made later."""
+    graph = {module: set(at_import(module)) - {module} for module in modules()}
+    done: set[str] = set()
+    while ready := {module for module, used in graph.items() if module not in done and used <= done | {module}}:
+        done |= ready
+    assert not {module: used - done for module, used in graph.items() if module not in done}
 
 
 def test_nothing_above_the_line_imports_mujoco() -> None:
-    """One room after the other: the first that brings MuJoCo, or what is as heavy, is named."""
+    """One package after the other: the first that brings MuJoCo, or what is as heavy, is named."""
     code = "import importlib, sys\n"
-    for room in ABOVE:
-        code += f"importlib.import_module('cmg_mj.{room}')\n"
+    light = [name for package in ABOVE for name in of_package(package) if not uses_casadi(name)]
+    for name in light:
+        code += f"importlib.import_module({name!r})\n"
         for heavy in ("mujoco", "control", "pyarrow", *HEAVY):
-            code += f"if {heavy!r} in sys.modules: print('{room}:{heavy}')\n"
+            code += f"if {heavy!r} in sys.modules: print({name!r}, {heavy!r})\n"
     code += "print('done')"
     assert in_a_fresh_interpreter(code) == ["done"]
 
 
-def test_a_bundled_scenario_is_checked_without_mujoco() -> None:
-    code = "import sys; import cmg_mj.scenario.loading; print('mujoco' in sys.modules); "
-    code += "from cmg_mj.cli import main; main(['check', 'push_recovery']); print('mujoco' in sys.modules)"
-    first, *_, last = in_a_fresh_interpreter(code)
-    assert (first, last) == ("False", "False")
+def uses_casadi(module: str) -> bool:
+    return module.startswith("cmg_mj.codegen.export.")
 
 
-def test_a_log_is_replayed_without_mujoco() -> None:
-    code = f"""
-import sys
-from cmg_mj import read_log, replay_log
-log = read_log({str(REAL_LOG)!r}, {{"time": "time_s", "tilt": "encoder_rad"}}, between_s=(0.0, 2.0))
-replay_log(log, ["linear"], skip_s=0.5)
-print("mujoco" in sys.modules)
-"""
-    assert in_a_fresh_interpreter(code) == ["False"]
+@pytest.mark.parametrize("package", ABOVE)
+def test_upper_packages_do_not_name_mujoco(package: str) -> None:
+    """Not even inside a function."""
+    named = [
+        f"{name}:{line}" for name in of_package(package) for line, used in imports(name) if used.startswith("mujoco")
+    ]
+    assert not named
 
 
 def test_every_observer_works_without_mujoco() -> None:
@@ -145,33 +183,23 @@ print("mujoco" in sys.modules)
     assert in_a_fresh_interpreter(code) == ["False"]
 
 
-def test_heavy_packages_are_imported_where_they_are_used() -> None:
-    """All rooms but two leave them out: nothing imports matplotlib before a plot is drawn."""
+@pytest.mark.parametrize("library", sorted(HEAVY))
+def test_only_one_place_knows_a_heavy_library(library: str) -> None:
+    place = f"cmg_mj.{HEAVY[library].replace('/', '.')}"
+    users = {name for name in modules() for _, used in imports(name) if f"{used}.".startswith(f"{library}.")}
+    assert users
+    assert {name for name in users if not f"{name}.".startswith(f"{place}.")} == set()
+
+
+def test_heavy_libraries_are_imported_where_they_are_used() -> None:
+    """All modules but these leave them out: nothing imports matplotlib before a plot is drawn."""
+    inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.dask_", *AT_ONCE)
     code = "import importlib, sys\n"
-    for room in rooms():
-        if room not in AT_ONCE:
-            code += f"importlib.import_module('cmg_mj.{room}')\n"
+    for name in modules():
+        if not name.startswith(inner):
+            code += f"importlib.import_module({name!r})\n"
     code += f"print(*[name for name in {sorted(HEAVY)} if name in sys.modules], 'done')"
     assert in_a_fresh_interpreter(code) == ["done"]
-
-
-@pytest.mark.parametrize("package", sorted(HEAVY))
-def test_only_one_room_knows_a_heavy_package(package: str) -> None:
-    users = {
-        room
-        for room in rooms()
-        for path in files(room)
-        for _, name in imports(path)
-        if f"{name}.".startswith(f"{package}.")
-    }
-    assert users <= {HEAVY[package]}
-
-
-@pytest.mark.parametrize("room", ABOVE)
-def test_upper_rooms_do_not_name_mujoco(room: str) -> None:
-    """Not even inside a function."""
-    named = [f"{path.name}:{line}" for path in files(room) for line, name in imports(path) if name.startswith("mujoco")]
-    assert not named
 
 
 def test_public_names_are_what_they_say() -> None:
@@ -182,7 +210,6 @@ def test_public_names_are_what_they_say() -> None:
 
 
 def test_documents_named_in_the_sources_exist() -> None:
-    root = PACKAGE.parent
-    for path in [*PACKAGE.rglob("*.py"), root / "README.md", *(root / "docs").glob("*.md")]:
+    for path in [*PACKAGE.rglob("*.py"), ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
         for name in re.findall(r"docs/[\w/]+\.(?:md|py|png)", path.read_text(encoding="utf-8")):
-            assert (root / name).is_file(), f"{path.name} names {name}"
+            assert (ROOT / name).is_file(), f"{path.name} names {name}"
