@@ -96,7 +96,7 @@ def test_plant(given: str, fragments: list[str]) -> None:
     (
         "typo",
         "rate = 200",
-        "controller.rate: no such field; did you mean 'rate_hz'? allowed: compensate_turning, angles",
+        "controller.rate: no such field; did you mean 'rate_hz'? allowed: angle_source, bias_trim_s, compensate_turning",
     ),
     ("no rate", "rate_hz = 0", f"controller.rate_hz = 0: {RATE}"),
     ("a negative rate", "rate_hz = -200", f"controller.rate_hz = -200: {RATE}"),
@@ -161,7 +161,7 @@ def test_plant(given: str, fragments: list[str]) -> None:
     ),
     (
         "typo in a choice",
-        "angles = 'measure'",
+        "angle_source = 'measure'",
         "'measure': must be one of 'measured', 'estimated'; did you mean 'measured'?",
     ),
 )
@@ -196,7 +196,7 @@ def test_conditions_of_the_theorems(given: str, complaint: str) -> None:
 
 
 def test_trimming_without_a_bias_estimate() -> None:
-    said = check("[controller]\ntrim_s = 1.0").complaint
+    said = check("[controller]\nbias_trim_s = 1.0").complaint
     assert said.startswith("my.toml: controller.bias_trim_s = 1: needs an observer in the loop that estimates the bias")
 
 

@@ -229,7 +229,7 @@ def test_a_law_that_cannot_work(given: type, fragments: list[str], command: str)
     (
         "another's field",
         ["torque_walk=1.0"],
-        "controller.torque_walk: no such field; allowed: compensate_turning, angles",
+        "controller.torque_walk: no such field; allowed: angle_source, bias_trim_s, compensate_turning",
     ),
     (
         "of the wrong type",

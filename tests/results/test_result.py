@@ -143,7 +143,7 @@ def test_plants_and_vary_are_not_given_together() -> None:
 def test_wrong_keys_and_groups_are_refused() -> None:
     with pytest.raises(InputError, match="did you mean 'tilt_rms_deg'"):
         result().values("tilt_rms_dg")
-    with pytest.raises(InputError, match="did not ride along; did you mean 'linear'"):
+    with pytest.raises(InputError, match="no open-loop observer of this run; did you mean 'linear'"):
         result().values(ERROR, "liner")
     for count in (0, -1, 3):
         with pytest.raises(InputError, match="cannot be parted so"):

@@ -35,7 +35,7 @@ class Broken:
 @pytest.fixture(autouse=True)
 def nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Until something is refused."""
-    for module in ("store", "swept", "plan"):
+    for module in ("chunk_store", "api", "plan"):
         monkeypatch.setattr(f"cmg_mj.studies.sweeps.{module}.compute", lambda *_, **__: pytest.fail("computed"))
 
 
