@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cmg_mj.controllers.controller import Controller
-    from cmg_mj.controllers.laws import LAWS, Fed, Law, StateFeedback, lqr_gains, make_law
+    from cmg_mj.controllers.laws import LAWS, FeedbackState, Law, StateFeedback, lqr_gains, make_law
     from cmg_mj.errors import InputError, RunStopped
     from cmg_mj.observers import OBSERVERS, Estimate, Measurement, Observer, make_observer
     from cmg_mj.observers.reduced_model import ReducedModel
-    from cmg_mj.plant.mounting import Mounted, mount
+    from cmg_mj.plant.mounting import MountedRobot, mount
     from cmg_mj.plant.plant import Plant, load_plant
-    from cmg_mj.replay.log_replay import Replayed, replay_log
+    from cmg_mj.replay.log_replay import ReplayResult, replay_log
     from cmg_mj.replay.logs import Log, read_log
     from cmg_mj.results.result import Outcome, Result
     from cmg_mj.results.trajectory import Trajectory
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from cmg_mj.scenario.schema import Scenario
     from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, Sensors
     from cmg_mj.sensors.tilt import RadialTilt
-    from cmg_mj.simulation.callback import control, installed
+    from cmg_mj.simulation.callback import control, control_callback
     from cmg_mj.simulation.experiment import Experiment, prepare
-    from cmg_mj.studies.sweeps.api import Swept, sweep
+    from cmg_mj.studies.sweeps.api import SweepResult, sweep
 
 _HOMES = {
-    "simulation.callback": ("control", "installed"),
+    "simulation.callback": ("control", "control_callback"),
     "controllers.controller": ("Controller",),
     "errors": ("InputError", "RunStopped"),
     "observers": ("OBSERVERS", "Estimate", "Measurement", "Observer", "make_observer"),
@@ -40,16 +40,16 @@ _HOMES = {
     "scenario.plant_settings": ("PlantSettings",),
     "scenario.disturbances": ("Push",),
     "observers.reduced_model": ("ReducedModel",),
-    "replay.log_replay": ("Replayed", "replay_log"),
+    "replay.log_replay": ("ReplayResult", "replay_log"),
     "simulation.experiment": ("Experiment", "prepare"),
-    "controllers.laws": ("LAWS", "Fed", "Law", "StateFeedback", "lqr_gains", "make_law"),
+    "controllers.laws": ("LAWS", "FeedbackState", "Law", "StateFeedback", "lqr_gains", "make_law"),
     "replay.logs": ("Log", "read_log"),
-    "plant.mounting": ("Mounted", "mount"),
+    "plant.mounting": ("MountedRobot", "mount"),
     "scenario.loading": ("load_scenario", "parse_scenario"),
     "scenario.schema": ("Scenario",),
     "sensors.sampled": ("Accelerometer", "Encoder", "Fog", "Sensors"),
     "results.result": ("Outcome", "Result"),
-    "studies.sweeps.api": ("Swept", "sweep"),
+    "studies.sweeps.api": ("SweepResult", "sweep"),
     "sensors.tilt": ("RadialTilt",),
     "results.trajectory": ("Trajectory",),
 }
@@ -63,13 +63,13 @@ __all__ = [
     "Encoder",
     "Estimate",
     "Experiment",
-    "Fed",
+    "FeedbackState",
     "Fog",
     "InputError",
     "Law",
     "Log",
     "Measurement",
-    "Mounted",
+    "MountedRobot",
     "Observer",
     "Outcome",
     "Plant",
@@ -77,16 +77,16 @@ __all__ = [
     "Push",
     "RadialTilt",
     "ReducedModel",
-    "Replayed",
+    "ReplayResult",
     "Result",
     "RunStopped",
     "Scenario",
     "Sensors",
     "StateFeedback",
-    "Swept",
+    "SweepResult",
     "Trajectory",
     "control",
-    "installed",
+    "control_callback",
     "load_plant",
     "load_scenario",
     "lqr_gains",

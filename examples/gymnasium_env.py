@@ -20,7 +20,7 @@ for agent in ("nothing", "observer and law"):
     total, fell, ended = 0.0, False, False
     while not (fell or ended):
         if agent == "observer and law":
-            memory, u = law.step(memory, y, cmg_mj.Fed(y.y1, estimate[1], y.y2), u)
+            memory, u = law.step(memory, y, cmg_mj.FeedbackState(y.y1, estimate[1], y.y2), u)
         observed, reward, fell, ended, info = env.step(np.array([u / law.rate_limit]))
         y = cmg_mj.Measurement(observed[0], observed[1], 0.0)
         state, estimate = observer.step(state, y, u)

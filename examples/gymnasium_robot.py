@@ -21,6 +21,6 @@ with tempfile.TemporaryDirectory() as folder:
     experiment = write_scenario(model, ROBOT, "homogeneous", can)
 print(f"falls with {can.ceiling.pole:.2f} 1/s; any controller recovers at most {can.ceiling.tilt:.3f} rad")
 for share in (0.6, 1.8):
-    push = {"push.0.torque_n_m": share * can.bears.impulse / 0.1}
-    stood = experiment.with_values(push).run_many(5, keep_trajectory=False).stood.sum()
+    push = {"push.0.torque_n_m": share * can.push_margin.median_impulse / 0.1}
+    stood = experiment.with_settings(push).run_many(5, keep_trajectory=False).stood.sum()
     print(f"pushed with {share} of what it bears: {stood} of 5 stood")

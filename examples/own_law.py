@@ -28,7 +28,7 @@ class Leaning:
         """Sample k: what is measured, what is fed back with what the observer estimates beyond, u held since k-1."""
         leaning = self.share * x.extra[0] / (self.model.gimbals * self.model.gravity_torque)
         law = cmg_mj.StateFeedback(self.dt, rate_limit=self.rate_limit)
-        return law.step(state, y, cmg_mj.Fed(x.x1 + leaning, x.x2, x.x3), u)
+        return law.step(state, y, cmg_mj.FeedbackState(x.x1 + leaning, x.x2, x.x3), u)
 
 
 if __name__ == "__main__":

@@ -34,5 +34,5 @@ with tempfile.TemporaryDirectory() as folder:
     can = prospects(write_scenario(model, model, "homogeneous"))
     experiment = write_scenario(model, model, "homogeneous", can)  # pushes with 0.6 of what it bears
 outcome = experiment.run().outcomes[0]
-print(f"held: {', '.join(mounted.held)}; it bears {can.share:.0%} of what any law could")
+print(f"held: {', '.join(mounted.held)}; it bears {can.fraction_of_limit:.0%} of what any law could")
 print(f"pushed with 0.6 of that: {'fell at' if outcome.fell else 'stood until'} {outcome.time_s:g} s")

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from cmg_mj.cli import boards, logs, mount, scenarios, studies, studio, sweeps
-from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, say
+from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
 from cmg_mj.errors import InputError, RunStopped
 
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, real sensors, velocity observers.
@@ -36,21 +36,21 @@ class Commands(click.Group):
 
     def make_context(self, *arguments: Any, **others: Any) -> click.Context:
         """Read the arguments, which prints what --help asks for."""
-        with _perhaps_unread():
+        with _ignore_broken_pipe():
             return super().make_context(*arguments, **others)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""
         try:
-            with _perhaps_unread():
+            with _ignore_broken_pipe():
                 return super().invoke(ctx)
         except KeyboardInterrupt:
-            say("interrupted")
+            note("interrupted")
             sys.exit(INTERRUPTED)
 
 
 @contextmanager
-def _perhaps_unread() -> Iterator[None]:
+def _ignore_broken_pipe() -> Iterator[None]:
     """A reader, such as head, who has had enough is no failure; to click it is one."""
     try:
         yield
@@ -99,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except OSError as error:
         if not isinstance(error, BrokenPipeError):  # the reader, such as head, has had enough
             status = WRONG_INPUT
-        _give_up_streams(error)
+        _detach_streams(error)
     if status != DONE:
         sys.exit(status)
 
@@ -114,11 +114,13 @@ def _status(arguments: Sequence[str]) -> Any:
     except SystemExit as exit:
         return exit.code
     except (InputError, RunStopped, click.ClickException) as error:
-        return _said(error.format_message() if isinstance(error, click.ClickException) else str(error), WRONG_INPUT)
+        return _fail_with(
+            error.format_message() if isinstance(error, click.ClickException) else str(error), WRONG_INPUT
+        )
     except MemoryError:
-        return _said("there is not enough memory for this; take a shorter run or fewer worlds", WRONG_INPUT)
+        return _fail_with("there is not enough memory for this; take a shorter run or fewer worlds", WRONG_INPUT)
     except (KeyboardInterrupt, click.Abort):  # before or after a command
-        return _said("interrupted", INTERRUPTED)
+        return _fail_with("interrupted", INTERRUPTED)
     return DONE
 
 
@@ -129,14 +131,14 @@ def _open_streams() -> None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
 
 
-def _said(complaint: str, status: int) -> int:
+def _fail_with(complaint: str, status: int) -> int:
     """The status, whether anyone has read the complaint or not."""
     with suppress(BrokenPipeError):
-        say(complaint)
+        note(complaint)
     return status
 
 
-def _give_up_streams(error: OSError) -> None:
+def _detach_streams(error: OSError) -> None:
     """Nothing more is written to a stream that takes nothing, by Python at its end either; say why if that can be."""
     for stream in (sys.stdout, sys.stderr):
         try:
@@ -146,4 +148,4 @@ def _give_up_streams(error: OSError) -> None:
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     if not isinstance(error, BrokenPipeError):
         nameless = "the current folder" if isinstance(error, FileNotFoundError) else "standard output"
-        say(f"{error.filename or nameless}: {error.strerror}")
+        note(f"{error.filename or nameless}: {error.strerror}")

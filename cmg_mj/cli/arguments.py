@@ -26,7 +26,7 @@ MOST_WORLDS = 10_000
 
 
 @dataclass(frozen=True)
-class Chosen:
+class RunArguments:
     """What the arguments of every command that runs a scenario say.
 
     Attributes:
@@ -56,10 +56,10 @@ class Chosen:
     ) -> RunFolder:
         """The folder to write these files to: without --out it is named for what is run and what differs in it."""
         from cmg_mj.results.run_folder import unused_folder
-        from cmg_mj.scenario.differences import in_a_name, safe_name
+        from cmg_mj.scenario.differences import folder_suffix, safe_name
 
         if self.out is not None:
-            return claim(named(self.out), names)
+            return claim_folder(output_path(self.out), names)
         what = safe_name(what) + ("-board" if driver == "board" else "")
         parts = (
             safe_name(Path(self.name).stem),
@@ -67,7 +67,7 @@ class Chosen:
             str(experiment.scenario.seed),
             *([f"world{world}"] if world else []),
         )
-        name = "-".join(parts) + in_a_name(experiment.differences)
+        name = "-".join(parts) + folder_suffix(experiment.differences)
         return released_at_the_end(unused_folder(Path("runs"), name, names, experiment.as_toml(driver, world)))
 
 
@@ -79,8 +79,8 @@ def _letters(argument: str) -> str:
         return argument
 
 
-def of_a_run(command: Callable, *, required: bool = True) -> Callable:
-    """Arguments of every command that runs a scenario, which it takes as one `Chosen`.
+def run_options(command: Callable, *, required: bool = True) -> Callable:
+    """Arguments of every command that runs a scenario, which it takes as one `RunArguments`.
 
     Args:
         command: The command.
@@ -91,10 +91,10 @@ def of_a_run(command: Callable, *, required: bool = True) -> Callable:
     """
 
     @functools.wraps(command)
-    def chosen(
+    def with_arguments(
         scenario: str | None, settings: tuple, seed: int | None, out: str | None, as_json: bool, **others: Any
     ) -> Any:
-        return command(Chosen(scenario or "", settings, seed, out, as_json), **others)
+        return command(RunArguments(scenario or "", settings, seed, out, as_json), **others)
 
     for decorate in reversed(
         (
@@ -113,8 +113,8 @@ def of_a_run(command: Callable, *, required: bool = True) -> Callable:
             ),
         )
     ):
-        chosen = decorate(chosen)
-    return chosen
+        with_arguments = decorate(with_arguments)
+    return with_arguments
 
 
 of_observers = click.option(
@@ -126,7 +126,7 @@ of_observers = click.option(
 )
 
 
-def claim(path: Path, names: Sequence[str] = ()) -> RunFolder:
+def claim_folder(path: Path, names: Sequence[str] = ()) -> RunFolder:
     """The folder for what a command writes: no other may write to it until the command is done."""
     from cmg_mj.results.run_folder import RunFolder
 
@@ -152,7 +152,7 @@ def refuse_given(names: Sequence[str], why: str) -> None:
             raise InputError(f"{max(parameter.opts, key=len)}: {why}")
 
 
-def named(out: str) -> Path:
+def output_path(out: str) -> Path:
     """The folder that `--out` names."""
     if out == "":
         raise InputError("--out '': name a folder, . for the current one")

@@ -7,8 +7,8 @@ from typing import Literal
 
 import click
 
-from cmg_mj.cli.arguments import Chosen, check_observer, claim, named
-from cmg_mj.cli.terminal import say, say_hints, say_written, show, users_code
+from cmg_mj.cli.arguments import RunArguments, check_observer, claim_folder, output_path
+from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
 
 
 @click.command(short_help="Write an observer and the control law around it as C code.")
@@ -65,22 +65,22 @@ def export(
 
     check_observer("OBSERVER", observer)
     check_installed()
-    experiment = prepare(Chosen(scenario, settings, None, out, as_json).scenario(observer))
-    say_hints(experiment.hints)
-    experiment.only_axis("export")
+    experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
+    note_hints(experiment.hints)
+    experiment.require_single_axis("export")
     controller = experiment.controller()
     name = name_of(controller.observer, asked)
-    place = Path("runs") / f"export-{name}-{precision}" if out is None else named(out)
-    with claim(place, files_of(name)) as folder:
+    place = Path("runs") / f"export-{name}-{precision}" if out is None else output_path(out)
+    with claim_folder(place, files_of(name)) as folder:
         made = code(controller, precision, name)
         files = save(folder, made)
     show(made.figures, export_table(made.figures), as_json)
     if made.figures["compiler"] is None:
-        say(
+        note(
             "no C compiler was found (CC, cc, gcc, clang): the traced formulas were compared with Python, the C was not"
         )
     for part in made.figures["beyond_rounding"]:
         off = made.figures["c_off_by"][part]
-        say(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer makes so much of a last digit")
+        note(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer makes so much of a last digit")
     at = files[0].parent
     say_written(folder, at, f"Try it: cc -std=c99 {at / name}.c {at / name}_example.c -lm && ./a.out", as_json)

@@ -75,10 +75,10 @@ def live_run(
     factor = factor_of(pace)
     # Rerun reads it when it is imported. What it would say of a viewer that has gone, the command says at the end.
     os.environ.setdefault("RUST_LOG", "off")
-    from cmg_mj.studies.live_run import LiveRun, Pace
+    from cmg_mj.studies.live_run import LiveRun, RealTimeClock
     from cmg_mj.visualization.recording.viewer import require_listening, start_viewer, url_of
 
     if connect is not None:
         require_listening(connect)
     url = url_of(connect) if connect is not None else start_viewer().url
-    return LiveRun(experiment, url, Pace(factor), driver=driver, world=world)
+    return LiveRun(experiment, url, RealTimeClock(factor), driver=driver, world=world)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cmg_mj.cli.arguments import claim, named, names_of, of_observers, released_at_the_end
-from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code, where
+from cmg_mj.cli.arguments import claim_folder, names_of, of_observers, output_path, released_at_the_end
+from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, final_path, note, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Reading:
+class LogArguments:
     """How logs are read: what the options of a log say.
 
     Attributes:
@@ -77,7 +77,7 @@ LOG_OPTIONS = (
 
 
 def of_a_log(command: Callable) -> Callable:
-    """Options of every command that reads logs, which it takes as one `Reading`."""
+    """Options of every command that reads logs, which it takes as one `LogArguments`."""
 
     @functools.wraps(command)
     def read_so(
@@ -109,7 +109,7 @@ def of_a_log(command: Callable) -> Callable:
             "radii_m": None if radii is None else _pair(radii, ",", "--radii", "INNER,OUTER, such as 0.05,0.15"),
             "between_s": None if between is None else span(between, "--between"),
         }
-        reading = Reading(assignments(columns, "--columns"), options)
+        reading = LogArguments(assignments(columns, "--columns"), options)
         return command(*before, reading=reading, **others)
 
     for decorate in reversed(LOG_OPTIONS):
@@ -182,7 +182,7 @@ def span(text: str, option: str) -> tuple[float, float]:
 @click.option("--json", "as_json", is_flag=True, help="Print the figures alone, as JSON, on standard output.")
 @users_code()
 def replay(
-    reading: Reading,
+    reading: LogArguments,
     logs: tuple[str, ...],
     windows: tuple[str, ...],
     model: str | None,
@@ -218,7 +218,7 @@ def replay(
         if kind not in names:
             raise InputError(f"--set {kind}: is not among --observers {','.join(names)}")
     pendulum = None if model is None else model_of(model)
-    given = Reading(reading.columns, {**reading.options, **({"windows_s": tuple(spans)} if spans else {})})
+    given = LogArguments(reading.columns, {**reading.options, **({"windows_s": tuple(spans)} if spans else {})})
     each_once(logs)
     read = [given.read(path) for path in logs]
     distinct = files.distinct([log.name for log in read])
@@ -232,7 +232,7 @@ def replay(
     toml = files.settings_of(logs, asked, given.given)
     written = files.files_of_replay(distinct)
     if out is not None:
-        folder = claim(named(out), written)
+        folder = claim_folder(output_path(out), written)
     else:
         from cmg_mj.results.run_folder import unused_folder
 
@@ -244,7 +244,7 @@ def replay(
         try:
             with progress("Replay", float(len(read)), ctrl_c) as on_progress:
                 for i, log in enumerate(read):
-                    done = told.replay_ready(
+                    done = told.replay_prepared(
                         log,
                         names,
                         model=pendulum,
@@ -256,7 +256,7 @@ def replay(
                     replays.append(done)
         except KeyboardInterrupt:
             if not replays:
-                say("interrupted before the first log was done; nothing was written")
+                note("interrupted before the first log was done; nothing was written")
                 sys.exit(INTERRUPTED)
         complete = len(replays) == len(read)
         try:
@@ -267,5 +267,5 @@ def replay(
             show(figures, table, as_json)
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", as_json)
     if ctrl_c.noted or not complete:
-        say(f"interrupted; {len(replays)} of {len(read)} logs are in {where(folder, place)}")
+        note(f"interrupted; {len(replays)} of {len(read)} logs are in {final_path(folder, place)}")
         sys.exit(INTERRUPTED)

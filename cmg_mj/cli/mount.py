@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import click
 
 from cmg_mj.cli.arguments import check_observer
-from cmg_mj.cli.terminal import own_stdout, say, say_hints, users_code
+from cmg_mj.cli.terminal import note, note_hints, own_stdout, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.plant.mounting import Mounted
+    from cmg_mj.plant.mounting import MountedRobot
 
 
 @click.command(short_help="Mount a pair on a robot of your own: any MJCF in, a rig out.")
@@ -75,13 +75,13 @@ def mount(
     from cmg_mj.plant.mounting import mount as mounted_on
     from cmg_mj.plant.mounting.mounted import check_target, with_scenario
     from cmg_mj.plant.plant import load_plant
-    from cmg_mj.studies.push_limits.mount_report import scenario_text, told, write_scenario
-    from cmg_mj.studies.push_limits.prospects import LOW_CEILING_DEG, prospects, scale_that_suffices
+    from cmg_mj.studies.push_limits.mount_report import mount_report_lines, scenario_text, write_scenario
+    from cmg_mj.studies.push_limits.prospects import LOW_CEILING_DEG, prospects, smallest_sufficient_scale
     from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
     along = axis.split() if len(axis.split()) == 3 else axis
 
-    def mounted_at(size: float) -> Mounted:
+    def mounted_at(size: float) -> MountedRobot:
         try:
             return mounted_on(
                 Path(robot),
@@ -114,27 +114,29 @@ def mount(
         found.save(model)
         can = prospects(write_scenario(model, found.path, observer, axis=name), name)
         experiment = write_scenario(model, found.path, observer, can, name)
-        plant = experiment.plant.along(name)
+        plant = experiment.plant.single_axis(name)
         enough = None
         if math.degrees(can.ceiling.tilt) < LOW_CEILING_DEG:
 
             def ceiling_at(size: float) -> float:
                 trial = mounted_at(size).save(model.with_name(f".{target.stem}.trial.xml"))
                 try:
-                    return ceiling(load_plant(model=str(trial)).along(name).reduced, experiment.law.rate_limit).tilt
+                    return ceiling(
+                        load_plant(model=str(trial)).single_axis(name).reduced, experiment.law.rate_limit
+                    ).tilt
                 finally:
                     trial.unlink()
 
-            enough = scale_that_suffices(ceiling_at, scale)
+            enough = smallest_sufficient_scale(ceiling_at, scale)
         scenario = scenario_text(target.name, found.path, observer, can, name)
         model.with_suffix(".toml").write_text(scenario, encoding="utf-8")
     if as_json:
         figures = can.figures() | {"model": str(target), "held": list(found.held), "scale_that_suffices": enough}
         click.echo(json.dumps(figures, indent=2), file=own_stdout())
         return
-    click.echo("\n".join(told(found, plant, can, enough)), file=own_stdout())
-    say_hints(can.hints)
-    say(f"wrote {target} and {target.with_suffix('.toml')}; try: cmg-mj run {target.with_suffix('.toml')}")
+    click.echo("\n".join(mount_report_lines(found, plant, can, enough)), file=own_stdout())
+    note_hints(can.hints)
+    note(f"wrote {target} and {target.with_suffix('.toml')}; try: cmg-mj run {target.with_suffix('.toml')}")
 
 
 def _point(at: str | None) -> list[float] | None:

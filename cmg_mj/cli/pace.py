@@ -11,7 +11,7 @@ SOON_S = 1.0
 """Before so much has passed nobody can tell."""
 
 
-class Pace:
+class ProgressRate:
     """The pace of what is counted, by all that was done since the beginning.
 
     Args:

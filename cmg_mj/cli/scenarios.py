@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, check_observer, names_of, of_a_run
+from cmg_mj.cli.arguments import MOST_WORLDS, RunArguments, check_observer, names_of, run_options
 from cmg_mj.cli.live import live_options, live_run
 from cmg_mj.cli.terminal import (
     INTERRUPTED,
     WRONG_INPUT,
     CtrlC,
+    final_path,
+    note,
+    note_hints,
     own_stdout,
     progress,
-    say,
-    say_hints,
     say_written,
     show,
     users_code,
-    where,
 )
 from cmg_mj.errors import InputError, RunStopped
 
@@ -35,7 +35,7 @@ LAST_WORLD = 2**63 - 1
 
 @click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
 @click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
-@of_a_run
+@run_options
 @click.option(
     "--driver",
     type=click.Choice(["native", "callback", "board"]),
@@ -55,7 +55,7 @@ LAST_WORLD = 2**63 - 1
 @live_options
 @users_code()
 def run(
-    chosen: Chosen,
+    arguments: RunArguments,
     observer: str | None,
     driver: Driver,
     world: int,
@@ -76,16 +76,16 @@ def run(
 
     if observer is not None:
         check_observer("--observer", observer)
-    scenario = chosen.scenario(observer)
+    scenario = arguments.scenario(observer)
     experiment = prepare(scenario)
-    say_hints(experiment.hints)
+    note_hints(experiment.hints)
     if scenario.compare:
-        say("[compare] is for cmg-mj compare; this is one run")
+        note("[compare] is for cmg-mj compare; this is one run")
     what = runs.file_name(scenario.observer.kind)
-    folder = chosen.folder(what, runs.files_of_run(experiment, plot=plot), experiment, driver, world)
+    folder = arguments.folder(what, runs.files_of_run(experiment, plot=plot), experiment, driver, world)
     shown = live_run(experiment, live, connect, pace, driver, world)
     with CtrlC() as ctrl_c, shown or nullcontext():
-        with progress(scenario.title or chosen.name, scenario.duration_s, ctrl_c) as on_progress:
+        with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
             options = {"on_progress": on_progress} if shown is None else shown.options(on_progress)
             result = experiment.run(driver=driver, world=world, **options)
         if shown is not None:
@@ -94,18 +94,18 @@ def run(
         try:
             place = runs.save_run(folder, experiment, result, plot=plot)
         finally:
-            show(summary, report.summary_table(summary), chosen.as_json)
+            show(summary, report.summary_table(summary), arguments.as_json)
     if shown is not None and shown.lost:
-        say(f"the viewer did not get all of it: {shown.lost}; the run and its files are whole")
-    say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", chosen.as_json)
+        note(f"the viewer did not get all of it: {shown.lost}; the run and its files are whole")
+    say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", arguments.as_json)
     outcome = result.outcomes[0]
     if outcome.kind == "stopped":
-        raise RunStopped(f"{outcome.reason}; what was recorded until then is in {where(folder, place)}")
+        raise RunStopped(f"{outcome.reason}; what was recorded until then is in {final_path(folder, place)}")
     if outcome.kind == "interrupted":
-        say(f"interrupted at {outcome.time_s:g} s; what was recorded until then is in {where(folder, place)}")
+        note(f"interrupted at {outcome.time_s:g} s; what was recorded until then is in {final_path(folder, place)}")
         sys.exit(INTERRUPTED)
     if ctrl_c.noted:
-        say(f"interrupted when all was done; it is in {where(folder, place)}")
+        note(f"interrupted when all was done; it is in {final_path(folder, place)}")
         sys.exit(INTERRUPTED)
 
 
@@ -116,7 +116,7 @@ def run(
     help="Names with commas between, or all; your own as package.module:Class.  "
     "[default: the scenario's [compare], or all]",
 )
-@of_a_run
+@run_options
 @click.option(
     "--worlds",
     type=click.IntRange(1, MOST_WORLDS),
@@ -127,7 +127,7 @@ def run(
 @click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 @click.option("--plot", is_flag=True, help="Write plot.png as well: every figure over the worlds.")
 @users_code()
-def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown: bool, plot: bool) -> None:
+def compare(arguments: RunArguments, observers: str | None, worlds: int | None, markdown: bool, plot: bool) -> None:
     """Run several observers on the same plant, pushes and noise: one table, one recording.
 
     The table has the means over the worlds that stood to the end, with 95 % intervals, and the differences to the best,
@@ -136,19 +136,19 @@ def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown:
     """
     from cmg_mj.controllers.laws.protocol import needs
     from cmg_mj.results import terminal_tables as report
-    from cmg_mj.scenario.differences import in_words
+    from cmg_mj.scenario.differences import describe_differences
     from cmg_mj.scenario.schema import CompareSettings
     from cmg_mj.studies import save as runs
     from cmg_mj.studies.compare import comparison
     from cmg_mj.studies.compare.statistics import standings
 
     names = None if observers is None else names_of(observers)
-    scenario = chosen.scenario()
+    scenario = arguments.scenario()
     asked = scenario.compare or CompareSettings()
     names, worlds = names or asked.names(), worlds or asked.worlds
     for name in names:
         check_observer("compare.observers:", name)
-    for setting in chosen.settings:
+    for setting in arguments.settings:
         if setting.startswith("observer.") and scenario.observer.kind not in names:
             raise InputError(
                 f"--set {setting}: is a setting of {scenario.observer.kind}, which is not among "
@@ -156,31 +156,31 @@ def compare(chosen: Chosen, observers: str | None, worlds: int | None, markdown:
             )
     experiments = comparison.prepare_comparison(scenario, names)
     own = comparison.rerunnable(scenario, experiments, worlds)
-    say_hints(own.hints)
+    note_hints(own.hints)
     if not needs(own.law):
-        say(f"{scenario.controller.kind} takes nothing of the observer: every loop is the same, the estimates differ")
+        note(f"{scenario.controller.kind} takes nothing of the observer: every loop is the same, the estimates differ")
     files = runs.files_of_comparison(names, plot=plot)
-    folder = chosen.folder("compare", files, own)
+    folder = arguments.folder("compare", files, own)
     with CtrlC() as ctrl_c:
-        with progress(f"{scenario.title or chosen.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
+        with progress(f"{scenario.title or arguments.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
             compared = comparison.compare(experiments, worlds, on_progress)
         if not compared:
-            say("interrupted before the first observer was done; nothing was written")
+            note("interrupted before the first observer was done; nothing was written")
             sys.exit(INTERRUPTED)
         summaries = standings(compared)
         try:
             place = runs.save_comparison(folder, own, compared, plot=plot, complete=len(compared) == len(names))
         finally:
-            differs = in_words(own.differences)
-            title = f"{scenario.title or chosen.name}: {worlds} worlds an observer, seed {scenario.seed}{differs}"
+            differs = describe_differences(own.differences)
+            title = f"{scenario.title or arguments.name}: {worlds} worlds an observer, seed {scenario.seed}{differs}"
             table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
-            show(summaries, table, chosen.as_json)
-    say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", chosen.as_json)
+            show(summaries, table, arguments.as_json)
+    say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", arguments.as_json)
     for entry in compared:
         if entry.stopped:
-            say(f"{entry.kind}: {len(entry.stopped)} of {worlds} worlds stopped: {entry.stopped[0].reason}")
+            note(f"{entry.kind}: {len(entry.stopped)} of {worlds} worlds stopped: {entry.stopped[0].reason}")
     if ctrl_c.noted or len(compared) < len(names):
-        say(f"interrupted; {len(compared)} of {len(names)} observers are in {where(folder, place)}")
+        note(f"interrupted; {len(compared)} of {len(names)} observers are in {final_path(folder, place)}")
         sys.exit(INTERRUPTED)
     if any(entry.stopped for entry in compared):
         sys.exit(WRONG_INPUT)
@@ -220,5 +220,5 @@ def check(file: str) -> None:
     scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file)
     describe = rig_description if is_model else description
     parts = prepare(scenario).parts
-    words = [describe(file, part.scenario, part.design, part.plant.facts, part.plant.axis.name) for part in parts]
+    words = [describe(file, part.scenario, part.design, part.plant.parameters, part.plant.axis.name) for part in parts]
     click.echo("\n".join(words), file=own_stdout())

@@ -13,17 +13,17 @@ import click
 
 from cmg_mj.cli.arguments import (
     MOST_WORLDS,
-    Chosen,
+    RunArguments,
     check_observer,
-    claim,
-    named,
+    claim_folder,
     names_of,
-    of_a_run,
     of_observers,
+    output_path,
     refuse_given,
+    run_options,
 )
-from cmg_mj.cli.logs import READING, Reading, each_once, of_a_log
-from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code, where
+from cmg_mj.cli.logs import READING, LogArguments, each_once, of_a_log
+from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, final_path, note, progress, say_written, show, users_code
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.scenario.differences import safe_name
 
@@ -101,7 +101,7 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
         raise InputError(f"{paper!r}: no such paper; {nearest(paper, names)}")
     papers = list(PAPERS) if paper == "all" else [paper]
     check_installed(papers)  # before a folder is made
-    folder = claim(named(out) if out is not None else Path("runs") / f"reproduce-{paper}", REPORT_FILES)
+    folder = claim_folder(output_path(out) if out is not None else Path("runs") / f"reproduce-{paper}", REPORT_FILES)
     with CtrlC() as ctrl_c:
         with progress(f"reproduce {paper}", 1.0, ctrl_c) as on_progress:
             entries = obtain(papers, lambda now, done: on_progress(done, now))
@@ -109,13 +109,13 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
         show(figures_of(entries), verdict_table(entries), as_json)
     say_written(folder, place, f"Read {place / 'report.md'}", as_json)
     if ctrl_c.noted:
-        say(f"interrupted; what was obtained until then is in {where(folder, place)}")
+        note(f"interrupted; what was obtained until then is in {final_path(folder, place)}")
         sys.exit(INTERRUPTED)
 
 
 @click.command(short_help="Fit an observer's parameters to the gyro.")
 @click.option("--observer", metavar="NAME", help="What to tune: a name, or your own as package.module:Class.")
-@partial(of_a_run, required=False)
+@partial(run_options, required=False)
 @click.option(
     "--worlds",
     type=click.IntRange(2, MOST_WORLDS // 10),  # whose trajectories are kept
@@ -152,7 +152,7 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
 @of_a_log
 @users_code()
 def tune(
-    chosen: Chosen,
+    arguments: RunArguments,
     observer: str | None,
     worlds: int,
     parameters: str,
@@ -162,7 +162,7 @@ def tune(
     split: float,
     model: str | None,
     skip: float,
-    reading: Reading,
+    reading: LogArguments,
 ) -> None:
     """Fit an observer's parameters to the gyro, as section V of aranovskiy2020 does; observer_tuning is its experiment.
 
@@ -180,9 +180,9 @@ def tune(
     if logs:
         refuse_given(("worlds", "seed"), "is for a scenario; a log is what it is")
         found = dict(map(_range, ranges))
-        _tune_on_logs(chosen, observer, logs, reading, split, model, noise, skip, chosen_numbers, found)
+        _tune_on_logs(arguments, observer, logs, reading, split, model, noise, skip, chosen_numbers, found)
         return
-    if not chosen.name:
+    if not arguments.name:
         raise InputError("tune: name a scenario, such as observer_tuning, or a log with --log")
     refuse_given((*READING, "split", "model", "skip"), "is for --log LOG")
     from cmg_mj.studies.save import file_name
@@ -191,14 +191,14 @@ def tune(
 
     if observer is not None:
         check_observer("--observer", observer)
-    scenario = chosen.scenario(observer)
+    scenario = arguments.scenario(observer)
     default = Path("runs") / f"tune-{file_name(scenario.observer.kind)}-{scenario.seed}"
     densities = [_density(text) for text in noise.split(",") if text.strip()]
     if noise and not densities:
         raise InputError(f"--noise {noise!r}: give numbers with commas between")
-    folder = claim(default if chosen.out is None else named(chosen.out), files_of_study(densities))
+    folder = claim_folder(default if arguments.out is None else output_path(arguments.out), files_of_study(densities))
     with CtrlC() as ctrl_c:
-        with progress(f"{scenario.title or chosen.name}: {scenario.observer.kind}", 1.0, ctrl_c) as on_progress:
+        with progress(f"{scenario.title or arguments.name}: {scenario.observer.kind}", 1.0, ctrl_c) as on_progress:
             study = fit(
                 scenario,
                 worlds=worlds,
@@ -207,21 +207,21 @@ def tune(
                 noise_ug_rthz=densities,
                 on_share=on_progress,
             )
-        show(figures_of(study), tuning_table(study), chosen.as_json)
+        show(figures_of(study), tuning_table(study), arguments.as_json)
         wanted = len(densities) or 1
         files = save_study(folder, study, complete=len(study.levels) == wanted)
     place = files[0].parent
-    say_written(folder, place, f"Run with the tuned observer: cmg-mj run {files[1]}", chosen.as_json)
+    say_written(folder, place, f"Run with the tuned observer: cmg-mj run {files[1]}", arguments.as_json)
     if ctrl_c.noted:
-        say(f"interrupted; {len(study.levels)} of {wanted} noise densities are in {where(folder, place)}")
+        note(f"interrupted; {len(study.levels)} of {wanted} noise densities are in {final_path(folder, place)}")
         sys.exit(INTERRUPTED)
 
 
 def _tune_on_logs(
-    chosen: Chosen,
+    arguments: RunArguments,
     observer: str | None,
     logs: Sequence[str],
-    reading: Reading,
+    reading: LogArguments,
     split: float,
     model: str | None,
     noise: str,
@@ -238,15 +238,15 @@ def _tune_on_logs(
     from cmg_mj.studies.tuning.save import plain
     from cmg_mj.studies.tuning.save_on_logs import FILES
 
-    if chosen.name:
-        raise InputError(f"{chosen.name}: either a scenario or --log, not both")
+    if arguments.name:
+        raise InputError(f"{arguments.name}: either a scenario or --log, not both")
     if observer is None:
         raise InputError("--log: say which observer, --observer NAME")
     check_observer("--observer", observer)
-    for setting in chosen.settings:
+    for setting in arguments.settings:
         if not setting.startswith("observer."):
             raise InputError(f"--set {setting}: of a log write observer.PARAMETER=VALUE")
-    given = parameters_of([observer + setting.removeprefix("observer") for setting in chosen.settings])
+    given = parameters_of([observer + setting.removeprefix("observer") for setting in arguments.settings])
     if noise and "=" not in noise:
         raise InputError(f"--noise {noise}: densities are for a scenario; of a log write NAME=VALUE,... as in replay")
     noises = noise_numbers(noise)
@@ -254,7 +254,7 @@ def _tune_on_logs(
     read = [reading.read(path) for path in logs]
     pendulum = None if model is None else model_of(model)
     default = Path("runs") / f"tune-{file_name(observer)}-{safe_name(read[0].name)}"
-    folder = claim(default if chosen.out is None else named(chosen.out), FILES)
+    folder = claim_folder(default if arguments.out is None else output_path(arguments.out), FILES)
     with CtrlC() as ctrl_c:
         with progress(f"{read[0].name}: {observer}", 1.0, ctrl_c) as on_progress:
             study = tune_on_logs(
@@ -269,11 +269,11 @@ def _tune_on_logs(
                 ranges=ranges,
                 on_share=on_progress,
             )
-        show(figures_of_logs(study), logs_table(study), chosen.as_json)
+        show(figures_of_logs(study), logs_table(study), arguments.as_json)
         place = save_log_study(folder, study)
     found = plain({n.parameter: study.level.parameters[n.parameter] for n in study.numbers})
     settings = " ".join(f"--set '{observer}.{name}={json.dumps(value)}'" for name, value in found.items())
-    say_written(folder, place, f"Replay it tuned: {settings}", chosen.as_json)
+    say_written(folder, place, f"Replay it tuned: {settings}", arguments.as_json)
 
 
 def _range(text: str) -> tuple[str, tuple[float, float]]:

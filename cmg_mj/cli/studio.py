@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import Chosen, check_observer
-from cmg_mj.cli.terminal import say_hints, users_code
+from cmg_mj.cli.arguments import RunArguments, check_observer
+from cmg_mj.cli.terminal import note_hints, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -63,16 +63,16 @@ def studio(
 
     if observer is not None:
         check_observer("--observer", observer)
-    chosen = Chosen(scenario, settings, seed, None, False)
+    arguments = RunArguments(scenario, settings, seed, None, False)
 
     def opened(model: str) -> Experiment:
         """The scenario as its file is now; with another rig, if one was dropped on the viewer."""
         if not model:
-            return prepare(chosen.scenario(observer))
-        return prepare(chosen.scenario(observer)).with_values({"plant.model": model})
+            return prepare(arguments.scenario(observer))
+        return prepare(arguments.scenario(observer)).with_settings({"plant.model": model})
 
     first = opened("")
-    say_hints(first.hints)
+    note_hints(first.hints)
     if importlib.util.find_spec("mujoco.studio") is None:
         raise InputError("this MuJoCo comes without Studio: install the wheel from PyPI, python -m pip install mujoco")
     from cmg_mj.visualization.studio.open import open_in_studio

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cmg_mj.cli.arguments import MOST_WORLDS, Chosen, claim, named, named_observers, of_a_run
-from cmg_mj.cli.pace import Pace, in_time
-from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, progress, say, say_written, show, users_code
+from cmg_mj.cli.arguments import MOST_WORLDS, RunArguments, claim_folder, named_observers, output_path, run_options
+from cmg_mj.cli.pace import ProgressRate, in_time
+from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, note, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.studies.sweeps.report import Found
-    from cmg_mj.studies.sweeps.study import Study
+    from cmg_mj.studies.sweeps.report import SweepTables
+    from cmg_mj.studies.sweeps.study import SweepStudy
 
 
 @click.command(short_help="Vary fields over many worlds: every observer, with intervals.")
-@of_a_run
+@run_options
 @click.option(
     "--vary",
     "varied",
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 @click.option("--yes", is_flag=True, help="Run it even if it is very large.")
 @users_code()
 def sweep(
-    chosen: Chosen,
+    arguments: RunArguments,
     varied: tuple[str, ...],
     observers: str | None,
     worlds: int | None,
@@ -66,7 +66,7 @@ def sweep(
     """
     from cmg_mj.studies.sweeps.cells import COLUMNS, Trials
     from cmg_mj.studies.sweeps.chunk_store import Store
-    from cmg_mj.studies.sweeps.plan import expected
+    from cmg_mj.studies.sweeps.plan import estimate_cost
     from cmg_mj.studies.sweeps.report import FILES, found_of, save, summary
     from cmg_mj.studies.sweeps.study import MOST_TRIALS, check_values, counted
 
@@ -74,36 +74,36 @@ def sweep(
         from cmg_mj.studies.sweeps.dask_cluster import local_workers
 
         local_workers(cluster)
-    study = _study(chosen, varied, observers, worlds, sample, sobol, order)
+    study = _study(arguments, varied, observers, worlds, sample, sobol, order)
     check_values(study)
     if plan:
-        takes = expected(study)
-        show(takes, _plan_text(takes), chosen.as_json)
+        takes = estimate_cost(study)
+        show(takes, _plan_text(takes), arguments.as_json)
         return
     if study.trials > MOST_TRIALS and not yes:
         raise InputError(
             f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; beyond {MOST_TRIALS} say "
             "--yes (--plan says what it would take)"
         )
-    place = Path("runs") / f"sweep-{Path(chosen.name).stem}" if chosen.out is None else named(chosen.out)
+    place = Path("runs") / f"sweep-{Path(arguments.name).stem}" if arguments.out is None else output_path(arguments.out)
     with _runner(cluster) as run:
-        folder = claim(place, FILES)
+        folder = claim_folder(place, FILES)
         store = Store(place, study)
         before = store.open()
         if before:
-            say(f"{before} of {study.trials} trials are there from before")
+            note(f"{before} of {study.trials} trials are there from before")
         with CtrlC() as ctrl_c:
             try:
-                pace = Pace("trials", study.trials, before)
-                with progress(f"sweep {chosen.name}", study.trials, ctrl_c, pace) as on_progress:
+                pace = ProgressRate("trials", study.trials, before)
+                with progress(f"sweep {arguments.name}", study.trials, ctrl_c, pace) as on_progress:
                     run(store, on_progress)
             except KeyboardInterrupt:
-                say(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
+                note(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
                 sys.exit(INTERRUPTED)
             found = found_of(Trials(study, store.tables(COLUMNS)))
             at = save(folder, store, found)
-    show(_as_json(found) if chosen.as_json else None, summary(found), chosen.as_json)
-    say_written(folder, at, f"Read {at / 'report.md'}", chosen.as_json)
+    show(_as_json(found) if arguments.as_json else None, summary(found), arguments.as_json)
+    say_written(folder, at, f"Read {at / 'report.md'}", arguments.as_json)
 
 
 @contextmanager
@@ -116,38 +116,38 @@ def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
     else:
         from cmg_mj.studies.sweeps.dask_cluster import on_cluster
 
-        with on_cluster(cluster, say) as connected:
+        with on_cluster(cluster, note) as connected:
             yield connected.run
 
 
 def _study(
-    chosen: Chosen,
+    arguments: RunArguments,
     varied: tuple[str, ...],
     observers: str | None,
     worlds: int | None,
     sample: int | None,
     sobol: int | None,
     order: str | None,
-) -> Study:
+) -> SweepStudy:
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
     from cmg_mj.studies.sweeps.file import axes_of, design_of, scenario_of, study_file
-    from cmg_mj.studies.sweeps.study import Study
+    from cmg_mj.studies.sweeps.study import SweepStudy
 
     if sample is not None and sobol is not None:
         raise InputError("--sample and --sobol: one of them")
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
-    fields = study_file(chosen.name)
+    fields = study_file(arguments.name)
     asked: dict[str, Any] = {}
     if fields is None:
-        scenario = chosen.scenario()
+        scenario = arguments.scenario()
     else:
-        scenario = scenario_of(chosen.name, fields, chosen.settings)
-        if chosen.seed is not None:
-            scenario = scenario.model_copy(update={"seed": chosen.seed})
+        scenario = scenario_of(arguments.name, fields, arguments.settings)
+        if arguments.seed is not None:
+            scenario = scenario.model_copy(update={"seed": arguments.seed})
         asked = fields.get("sweep", {})
-        axes = axes or axes_of(chosen.name, fields)
-    design, n = design_of(chosen.name, asked)
+        axes = axes or axes_of(arguments.name, fields)
+    design, n = design_of(arguments.name, asked)
     if sample is not None or sobol is not None:
         design, n = ("sample", sample or 0) if sample is not None else ("sobol", sobol or 0)
     names = asked.get("observers", [scenario.observer.kind])
@@ -155,7 +155,7 @@ def _study(
         names = named_observers(observers)
     expected = asked.get("order", []) if order is None else [name.strip() for name in order.split(",")]
     of_each = worlds or asked.get("worlds", WORLDS)
-    return Study(scenario, tuple(axes), tuple(names), of_each, design, n, tuple(expected))
+    return SweepStudy(scenario, tuple(axes), tuple(names), of_each, design, n, tuple(expected))
 
 
 def _split(setting: str) -> tuple[str, str]:
@@ -163,7 +163,7 @@ def _split(setting: str) -> tuple[str, str]:
     return field.strip(), values
 
 
-def _as_json(found: Found) -> dict[str, Any]:
+def _as_json(found: SweepTables) -> dict[str, Any]:
     from cmg_mj.studies.sweeps.cells import cells_of
 
     study = found.trials.study

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import click
 
-from cmg_mj.cli.pace import Pace
+from cmg_mj.cli.pace import ProgressRate
 
 if TYPE_CHECKING:
     from cmg_mj.results.run_folder import RunFolder
@@ -92,19 +92,19 @@ def own_stdout() -> Any:
     return _own_stdout.get(sys.stdout)
 
 
-def say(message: str) -> None:
+def note(message: str) -> None:
     """One line on standard error, if anybody reads it."""
     with suppress(OSError):
         click.echo(f"cmg-mj: {' '.join(message.split())}", err=True)
 
 
-def say_hints(hints: Iterable[str]) -> None:
+def note_hints(hints: Iterable[str]) -> None:
     """What is no mistake and yet likely to make the rig fall, before it does."""
     for hint in hints:
-        say(f"hint: {hint}")
+        note(f"hint: {hint}")
 
 
-def where(folder: RunFolder, place: Path) -> str:
+def final_path(folder: RunFolder, place: Path) -> str:
     """Where a result is, and why if it is not where the user wanted it."""
     return str(place) if place == folder.path else f"{place}; what {folder.path} has held stays as it was"
 
@@ -112,7 +112,7 @@ def where(folder: RunFolder, place: Path) -> str:
 def say_written(folder: RunFolder, place: Path, open_it: str, as_json: bool) -> None:
     """Where the files are, and how to open them; with JSON on standard output only what is not as expected."""
     if not as_json or place != folder.path:
-        click.echo(f"Written to {where(folder, place)}. {open_it}", err=True)
+        click.echo(f"Written to {final_path(folder, place)}. {open_it}", err=True)
 
 
 def show(value: Any, table: Any, as_json: bool) -> None:
@@ -133,7 +133,9 @@ def show(value: Any, table: Any, as_json: bool) -> None:
 
 
 @contextmanager
-def progress(label: str, total: float, ctrl_c: CtrlC | None = None, pace: Pace | None = None) -> Iterator[OnProgress]:
+def progress(
+    label: str, total: float, ctrl_c: CtrlC | None = None, pace: ProgressRate | None = None
+) -> Iterator[OnProgress]:
     """A progress bar on standard error, gone when done; where there is no terminal a line a minute of a pace, or none.
 
     Args:
@@ -166,7 +168,7 @@ def progress(label: str, total: float, ctrl_c: CtrlC | None = None, pace: Pace |
             ctrl_c.check()
         if pace is not None and not console.is_terminal:
             if line := pace.line(done):
-                say(line)
+                note(line)
             return
         if now is None and done - shown < total / 2000.0:
             return  # called after every tick, of which one in many is worth drawing

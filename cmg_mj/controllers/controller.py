@@ -7,16 +7,16 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from cmg_mj.controllers.backlash import Backlash
-from cmg_mj.controllers.integrator_trim import trim_of
-from cmg_mj.controllers.law_runner import Commanding, Succeeding
-from cmg_mj.controllers.laws.protocol import Law, fed
+from cmg_mj.controllers.integrator_trim import integrator_trim
+from cmg_mj.controllers.law_runner import LawRunner, LawTakeover
+from cmg_mj.controllers.laws.protocol import Law, feedback_state
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
 from cmg_mj.observers.protocol import Measurement, Observer
-from cmg_mj.observers.runner import Joining, Observing, read_only
+from cmg_mj.observers.runner import ObserverRunner, ObserverTakeover, read_only
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.ideal import Ideal
-from cmg_mj.sensors.sampled import Sensors, at_work
+from cmg_mj.sensors.ideal import IdealReading
+from cmg_mj.sensors.sampled import Sensors, sampled_sensors
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.sensors.timing import steps_until, whole_steps
 
@@ -29,7 +29,7 @@ CONTROLLER_OPTIONS = frozenset(
 )
 """Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
 
-RIDES_ALONG = 20
+TAKEOVER_TICKS = 20
 """Ticks that a new observer sees before it takes over from another: 0.1 s at 200 Hz."""
 
 
@@ -118,11 +118,13 @@ class Controller:
         self.open_loop_observers = dict(open_loop_observers or {})
         self._single = isinstance(worlds, int)
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
-        self._commanding: Commanding = Commanding(law, self._single, timestep)
-        self._observing: Observing = Observing([observer, *self.open_loop_observers.values()], self._single, timestep)
+        self._commanding: LawRunner = LawRunner(law, self._single, timestep)
+        self._observing: ObserverRunner = ObserverRunner(
+            [observer, *self.open_loop_observers.values()], self._single, timestep
+        )
         self.extra_signals = self._observing.extra_signals
         self.bias_trim_s = bias_trim_s
-        self.trim_part, self.trim_gain = trim_of(bias_trim_s, law, self.extra_signals[0])
+        self.trim_part, self.trim_gain = integrator_trim(bias_trim_s, law, self.extra_signals[0])
         self.trimmed_until = steps_until(bias_trim_s, timestep)
         self.backlash = backlash
         self.gimbal_angle = GimbalAngle(self.directions, self.gimbal_zero)
@@ -135,19 +137,21 @@ class Controller:
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
-        self._sampled = at_work(self.sensors, self.timestep, self.seed, self.worlds, self.axis)
+        self._sampled = sampled_sensors(self.sensors, self.timestep, self.seed, self.worlds, self.axis)
         self.tick: Tick | None = None
-        self.turning: Scalar = None
+        self.gimbal_rate: Scalar = None
         """The rate at which the gimbals are turned since the last tick: its u, behind the backlash [rad/s]."""
-        self._gap = None if type(self.backlash) is float and not self.backlash else Backlash(self.backlash, self.law.dt)
+        self._backlash = (
+            None if type(self.backlash) is float and not self.backlash else Backlash(self.backlash, self.law.dt)
+        )
         self.coriolis: Scalar | None = None
         """What in the accelerometers' angular acceleration is none, on a rig that turns [rad/s^2]."""
         self.step: int | None = None
         """The physics step of the last update."""
-        self.beat = math.gcd(self.period, *(sensor.beat for sensor in self._sampled))
+        self.steps_per_sample = math.gcd(self.period, *(sensor.steps_per_sample for sensor in self._sampled))
         """Physics steps between the moments at which anything may be due."""
 
-    def exchange(
+    def swap_components(
         self,
         *,
         observer: Observer | None = None,
@@ -160,8 +164,8 @@ class Controller:
         An integrator that was trimmed until now goes free with another observer or law.
 
         Args:
-            observer: Another one for the loop. It starts from the next tick's sample and takes over `RIDES_ALONG` ticks
-                later; open-loop observers start again with it.
+            observer: Another one for the loop. It starts from the next tick's sample and takes over `TAKEOVER_TICKS`
+                ticks later; open-loop observers start again with it.
             law: Another law of the same control period, which starts from the next tick's sample.
             sensors: Others, of the same rates. All sensors start afresh, with their noise from its beginning.
             feedback: Which rate the law uses.
@@ -172,30 +176,32 @@ class Controller:
         if law is not None and law.dt != self.law.dt:
             raise InputError(f"controller.rate_hz: stays {1.0 / self.law.dt:g} Hz while it runs")
         if sensors is not None:
-            sampled = at_work(sensors, self.timestep, self.seed, self.worlds, self.axis)
-            if math.gcd(self.period, *(sensor.beat for sensor in sampled)) != self.beat:
+            sampled = sampled_sensors(sensors, self.timestep, self.seed, self.worlds, self.axis)
+            if math.gcd(self.period, *(sensor.steps_per_sample for sensor in sampled)) != self.steps_per_sample:
                 raise InputError("sensors: their rates stay while it runs")
             self._sampled, self.sensors = sampled, sensors
             self.step = None  # all of them sample at the next update, due or not
         if observer is not None:
             observers = [observer, *self.open_loop_observers.values()]
             if self.tick is None:
-                self._observing = Observing(observers, self._single, self.timestep)
+                self._observing = ObserverRunner(observers, self._single, self.timestep)
             else:
-                self._observing = Joining(self._observing, RIDES_ALONG, observers, self._single, self.timestep)
+                self._observing = ObserverTakeover(
+                    self._observing, TAKEOVER_TICKS, observers, self._single, self.timestep
+                )
             self.observer, self.extra_signals = observer, self._observing.extra_signals
         if law is not None:
-            self._commanding = Succeeding(self._commanding, law, self._single, self.timestep)
+            self._commanding = LawTakeover(self._commanding, law, self._single, self.timestep)
             self.law = law
         if law is not None or observer is not None:
             self.trimmed_until = 0
         self.feedback = feedback or self.feedback
 
-    def update(self, step: int, ideal: Ideal) -> bool:
+    def update(self, step: int, ideal: IdealReading) -> bool:
         """Take the samples and the control decision that are due at a physics step.
 
         Args:
-            step: Number of the physics step, a multiple of `beat`.
+            step: Number of the physics step, a multiple of `steps_per_sample`.
             ideal: The ideal readings at that step.
 
         Returns:
@@ -206,19 +212,19 @@ class Controller:
         """
         first, self.step = self.step is None, step
         for sensor in self._sampled:
-            if step % sensor.beat == 0 or first:  # a start between two samples still has something to show
+            if step % sensor.steps_per_sample == 0 or first:  # a start between two samples still has something to show
                 sensor.sample(step, ideal)
         if step % self.period:
             return False
         accelerometers, encoders, fog = self._sampled
         u = self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), ideal.rate).u
         if self.turns_gimbals:
-            self.turning = u if self._gap is None else self._gap(u)
+            self.gimbal_rate = u if self._backlash is None else self._backlash(u)
         return True
 
-    def turn(self, u: Scalar) -> None:
+    def command_rate(self, u: Scalar) -> None:
         """Turn the gimbals at a rate from now on [rad/s]."""
-        self.turning = u if self._gap is None else self._gap(u)
+        self.gimbal_rate = u if self._backlash is None else self._backlash(u)
 
     def decide(
         self, step: int, forces: Sequence[Scalar], encoders: Sequence[Scalar], fog: Scalar, rate: Scalar
@@ -264,7 +270,7 @@ class Controller:
         if not self._single:
             x2 = x2.copy()
             read_only(x2, *estimate)
-        x = fed(x1, x2, x3)
+        x = feedback_state(x1, x2, x3)
         if len(estimate) > 3:
             x.extra = estimate[3:]
         u, x_e = self._commanding.decide(y, x, held, step)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.controllers.laws.protocol import Law, fed
+from cmg_mj.controllers.laws.protocol import Law, feedback_state
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, raised, shown
 from cmg_mj.observers import Measurement, Observer
@@ -18,7 +18,7 @@ TILTS = (0.01, 0.011)
 """Of the two samples [rad]."""
 
 
-def rehearse(observer: Observer, worlds: int | None) -> None:
+def dry_run_observer(observer: Observer, worlds: int | None) -> None:
     """Two samples of one observer, on floats or on arrays of so many worlds."""
     first, second, u = _samples(worlds)
     call = "init(y)"
@@ -43,7 +43,7 @@ def rehearse(observer: Observer, worlds: int | None) -> None:
         _check_number(call, name, value, worlds)
 
 
-def rehearse_law(law: Law, extra: int, worlds: int | None) -> None:
+def dry_run_law(law: Law, extra: int, worlds: int | None) -> None:
     """Two samples of a law, fed back with so many signals beyond x, on floats or on arrays of so many worlds."""
     first, second, u = _samples(worlds)
     call = "init(y)"
@@ -53,7 +53,7 @@ def rehearse_law(law: Law, extra: int, worlds: int | None) -> None:
         for tilt, y, rate, held in ((TILTS[0], first, 0.0 * u, 0.0 * u), (TILTS[1], second, u, u)):
             if worlds is not None:
                 read_only(held)
-            returned = law.step(state, y, fed(y[0], rate, y[1], (rate,) * extra), held)
+            returned = law.step(state, y, feedback_state(y[0], rate, y[1], (rate,) * extra), held)
             _check_command(call, returned, state, worlds, tilt)
             state = returned[0]
     except InputError:

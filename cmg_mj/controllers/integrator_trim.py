@@ -11,7 +11,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers.protocol import BIAS
 
 
-def trim_of(bias_trim_s: float, law: Law, extra_signals: Sequence[str]) -> tuple[int, float]:
+def integrator_trim(bias_trim_s: float, law: Law, extra_signals: Sequence[str]) -> tuple[int, float]:
     """How the integrator is trimmed by the observer's estimate of the bias.
 
     Args:

@@ -7,13 +7,13 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from cmg_mj.controllers.laws.protocol import Fed, Law
+from cmg_mj.controllers.laws.protocol import FeedbackState, Law
 from cmg_mj.elementwise import Scalar, clip
 from cmg_mj.errors import RunStopped, raised
 from cmg_mj.observers.protocol import Measurement
 
 
-class Commanding:
+class LawRunner:
     """A law that decides.
 
     Args:
@@ -43,13 +43,13 @@ class Commanding:
         try:
             self._state = self.law.init(y)
         except (Exception, SystemExit) as error:  # a user's law may fail in any way
-            self._blame(f"raised {raised(error)}", step, error)
+            self._fail(f"raised {raised(error)}", step, error)
 
     def trim(self, x_e: Scalar) -> None:
         """Hold the integrator at a value [rad s]."""
         self._state = self._state._replace(x_e=x_e)
 
-    def decide(self, y: Measurement, x: Fed, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
+    def decide(self, y: Measurement, x: FeedbackState, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
         """The command of a tick.
 
         Args:
@@ -71,14 +71,14 @@ class Commanding:
             # A float within the limit is what the bench's laws give: all else is looked at more closely.
             if self._single and type(command) is float and type(x_e) is float and self._least <= command <= self._most:
                 return command, x_e
-            command, x_e = self._fitted(command, x_e, y)
+            command, x_e = self._coerced(command, x_e, y)
         except (Exception, SystemExit) as error:  # a user's law may fail in any way
-            self._blame(f"raised {raised(error)}", step, error)
+            self._fail(f"raised {raised(error)}", step, error)
         if self._single and not math.isfinite(command):  # many worlds are judged one by one, elsewhere
-            self._blame(f"returned {command} for u", step)
+            self._fail(f"returned {command} for u", step)
         return command, x_e
 
-    def _fitted(self, command: Any, x_e: Any, y: Measurement) -> tuple[Scalar, Scalar]:
+    def _coerced(self, command: Any, x_e: Any, y: Measurement) -> tuple[Scalar, Scalar]:
         """What a law has said, within the limit, as floats or as arrays of their own: it may go on changing its own."""
         if self._single:
             u, x_e = _number(command), _number(x_e)
@@ -86,11 +86,11 @@ class Commanding:
         u = _of_worlds(command, y)
         return np.where(np.isfinite(u), clip(u, self._least, self._most), u), _of_worlds(x_e, y)
 
-    def _blame(self, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
+    def _fail(self, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
         raise RunStopped(f"law {type(self.law).__name__} {what} at t = {step * self._timestep:g} s") from cause
 
 
-class Succeeding(Commanding):
+class LawTakeover(LawRunner):
     """A law that takes over from another: it starts from the first sample that it sees, with the other's integrator.
 
     Args:
@@ -100,13 +100,13 @@ class Succeeding(Commanding):
         timestep: Physics step [s].
     """
 
-    def __init__(self, before: Commanding, law: Law, single: bool, timestep: float) -> None:
+    def __init__(self, before: LawRunner, law: Law, single: bool, timestep: float) -> None:
         super().__init__(law, single, timestep)
-        waiting = before._before if isinstance(before, Succeeding) else None
-        self._before: Commanding | None = waiting or before
+        waiting = before._before if isinstance(before, LawTakeover) else None
+        self._before: LawRunner | None = waiting or before
 
-    def decide(self, y: Measurement, x: Fed, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
-        """The command of a tick: see `Commanding`."""
+    def decide(self, y: Measurement, x: FeedbackState, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
+        """The command of a tick: see `LawRunner`."""
         if self._before is not None:
             self.start(y, step)
             x_e = getattr(self._before._state, "x_e", None)

@@ -12,13 +12,13 @@ from cmg_mj.controllers.controller import Controller, Feedback, Tick
 from cmg_mj.elementwise import Scalar, clip, cos, dot, sin, where
 from cmg_mj.errors import InputError
 from cmg_mj.observers.runner import read_only
-from cmg_mj.sensors.ideal import Ideal, Ideals
+from cmg_mj.sensors.ideal import IdealReading, MultiAxisReading
 from cmg_mj.sensors.mems_gyro import MemsGyro
 from cmg_mj.sensors.sampled import normals
 
 Rows = Sequence[Sequence[float]]
 
-STREAM = 5
+TURN_GYRO_STREAM = 5
 """Of the noise of the gyro about the vertical: those before it are an axis' sensors'."""
 
 
@@ -50,7 +50,7 @@ class Turning(NamedTuple):
     """k [1]."""
 
 
-class AxesController:
+class MultiAxisController:
     """Runs a controller an axis, tick after tick.
 
     Where the rig turns about the vertical at w, the momenta of axis j, its wheels' and its tilt's, are swept round with
@@ -83,7 +83,7 @@ class AxesController:
         self.law, self.sensors = first.law, first.sensors
         self._gyro = gyro or first.sensors.mems_gyro
         self.seed, self.worlds = first.seed, first.worlds
-        self.beat = math.gcd(*(part.beat for part in self.parts))
+        self.steps_per_sample = math.gcd(*(part.steps_per_sample for part in self.parts))
         """Physics steps between the moments at which anything may be due."""
         self._turning = None if turning is None else [coefficients.tolist() for coefficients in turning]
         for part in self.parts:
@@ -96,14 +96,14 @@ class AxesController:
             part.reset()
         self.step: int | None = None
         """The physics step of the last update."""
-        noise = normals(self.seed, self.worlds, STREAM, self._gyro.channels)
-        self._read = self._gyro.meter(self.law.dt, noise)
+        noise = normals(self.seed, self.worlds, TURN_GYRO_STREAM, self._gyro.channels)
+        self._read = self._gyro.make_reading_function(self.law.dt, noise)
 
-    def update(self, step: int, ideals: Ideals) -> bool:
+    def update(self, step: int, ideals: MultiAxisReading) -> bool:
         """Take the samples and the control decisions that are due at a physics step.
 
         Args:
-            step: Number of the physics step, a multiple of `beat`.
+            step: Number of the physics step, a multiple of `steps_per_sample`.
             ideals: The ideal readings at that step.
 
         Returns:
@@ -118,7 +118,7 @@ class AxesController:
             self._against(ideals, *self._turning)
         return ticked[0]
 
-    def _against(self, ideals: Ideals, wheels: Rows, body: Rows, shown: Rows) -> None:
+    def _against(self, ideals: MultiAxisReading, wheels: Rows, body: Rows, shown: Rows) -> None:
         """Add to each axis' command what cancels the torque of momenta that are swept round."""
         turn_rate = ideals.turn_rate
         read = self._read(np.atleast_1d(turn_rate)[None, :])[0]
@@ -136,9 +136,9 @@ class AxesController:
             if type(u) is not float:
                 read_only(u, none)  # as in `Controller.decide`
             part.tick = tick._replace(u=u)
-            part.turn(total)
+            part.command_rate(total)
 
 
-def _fed_back(feedback: Feedback, tick: Tick, ideal: Ideal) -> Scalar:
+def _fed_back(feedback: Feedback, tick: Tick, ideal: IdealReading) -> Scalar:
     """The tilt rate of an axis that its law is given [rad/s]."""
     return tick.estimates[0][1] if feedback == "observer" else tick.fog if feedback == "fog" else ideal.rate

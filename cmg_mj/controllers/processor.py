@@ -9,7 +9,7 @@ from cmg_mj.controllers.controller import Controller, Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers.protocol import Measurement, Observer
-from cmg_mj.observers.runner import named
+from cmg_mj.observers.runner import as_estimate
 
 
 class Decision(NamedTuple):
@@ -45,7 +45,7 @@ class Processor(Protocol):
         ...
 
 
-class _Elsewhere:
+class _RemoteObserver:
     """Stands for the observer that a processor runs: what it estimates has just been decided."""
 
     def __init__(self, observer: Observer) -> None:
@@ -60,7 +60,7 @@ class _Elsewhere:
         return None, self.estimate
 
 
-class WithProcessor(Controller):
+class ProcessorController(Controller):
     """A controller whose decisions a processor takes, from what the sensors show (one world only).
 
     Args:
@@ -75,7 +75,7 @@ class WithProcessor(Controller):
 
     def __init__(self, processor: Processor, observer: Observer, *args: Any, **options: Any) -> None:
         self.processor = processor
-        self._elsewhere = _Elsewhere(observer)
+        self._elsewhere = _RemoteObserver(observer)
         super().__init__(self._elsewhere, *args, **options)
         self.observer = observer
         if not isinstance(self.worlds, int) or self.feedback != "observer":
@@ -98,5 +98,7 @@ class WithProcessor(Controller):
         tick = super().decide(step, forces, encoders, fog, rate)
         trimmed = step < self.trimmed_until
         x_e = self.trim_gain * decision.estimate[self.trim_part] if trimmed else decision.x_e
-        self.tick = tick._replace(u=decision.u, x_e=x_e, estimates=[named(decision.estimate), *tick.estimates[1:]])
+        self.tick = tick._replace(
+            u=decision.u, x_e=x_e, estimates=[as_estimate(decision.estimate), *tick.estimates[1:]]
+        )
         return self.tick

@@ -16,7 +16,7 @@ from cmg_mj.inputs.messages import complaint, fields_of, not_allowed
 
 
 @dataclass(frozen=True)
-class Kind:
+class UserClassKind:
     """What such classes are for, and what messages call them.
 
     Attributes:

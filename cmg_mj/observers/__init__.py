@@ -1,10 +1,10 @@
 """Velocity observers, one a file."""
 
 from cmg_mj.observers.protocol import NEEDS, Estimate, Measurement, Observer, needs
-from cmg_mj.observers.registry import GIVEN, OBSERVERS, check_names, make_observer, observer_class
+from cmg_mj.observers.registry import BENCH_PARAMETERS, OBSERVERS, check_names, make_observer, observer_class
 
 __all__ = [
-    "GIVEN",
+    "BENCH_PARAMETERS",
     "NEEDS",
     "OBSERVERS",
     "Estimate",

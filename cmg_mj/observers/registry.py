@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.user_classes import Kind
+from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.observers.protocol import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.sensors.tilt import TiltNoise
@@ -28,10 +28,10 @@ OBSERVERS = {
 }
 """Name a user types -> dotted path of the class."""
 
-GIVEN = ("dt", "model", "noise")
+BENCH_PARAMETERS = ("dt", "model", "noise")
 """What the bench gives every observer whose constructor takes it; all else is the user's choice."""
 
-OF_OBSERVERS = Kind("observer", "observer", OBSERVERS, GIVEN, {"init": "y", "step": "state, y, u"})
+OF_OBSERVERS = UserClassKind("observer", "observer", OBSERVERS, BENCH_PARAMETERS, {"init": "y", "step": "state, y, u"})
 """How an observer is found, checked and made."""
 
 

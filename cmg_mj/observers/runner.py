@@ -19,7 +19,7 @@ def read_only(*arrays: np.ndarray) -> None:
         array.flags.writeable = False
 
 
-class Observing:
+class ObserverRunner:
     """Observers that see the same samples.
 
     Args:
@@ -59,7 +59,7 @@ class Observing:
         self._at_work = list(self._given)
         self._states = [self._first_state(observer, y, step) for observer in self._at_work]
         zero = 0.0 * y.y1
-        return [named((y.y1, zero, y.y2, *[zero] * (width - 3))) for width in self._widths]
+        return [as_estimate((y.y1, zero, y.y2, *[zero] * (width - 3))) for width in self._widths]
 
     def advance(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
         """The estimates at the next sample.
@@ -84,22 +84,22 @@ class Observing:
                 if single:
                     # The sum of floats is a float, of anything else (but for a few integers among them) is not.
                     if len(estimate) != self._widths[i] or type(total := sum(estimate)) is not float:
-                        estimate = self._fitted(estimate, self._widths[i], y)
+                        estimate = self._coerced(estimate, self._widths[i], y)
                         total = sum(estimate)
-                elif self._fits(estimate, self._widths[i], y):
+                elif self._has_right_shape(estimate, self._widths[i], y):
                     # The record keeps a copy: an observer may go on changing its arrays in place.
-                    estimate = named([part.copy() for part in estimate])
+                    estimate = as_estimate([part.copy() for part in estimate])
                 else:
-                    estimate = self._fitted(estimate, self._widths[i], y)
+                    estimate = self._coerced(estimate, self._widths[i], y)
             except (Exception, SystemExit) as error:  # a user's observer may fail in any way
                 if i == 0:
-                    self._blame(observer, f"raised {raised(error)}", step, error)
+                    self._fail(observer, f"raised {raised(error)}", step, error)
                 # One that only rides along must not end the run: it is NaN from here on.
-                self._at_work[i] = lost = _Lost(self._widths[i])
+                self._at_work[i] = lost = _FailedObserver(self._widths[i])
                 states[i], estimate = lost.step(None, y, u)
             # Many worlds are judged one by one, elsewhere. NaN and infinity alike are not zero times themselves.
             if i == 0 and 0.0 * total != 0.0:
-                self._blame_number(observer, estimate, step)
+                self._fail_not_finite(observer, estimate, step)
             estimates.append(estimate)
         return estimates
 
@@ -107,16 +107,16 @@ class Observing:
         try:
             return observer.init(y)
         except (Exception, SystemExit) as error:  # a user's observer may fail in any way
-            self._blame(observer, f"raised {raised(error)}", step, error)
+            self._fail(observer, f"raised {raised(error)}", step, error)
 
-    def _fits(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> bool:
+    def _has_right_shape(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> bool:
         """Whether an estimate has all its parts, arrays (n_worlds,)."""
         shape = y.y1.shape
         return len(estimate) == width and all(
             getattr(part, "shape", None) == shape and part.dtype == float for part in estimate
         )
 
-    def _fitted(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> Sequence[Scalar]:
+    def _coerced(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> Sequence[Scalar]:
         """Make a user's estimate, which may be NumPy's numbers or the same for all worlds, consist of these."""
         if len(estimate) < width:
             raise ValueError(f"the estimate has {len(estimate)} parts, not {width}: x1, x2, x3 and the extra signals")
@@ -125,21 +125,21 @@ class Observing:
             if part.dtype.kind not in "fiub":
                 raise TypeError(f"the estimate has a part of type {part.dtype}, not real numbers")
         if self._single:
-            return named([float(part) for part in parts])
-        return named([np.broadcast_to(part.astype(float), y.y1.shape) for part in parts])
+            return as_estimate([float(part) for part in parts])
+        return as_estimate([np.broadcast_to(part.astype(float), y.y1.shape) for part in parts])
 
-    def _blame_number(self, observer: Observer, estimate: Sequence[float], step: int) -> None:
+    def _fail_not_finite(self, observer: Observer, estimate: Sequence[float], step: int) -> None:
         """Stop for a number that is not finite, if there is one: a sum may overflow."""
         for name, value in zip(("x1", "x2", "x3", *self.extra_signals[0]), estimate, strict=True):
             if not math.isfinite(value):
-                self._blame(observer, f"returned {value} for {name}", step)
+                self._fail(observer, f"returned {value} for {name}", step)
 
-    def _blame(self, observer: Observer, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
+    def _fail(self, observer: Observer, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
         name = type(getattr(observer, "stands_for", observer)).__name__
         raise RunStopped(f"observer {name} {what} at t = {step * self._timestep:g} s") from cause
 
 
-class Joining(Observing):
+class ObserverTakeover(ObserverRunner):
     """Observers that join a run which others have begun, and take over once they have had time to converge.
 
     They start from the first sample that they see, whose rate they take for zero. Until they take over, or the one
@@ -154,20 +154,20 @@ class Joining(Observing):
     """
 
     def __init__(
-        self, before: Observing, ticks: int, observers: Sequence[Observer], single: bool, timestep: float
+        self, before: ObserverRunner, ticks: int, observers: Sequence[Observer], single: bool, timestep: float
     ) -> None:
         super().__init__(observers, single, timestep)
-        self._before: Observing | None = before
+        self._before: ObserverRunner | None = before
         self._ticks = ticks
 
     def advance(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
-        """The estimates at the next sample: see `Observing`."""
+        """The estimates at the next sample: see `ObserverRunner`."""
         estimates = super().advance(y, u, step) if self._at_work else self.start(y, step)
         if self._before is not None:
             self._ticks -= 1
             try:
                 of_before = self._before.advance(y, u, step)[0]
-                estimates[0] = named([*of_before[:3], *estimates[0][3:]])  # beyond x a law finds what it was told
+                estimates[0] = as_estimate([*of_before[:3], *estimates[0][3:]])  # beyond x a law finds what it was told
             except RunStopped:
                 self._ticks = 0
             if self._ticks <= 0:
@@ -175,7 +175,7 @@ class Joining(Observing):
         return estimates
 
 
-class _Lost:
+class _FailedObserver:
     """An open-loop observer that raised: nothing is known any more."""
 
     def __init__(self, width: int) -> None:
@@ -185,10 +185,10 @@ class _Lost:
         return None
 
     def step(self, state: None, y: Measurement, u: Scalar) -> tuple[None, Any]:
-        return None, named((math.nan + 0.0 * y[0],) * self.width)
+        return None, as_estimate((math.nan + 0.0 * y[0],) * self.width)
 
 
-def named(parts: Sequence[Scalar]) -> Sequence[Scalar]:
+def as_estimate(parts: Sequence[Scalar]) -> Sequence[Scalar]:
     """An estimate of x alone has its parts' names."""
     return Estimate(*parts) if len(parts) == 3 else tuple(parts)
 

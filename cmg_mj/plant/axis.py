@@ -15,10 +15,10 @@ import numpy as np
 from cmg_mj.elementwise import Scalar
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.effective_inertia import at_keyframe, inertia_about
-from cmg_mj.plant.parts import LINE, Cube, cubes_of
+from cmg_mj.plant.parts import TILT_ELEMENT, Cube, cubes_of
 from cmg_mj.plant.tilt_line import Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.ideal import Ideal
+from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.tilt import RadialTilt
 
 _new = tuple.__new__  # a named tuple's own takes twice as long
@@ -90,7 +90,7 @@ class Axis:
         n = len(self.cubes)
         return [(cube.gimbal, cube.direction / n, cube.gimbal_zero) for cube in self.cubes]
 
-    def ideal(self, sensordata: Any, qvel: Any) -> Ideal:
+    def ideal(self, sensordata: Any, qvel: Any) -> IdealReading:
         """What perfect sensors show.
 
         Args:
@@ -105,7 +105,7 @@ class Axis:
             forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
         else:
             forces, encoders = sensordata[self.forces], [sensordata[address] for address in self.encoders]
-        return _new(Ideal, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel)))
+        return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel)))
 
     def gimbal_angle(self, qpos: Any) -> Scalar:
         """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""
@@ -130,7 +130,7 @@ class Axis:
 
 
 def find_axis(model: mujoco.MjModel, key: int, name: str) -> Axis:
-    """Resolve the names of an axis whose elements `rig_parts.lacks` has found.
+    """Resolve the names of an axis whose elements `rig_parts.missing_parts` has found.
 
     Args:
         model: The compiled model, as its file has it.
@@ -142,7 +142,7 @@ def find_axis(model: mujoco.MjModel, key: int, name: str) -> Axis:
     """
     prefix = f"{name}/" if name else ""
     data = at_keyframe(model, key)
-    joint, site = _id(model, "joint", prefix + LINE), _id(model, "site", prefix + LINE)
+    joint, site = _id(model, "joint", prefix + TILT_ELEMENT), _id(model, "site", prefix + TILT_ELEMENT)
     if joint >= 0:
         line: Line | None = line_of_joint(model, joint, key)
         frame, point, direction = int(model.jnt_bodyid[joint]), model.jnt_pos[joint], model.jnt_axis[joint]
@@ -189,7 +189,7 @@ def _cube(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Cube
     direction = 0.0
     if line is not None:
         inertia = inertia_about(model, key, line, {angle: zero - QUARTER_TURN})
-        direction = math.copysign(1.0, inertia.row[spin] * speed)
+        direction = math.copysign(1.0, inertia.coupling_row[spin] * speed)
     addresses = angle, int(model.jnt_dofadr[gimbal]), int(model.jnt_qposadr[flywheel]), spin
     return Cube(name, *addresses, servo, motor, direction, zero, speed)
 
@@ -209,10 +209,10 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     line = axis.line
     upright = inertia_about(model, key, line, {})
     turned = inertia_about(model, key, line, {c.gimbal: c.gimbal_zero - c.direction * QUARTER_TURN for c in axis.cubes})
-    J1 = upright.own / n
-    J2 = turned.own / n - J1
-    J_d = sum(abs(turned.row[c.flywheel_dof]) for c in axis.cubes) / n
-    momentum = sum(turned.row[c.flywheel_dof] * c.speed for c in axis.cubes)
+    J1 = upright.tilt_inertia / n
+    J2 = turned.tilt_inertia / n - J1
+    J_d = sum(abs(turned.coupling_row[c.flywheel_dof]) for c in axis.cubes) / n
+    momentum = sum(turned.coupling_row[c.flywheel_dof] * c.speed for c in axis.cubes)
     data = at_keyframe(model, key)
     data.qvel[:] = 0.0
     line.tilt(data, QUARTER_TURN)

@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.errors import shown
 from cmg_mj.inputs.sanity import LARGEST
-from cmg_mj.plant.parts import KEYFRAME, LINE, SENSORS, axes_in, cubes_in
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axes_in, cubes_in
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
 TRUE_DEG = 0.05
@@ -24,7 +24,7 @@ STEPS_S = 1e-6, 0.1
 """Physics steps that a model may ask for [s]."""
 
 
-def numbers_that_are_none(model: mujoco.MjModel) -> list[str]:
+def invalid_numbers(model: mujoco.MjModel) -> list[str]:
     """Numbers of a compiled model that are NaN, infinite or beyond all size, by their element.
 
     Args:
@@ -53,7 +53,7 @@ def numbers_that_are_none(model: mujoco.MjModel) -> list[str]:
     return wrong
 
 
-class Placement:
+class RigChecker:
     """A compiled model at its keyframe: what stands where it must not. What is missing is not looked at.
 
     Args:
@@ -67,7 +67,7 @@ class Placement:
     def __init__(self, model: mujoco.MjModel) -> None:
         self.hints: list[str] = []
         self.wrong: list[str] = []
-        self.key = _id(model, "key", KEYFRAME)
+        self.key = _id(model, "key", EQUILIBRIUM_KEY)
         if self.key < 0:
             return
         self.model, self.data = model, mujoco.MjData(model)
@@ -87,7 +87,7 @@ class Placement:
         """All of one axis."""
         model, data = self.model, self.data
         self.prefix = f"{name}/" if name else ""
-        self.what = what = self.prefix + LINE
+        self.what = what = self.prefix + TILT_ELEMENT
         joint, site = _id(model, "joint", what), _id(model, "site", what)
         if max(joint, site) < 0:
             return
@@ -134,8 +134,8 @@ class Placement:
                 angle = math.remainder(self.tilt.zero - self.tilt.sign * lean, 2.0 * math.pi)
                 cure = f" ({self.model.joint(self.tilt.joint).name!r} = {angle:.6g} would be upright)"
             yield (
-                f"at the keyframe {KEYFRAME!r} the rig must stand upright, its mass above the tilt axis; it leans by "
-                f"{math.degrees(lean):.3g} deg{cure}"
+                f"at the keyframe {EQUILIBRIUM_KEY!r} the rig must stand upright, its mass above the tilt axis; it "
+                f"leans by {math.degrees(lean):.3g} deg{cure}"
             )
 
     def _cube(self, cube: str) -> Iterator[str]:
@@ -144,7 +144,7 @@ class Placement:
         gimbal, flywheel, servo, motor = self._addresses(cube)
         turns, spins = data.xaxis[gimbal], data.xaxis[flywheel]
         angle = float(data.qpos[model.jnt_qposadr[gimbal]])
-        at_keyframe = f"at the keyframe {KEYFRAME!r}"
+        at_keyframe = f"at the keyframe {EQUILIBRIUM_KEY!r}"
         if not (_is_square(turns, self.axis) and _is_square(spins, turns)):
             yield (
                 f"the axes of '{cube}/gimbal' and the tilt, and of '{cube}/flywheel' and its gimbal, must be at right "
@@ -162,18 +162,18 @@ class Placement:
                 )
         speed, start = float(data.ctrl[motor]), float(data.qvel[model.jnt_dofadr[flywheel]])
         if speed == 0.0:
-            yield f"keyframe {KEYFRAME!r} must give '{cube}/flywheel_motor' a speed (in ctrl)"
+            yield f"keyframe {EQUILIBRIUM_KEY!r} must give '{cube}/flywheel_motor' a speed (in ctrl)"
         elif abs(start - speed) > 0.01 * abs(speed):
             yield (
-                f"keyframe {KEYFRAME!r} must start '{cube}/flywheel' at its motor's speed: qvel says {start:g}, "
+                f"keyframe {EQUILIBRIUM_KEY!r} must start '{cube}/flywheel' at its motor's speed: qvel says {start:g}, "
                 f"ctrl {speed:g}"
             )
         if model.actuator_dyntype[servo] == mujoco.mjtDyn.mjDYN_INTEGRATOR:
             setpoint = float(data.act[model.actuator_actadr[servo]])
             if abs(math.degrees(setpoint - angle)) > TRUE_DEG:
                 yield (
-                    f"keyframe {KEYFRAME!r} must have the setpoint (act) of '{cube}/gimbal_servo' where its gimbal "
-                    f"stands: {angle:.6g}, not {setpoint:.6g}"
+                    f"keyframe {EQUILIBRIUM_KEY!r} must have the setpoint (act) of '{cube}/gimbal_servo' where its "
+                    f"gimbal stands: {angle:.6g}, not {setpoint:.6g}"
                 )
 
     def _rest(self) -> Iterator[str]:
@@ -184,7 +184,7 @@ class Placement:
             f"{name!r} ({rate:g} rad/s)" for name, rate in joints.items() if rate and not name.endswith("/flywheel")
         ]
         if moving:
-            yield f"at the keyframe {KEYFRAME!r} only flywheels may turn, not {', '.join(moving)}"
+            yield f"at the keyframe {EQUILIBRIUM_KEY!r} only flywheels may turn, not {', '.join(moving)}"
 
     def _sensors(self) -> Iterator[str]:
         """They sit on the frame, the accelerometers on the radial line, upright."""
@@ -247,7 +247,7 @@ class Placement:
             )
 
 
-def starts(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+def survives_first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     """Whether the physics gets through its first steps.
 
     Args:

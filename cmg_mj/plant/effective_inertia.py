@@ -15,10 +15,10 @@ SMALL = 1e-9
 
 @dataclass(frozen=True)
 class Inertia:
-    """About a line: `row` couples a tilt with every joint, (nv,); `own` is the tilt's [kg m^2]."""
+    """About a line: `coupling_row` couples a tilt with every joint, (nv,); `tilt_inertia` is the tilt's [kg m^2]."""
 
-    row: np.ndarray
-    own: float
+    coupling_row: np.ndarray
+    tilt_inertia: float
 
 
 def at_keyframe(model: mujoco.MjModel, key: int) -> mujoco.MjData:
@@ -53,11 +53,11 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
     motion = line.motion(model, data)
     row = motion @ dense
     own = row @ motion
-    loose = _loose(model, data) if isinstance(line, HingeLine) else []
+    loose = _free_dofs(model, data) if isinstance(line, HingeLine) else []
     loose = [dof for dof in loose if not motion[dof]]
     if loose:
         gives, inertia = row[loose], dense[np.ix_(loose, loose)]
-        held = np.concatenate([_contacts(model, data), _ties(model, data)])[:, loose]
+        held = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)])[:, loose]
         if held.size:
             ways = _null_space(held)
             gives, inertia = gives @ ways, ways.T @ inertia @ ways
@@ -65,7 +65,7 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
     return Inertia(row, float(own))
 
 
-def _loose(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
+def _free_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
     """Degrees of freedom that neither a constraint nor a servo holds, flywheels and gimbals left out."""
     held = set()
     for constraint in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (data.eq_active == 1)):
@@ -78,7 +78,7 @@ def _loose(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
     return [dof for dof in range(model.nv) if dof not in held]
 
 
-def _ties(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+def _weld_jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """How fast what welds and connects tie together parts for the joints' rates, (n, nv): a ball is held by a weld."""
     kinds = int(mujoco.mjtEq.mjEQ_WELD), int(mujoco.mjtEq.mjEQ_CONNECT)
     rows = np.zeros((data.nefc, model.nv))

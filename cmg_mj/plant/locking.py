@@ -11,7 +11,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
 from cmg_mj.plant.effective_inertia import at_keyframe
-from cmg_mj.plant.parts import KEYFRAME, LINE, axes_in
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, TILT_ELEMENT, axes_in
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
 _QPOS_SIZES = {0: 7, 1: 4, 2: 1, 3: 1}
@@ -28,7 +28,7 @@ def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
     """
     if YAW not in [joint.name for joint in spec.joints]:
         raise InputError(f"plant.lock_thrust_bearing = true: {path} has no joint 'yaw' to lock")
-    take_out(spec, YAW)
+    remove_hinge(spec, YAW)
 
 
 def lock_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, axes: Sequence[str], path: Path) -> None:
@@ -43,7 +43,7 @@ def lock_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, axes: Sequence[str], p
     Raises:
         InputError: There is no such axis, it tilts about no hinge, or no axis is left.
     """
-    key = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, KEYFRAME))
+    key = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))
     for line in _hinges_of(model, key, axes, path):
         name = model.joint(line.joint).name
         angle = line.zero - float(model.qpos0[line.angle])
@@ -54,7 +54,7 @@ def lock_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, axes: Sequence[str], p
                     "joint of its body; give it a body of its own"
                 )
             _turn(spec.joint(name), angle)
-        take_out(spec, name)
+        remove_hinge(spec, name)
 
 
 def _hinges_of(model: mujoco.MjModel, key: int, axes: Sequence[str], path: Path) -> list[HingeLine]:
@@ -66,7 +66,7 @@ def _hinges_of(model: mujoco.MjModel, key: int, axes: Sequence[str], path: Path)
         if axis not in known:
             names = nearest(axis, known, "its axes") if any(known) else "its only one has no name"
             raise InputError(f"{said} has no axis {axis!r}; {names}")
-        name = f"{axis}/{LINE}".lstrip("/")
+        name = f"{axis}/{TILT_ELEMENT}".lstrip("/")
         line: Line | None = line_of_joint(model, joints.index(name), key) if name in joints else None
         if line is None:
             line = line_at_site(model, data, sites.index(name), key)
@@ -103,7 +103,7 @@ def _turn(hinge: Any, angle: float) -> None:
     body.pos, body.quat = np.array(body.pos) + moved, both
 
 
-def take_out(spec: mujoco.MjSpec, name: str) -> None:
+def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
     """Take a joint out, with what drives, reads or holds it, and their entries in every keyframe.
 
     Args:

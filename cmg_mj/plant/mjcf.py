@@ -11,9 +11,9 @@ import mujoco
 
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.includes import check_files
-from cmg_mj.plant.checks import Placement, numbers_that_are_none
+from cmg_mj.plant.checks import RigChecker, invalid_numbers
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
-from cmg_mj.plant.parts import NEEDS, lacks
+from cmg_mj.plant.parts import REQUIRED_PARTS, missing_parts
 
 
 def _one_line(error: Exception) -> str:
@@ -71,7 +71,7 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> tupl
         InputError: It is no rig. All that is missing or wrong is named.
     """
     spec = parse(path)
-    missing = lacks(spec)
+    missing = missing_parts(spec)
     if lock and not missing:
         lock_thrust_bearing(spec, path)
     spec.compiler.discardvisual = True
@@ -85,12 +85,12 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> tupl
         if "keyframe" not in str(error):  # whose sizes are wrong because something is missing
             wrong.append(str(error).removeprefix(f"{path}: "))
     else:
-        numbers = numbers_that_are_none(model)
-        placement = None if numbers else Placement(model)
+        numbers = invalid_numbers(model)
+        placement = None if numbers else RigChecker(model)
         wrong += numbers if placement is None else placement.wrong
         hints = [] if placement is None else placement.hints
     if wrong or model is None:
-        raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([NEEDS] if missing else [])]))
+        raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([REQUIRED_PARTS] if missing else [])]))
     if locked_axes:
         lock_axes(spec, model, locked_axes, path)
         model = compile_model(spec, path)

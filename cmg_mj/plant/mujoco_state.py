@@ -23,7 +23,7 @@ def quiet() -> Iterator[None]:
 
 
 @contextmanager
-def control_callback(callback: object | None) -> Iterator[None]:
+def set_control_callback(callback: object | None) -> Iterator[None]:
     """Have MuJoCo call this control callback (None: none), and the one before it again afterwards."""
     before = mujoco.get_mjcb_control()
     mujoco.set_mjcb_control(callback)

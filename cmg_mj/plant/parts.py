@@ -10,14 +10,14 @@ import mujoco
 
 from cmg_mj.errors import nearest
 
-KEYFRAME = "equilibrium"
-LINE = "tilt"
+EQUILIBRIUM_KEY = "equilibrium"
+TILT_ELEMENT = "tilt"
 """The hinge that a rig tilts about, or the site whose y axis lies along a line that it tilts about."""
 SENSORS = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
-NEEDS = (
+REQUIRED_PARTS = (
     "a rig needs a joint or a site tilt, the joints CUBE/gimbal, CUBE/flywheel, the actuators CUBE/gimbal_servo, "
-    f"CUBE/flywheel_motor, the sensors CUBE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe {KEYFRAME}, for one "
-    "CUBE or more; of several axes each has its name before these, as roll/tilt and roll/CUBE/gimbal"
+    f"CUBE/flywheel_motor, the sensors CUBE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe {EQUILIBRIUM_KEY}, "
+    "for one CUBE or more; of several axes each has its name before these, as roll/tilt and roll/CUBE/gimbal"
 )
 _OF_A_CUBE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
 
@@ -56,7 +56,7 @@ class Cube:
         return self.name.rpartition("/")[2]
 
 
-def lacks(spec: mujoco.MjSpec) -> list[str]:
+def missing_parts(spec: mujoco.MjSpec) -> list[str]:
     """What a parsed model lacks: a rig has certain joints, actuators, sensors and a keyframe, by name.
 
     The compiler, which comes after this, would only say that the keyframe has the wrong size.
@@ -91,9 +91,14 @@ def lacks(spec: mujoco.MjSpec) -> list[str]:
     sites = {site.name for site in spec.sites}
     for axis in axes_in([*names, *sites]) or [""]:
         prefix = f"{axis}/" if axis else ""
-        if prefix + LINE not in sites:
-            check("joint", prefix + LINE, _turns_about_y, f'joint {prefix + LINE!r} must turn about y (axis="0 1 0")')
-            check("joint", prefix + LINE, _is_hinge, f"joint {prefix + LINE!r} must be a hinge")
+        if prefix + TILT_ELEMENT not in sites:
+            check(
+                "joint",
+                prefix + TILT_ELEMENT,
+                _turns_about_y,
+                f'joint {prefix + TILT_ELEMENT!r} must turn about y (axis="0 1 0")',
+            )
+            check("joint", prefix + TILT_ELEMENT, _is_hinge, f"joint {prefix + TILT_ELEMENT!r} must be a hinge")
         for cube in cubes_in(names, axis) or [f"{prefix}cube1"]:
             for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
                 joint, drive = f"{cube}/{name}", f"{cube}/{actuator}"
@@ -103,13 +108,13 @@ def lacks(spec: mujoco.MjSpec) -> list[str]:
             check("sensor", encoder, _reads(joint), f"sensor {encoder!r} must be the jointpos of {joint!r}")
         for name, kind in SENSORS.items():
             check("sensor", prefix + name, _is_a(kind), f"sensor {prefix + name!r} must be of the kind {kind!r}")
-    check("keyframe", KEYFRAME, lambda _: True, "")
+    check("keyframe", EQUILIBRIUM_KEY, lambda _: True, "")
     return [_missing(kind, names, list(elements[kind])) for kind, names in missing.items() if names] + wrong
 
 
 def axes_in(names: Iterable[str]) -> list[str]:
     """Names of the axes that elements' names speak of; the only one of a rig need have none."""
-    of_an_axis = {LINE, *SENSORS}
+    of_an_axis = {TILT_ELEMENT, *SENSORS}
     found = [axis for name in names for axis, _, last in [name.rpartition("/")] if last in of_an_axis]
     return list(dict.fromkeys(found))
 

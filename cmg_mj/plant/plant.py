@@ -18,8 +18,8 @@ from pydantic import ValidationError
 from cmg_mj.controllers.backlash import ARCMIN_A_DEGREE
 from cmg_mj.controllers.controller import CONTROLLER_OPTIONS, Controller
 from cmg_mj.controllers.laws import Law, StateFeedback
-from cmg_mj.controllers.multi_axis import AxesController, Turning
-from cmg_mj.controllers.processor import Processor, WithProcessor
+from cmg_mj.controllers.multi_axis import MultiAxisController, Turning
+from cmg_mj.controllers.processor import Processor, ProcessorController
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.bundled import find
@@ -27,20 +27,20 @@ from cmg_mj.inputs.messages import complaint
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, held_cubes, read_reduced
-from cmg_mj.plant.checks import starts
+from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse
-from cmg_mj.plant.mujoco_state import control_callback, quiet
-from cmg_mj.plant.parts import KEYFRAME, Cube, axes_in
+from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Cube, axes_in
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import HingeLine
-from cmg_mj.plant.variations import at_speed, place_accelerometers, turn, vary
-from cmg_mj.scenario.plant_parameters import RigFacts
+from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
+from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import FINEST_STEP_S, PlantSettings
 from cmg_mj.scenario.time_grid import fitting_step
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.ideal import Ideals
+from cmg_mj.sensors.ideal import MultiAxisReading
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
 
@@ -74,14 +74,14 @@ class Plant:
         locked = settings.locked_axes
         self.model, self.hints = load_rig(path, lock=settings.lock_thrust_bearing, locked_axes=locked)
         self._as_filed = self.model
-        self.key = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, KEYFRAME))
+        self.key = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))
         names = [self.model.joint(i).name for i in range(self.model.njnt)]
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in names else None
         sites = [self.model.site(i).name for i in range(self.model.nsite)]
         axes = [name for name in axes_in([*names, *sites]) if name not in locked]
         self._axes_as_filed = tuple(find_axis(self.model, self.key, name) for name in axes)
         self._held = tuple(cube for name in locked for cube in held_cubes(self.model, self.key, name))
-        self._take(settings, period_s, of_axes)
+        self._apply_settings(settings, period_s, of_axes)
 
     def changed(
         self,
@@ -105,10 +105,12 @@ class Plant:
         other = copy.copy(self)
         for made in ("drawn_model", "turning"):
             other.__dict__.pop(made, None)
-        other._take(settings, period_s, of_axes)
+        other._apply_settings(settings, period_s, of_axes)
         return other
 
-    def _take(self, settings: PlantSettings, period_s: float | None, of_axes: Mapping[str, PlantSettings]) -> None:
+    def _apply_settings(
+        self, settings: PlantSettings, period_s: float | None, of_axes: Mapping[str, PlantSettings]
+    ) -> None:
         """Change the model as the settings say, and fit the physics step."""
         self.settings, self._of_axes = settings, of_axes
         self.backlash = math.radians(settings.gimbal_backlash_arcmin / ARCMIN_A_DEGREE)
@@ -123,16 +125,16 @@ class Plant:
                 radial_tilt=place_accelerometers(self.model, own, axis, self.path),
             )
             if settings.flywheel_speed_rad_s is not None:
-                cubes = at_speed(self.model, self.key, axis.cubes, settings.flywheel_speed_rad_s, self.path)
+                cubes = with_flywheel_speed(self.model, self.key, axis.cubes, settings.flywheel_speed_rad_s, self.path)
                 changed = replace(changed, cubes=cubes)
                 changed = replace(changed, reduced=read_reduced(self._as_filed, self.key, changed))
             axes.append(changed)
         self.axes = tuple(axes)
         held = self._held
         if settings.flywheel_speed_rad_s is not None:
-            held = at_speed(self.model, self.key, held, settings.flywheel_speed_rad_s, self.path)
+            held = with_flywheel_speed(self.model, self.key, held, settings.flywheel_speed_rad_s, self.path)
         if settings.turn_rate_rad_s:
-            turn(self.model, self.key, settings.turn_rate_rad_s, self.path)
+            set_turn_rate(self.model, self.key, settings.turn_rate_rad_s, self.path)
         filed = float(self.model.opt.timestep)
         vary(self.model, settings, self.path, self.axes, held)
         shaken = (
@@ -143,18 +145,18 @@ class Plant:
         self.largest_step = largest_step(self.model, self.key, filed, shaken)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
-                f"{self._blamed}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
+                f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
                 f"{FINEST_STEP_S:g} s; soften it, or set plant.timestep_s"
             )
         self.model.opt.timestep = fitting_step(settings, self.largest_step, period_s)
-        if not starts(self.model, self.new_data()):
+        if not survives_first_steps(self.model, self.new_data()):
             raise InputError(
-                f"{self._blamed}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "
+                f"{self._error_source}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "
                 "damping and servos must be of sizes that go together"
             )
 
     @property
-    def _blamed(self) -> str:
+    def _error_source(self) -> str:
         """What is wrong if the physics is: the settings that change it, if there are, or else the file."""
         changes = [f"plant.{name} = {value:g}" for name, value in self.settings.changes_of_physics().items()]
         return ", ".join(changes) or str(self.path)
@@ -162,7 +164,7 @@ class Plant:
     @cached_property
     def drawn_model(self) -> mujoco.MjModel:
         """The model with all that is only seen: the same bodies and joints, and geoms that physics does without."""
-        with control_callback(None), quiet():  # compiling a model runs it
+        with set_control_callback(None), quiet():  # compiling a model runs it
             spec = parse(self.path)
             if self.settings.lock_thrust_bearing:
                 lock_thrust_bearing(spec, self.path)
@@ -176,14 +178,14 @@ class Plant:
 
     # --- several axes ---------------------------------------------------------------------------------------
 
-    def along(self, axis: str) -> Plant:
+    def single_axis(self, axis: str) -> Plant:
         """The rig as one of its axes sees it: with that axis alone.
 
         Args:
             axis: Its name.
 
         Returns:
-            The rig, whose `reduced`, `cubes`, `ideal`, `controller`, ... are that axis'.
+            The rig, whose `reduced`, `cubes`, `ideal_readings`, `controller`, ... are that axis'.
 
         Raises:
             InputError: There is no such axis.
@@ -205,7 +207,7 @@ class Plant:
         """What a turn about the vertical couples."""
         return turning(self._as_filed, self.key, self.axes)
 
-    def lean(self, qpos: Any) -> Scalar:
+    def largest_tilt(self, qpos: Any) -> Scalar:
         """The tilt from the keyframe of the axis that is farthest from it [rad]."""
         if len(self.axes) == 1:
             return self.axis.line.lean(qpos)
@@ -263,12 +265,12 @@ class Plant:
             raise InputError(f"{self.path}: tilts about no hinge of its own at one address; use plant.axis.line")
         return line
 
-    def ideal(self, sensordata: Any, qvel: Any) -> Any:
-        """What perfect sensors show: of the axis (see `Axis.ideal`), or `Ideals` of several."""
+    def ideal_readings(self, sensordata: Any, qvel: Any) -> Any:
+        """What perfect sensors show: of the axis (see `Axis.ideal`), or `MultiAxisReading` of several."""
         if len(self.axes) == 1:
             return self.axis.ideal(sensordata, qvel)
         upward = sensordata[self.axis.gyro + 1]
-        return Ideals([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
+        return MultiAxisReading([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
 
     def gimbal_angle(self, qpos: Any) -> Scalar:
         """True x3 of the axis: see `Axis.gimbal_angle`."""
@@ -304,8 +306,8 @@ class Plant:
                 observer, if that is given by name.
 
         Returns:
-            The controller, a `Controller`; of a rig of several axes an `AxesController` of one an axis, all made alike,
-            whose gimbals also turn against what a turn about the vertical couples.
+            The controller, a `Controller`; of a rig of several axes a `MultiAxisController` of one an axis, all made
+            alike, whose gimbals also turn against what a turn about the vertical couples.
 
         Raises:
             InputError: The observer does not exist or refuses a parameter, or a rate does not fit the physics step.
@@ -314,21 +316,21 @@ class Plant:
             if processor is not None:
                 raise InputError(f"{self.path}: tilts about several axes; a board or other processor takes one")
             alike = {"law": law, "sensors": sensors, "tilt": tilt, "backlash": backlash, **options}
-            rigs = [self.along(name) for name in self.axis_names]
-            return AxesController(
+            rigs = [self.single_axis(name) for name in self.axis_names]
+            return MultiAxisController(
                 [rig.controller(observer, **alike, axis=i) for i, rig in enumerate(rigs)], self.turning
             )
         law = law or StateFeedback(dt=0.005)
         sensors = sensors or Sensors()
         parameters = {name: options.pop(name) for name in options.keys() - CONTROLLER_OPTIONS}
         if isinstance(observer, str):
-            noise = self.facts.noise(sensors)
+            noise = self.parameters.noise(sensors)
             observer = make_observer(observer, law.dt, self.reduced, noise, **parameters)
         elif parameters:
             name = next(iter(parameters))
             known = {"law", "sensors", "tilt", "backlash", "processor", *CONTROLLER_OPTIONS}
             raise InputError(f"controller({name}=...): no such option; {nearest(name, known)}")
-        make = Controller if processor is None else partial(WithProcessor, processor)
+        make = Controller if processor is None else partial(ProcessorController, processor)
         return make(
             observer,
             law,
@@ -352,10 +354,10 @@ class Plant:
         return float(np.linalg.norm(self.model.opt.gravity))
 
     @property
-    def facts(self) -> RigFacts:
+    def parameters(self) -> PlantParameters:
         """What a scenario's controller and observers are made from."""
         cubes = tuple(cube.name for cube in self.cubes)
-        return RigFacts(
+        return PlantParameters(
             self.path, cubes, self.reduced, self.radial_tilt, self.gravity, self.largest_step, tuple(self.hints)
         )
 
@@ -364,7 +366,7 @@ class Plant:
         mujoco.mj_resetDataKeyframe(self.model, data, self.key)
         for axis in self.axes:
             axis.line.tilt(data, -axis.bias + axis.initial_tilt)
-        with control_callback(None):  # the first control tick is the first step's
+        with set_control_callback(None):  # the first control tick is the first step's
             mujoco.mj_forward(self.model, data)
 
     def new_data(self) -> mujoco.MjData:
@@ -414,5 +416,5 @@ def load_plant(
             settings = PlantSettings(**fields)  # type: ignore[arg-type]
         except ValidationError as error:
             raise InputError(f"plant.{complaint(PlantSettings, error.errors()[0], fields)}") from error
-    with control_callback(None):  # compiling a model runs it
+    with set_control_callback(None):  # compiling a model runs it
         return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside), period_s, of_axes)

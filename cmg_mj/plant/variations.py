@@ -12,7 +12,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import Axis
-from cmg_mj.plant.parts import KEYFRAME, Cube
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Cube
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.sensors.tilt import RadialTilt
@@ -75,7 +75,9 @@ def vary(
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
 
 
-def at_speed(model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: float, path: Path) -> tuple[Cube, ...]:
+def with_flywheel_speed(
+    model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: float, path: Path
+) -> tuple[Cube, ...]:
     """Let the flywheels turn at another speed from the start, each in its own direction.
 
     Args:
@@ -105,7 +107,7 @@ def at_speed(model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: floa
     return tuple(found)
 
 
-def turn(model: mujoco.MjModel, key: int, rate: float, path: Path) -> None:
+def set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> None:
     """Let the rig turn about the vertical from the start.
 
     Args:
@@ -226,7 +228,7 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
             "it)"
         )
     data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, KEYFRAME))
+    mujoco.mj_resetDataKeyframe(model, data, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))
     mujoco.mj_forward(model, data)
     to_frame = data.xmat[frame].reshape(3, 3).T
     centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.controllers.dry_run import rehearse
+from cmg_mj.controllers.dry_run import dry_run_observer
 from cmg_mj.errors import InputError, raised
 from cmg_mj.observers import OBSERVERS, Observer, check_names, make_observer, observer_class
 from cmg_mj.observers.protocol import needs
@@ -41,7 +41,7 @@ OnShare = Callable[[float], None]
 
 
 @dataclass(frozen=True)
-class Replayed:
+class ReplayResult:
     """What the observers make of one log.
 
     Attributes:
@@ -74,7 +74,7 @@ def replay_log(
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     skip_s: float = SKIPPED_S,
     on_share: OnShare | None = None,
-) -> Replayed:
+) -> ReplayResult:
     """Replay observers on a log.
 
     Args:
@@ -119,7 +119,9 @@ def replay_log(
         )
         summaries[name] = {**scores(log, found["x2_rad_s"], scored), "noise_gain_1_s": gain}
     zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
-    return Replayed(log, estimates, {**summaries, ZERO: zero}, left_out, alignment_of(log), skip_s, noise, parameters)
+    return ReplayResult(
+        log, estimates, {**summaries, ZERO: zero}, left_out, alignment_of(log), skip_s, noise, parameters
+    )
 
 
 def _check_scored(log: Log, scored: np.ndarray, skip_s: float) -> None:
@@ -166,7 +168,7 @@ def _ready(
             left_out[name] = f"refused: {error}"
             continue
         with np.errstate(all="ignore"):
-            rehearse(observer, None)
+            dry_run_observer(observer, None)
         ready[name] = observer
     if not ready:
         reasons = "; ".join(f"{name} {reason}" for name, reason in left_out.items())

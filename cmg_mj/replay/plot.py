@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.replay.log_replay import Replayed, described
+from cmg_mj.replay.log_replay import ReplayResult, described
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import shown_first, written
 from cmg_mj.results.trajectory import whole_file
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
-from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import (
     INK,
     MEASURED,
@@ -29,7 +29,7 @@ CLOSE_S = 2.0
 """So much is drawn close by [s]."""
 
 
-def close_by(replayed: Replayed) -> tuple[float, float]:
+def close_by(replayed: ReplayResult) -> tuple[float, float]:
     """Where the tilt accelerates most: so many seconds around the middle of that [s]."""
     log = replayed.log
     length = max(2, round(CLOSE_S / log.dt))
@@ -51,7 +51,7 @@ def close_by(replayed: Replayed) -> tuple[float, float]:
     return where
 
 
-def plot_replay(path: Path, replayed: Replayed) -> None:
+def plot_replay(path: Path, replayed: ReplayResult) -> None:
     """Draw one log on a page.
 
     Args:
@@ -63,7 +63,7 @@ def plot_replay(path: Path, replayed: Replayed) -> None:
     few, referred = shown_first(replayed), "reference" in log.has
     others = [name for name in names if name not in few]
     palette = {name: hexadecimal(rgb) for name, rgb in colours(names).items()}
-    labels = shortened(names)
+    labels = short_names(names)
     small = [others[i : i + SMALL_COLUMNS] for i in range(0, len(others), SMALL_COLUMNS)]
     tall = 4 if referred else 3
     heights = [PANEL_HEIGHT] * tall + [SMALL_HEIGHT] * len(small)
@@ -111,13 +111,13 @@ def plot_replay(path: Path, replayed: Replayed) -> None:
     plt.close(figure)
 
 
-def _line(axes: Any, replayed: Replayed, values: np.ndarray, **style: Any) -> None:
+def _line(axes: Any, replayed: ReplayResult, values: np.ndarray, **style: Any) -> None:
     axes.plot(*replayed.log.broken(values), **style)
 
 
 def _draw_small(
     axes: Any,
-    replayed: Replayed,
+    replayed: ReplayResult,
     name: str,
     label: str,
     color: str,

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from cmg_mj.observers.protocol import BIAS
-from cmg_mj.replay.log_replay import Replayed
+from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import replay_markdown, shown_first
-from cmg_mj.visualization.plots.colours import YARDSTICKS, colours
-from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, colours
+from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.recording.replay_recording import LogSeries, write_logs
 from cmg_mj.visualization.recording.signals import CONTROLLER, CUBES, Series, numbered
 
 
-def write_replay(path: Path, replays: Sequence[Replayed], names: Sequence[str], settings_toml: str) -> None:
+def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:
     """Write the replays of some logs as one recording; whole or not at all.
 
     Args:
@@ -42,17 +42,17 @@ def write_replay(path: Path, replays: Sequence[Replayed], names: Sequence[str], 
     write_logs(path, title, logs, texts)
 
 
-def series(replayed: Replayed) -> list[Series]:
+def series(replayed: ReplayResult) -> list[Series]:
     """All time series of one log: angles in degrees, rates in rad/s."""
     log = replayed.log
 
     def row(path: str, name: str, values: np.ndarray, color: tuple, width: float = 1.5, **more: object) -> Series:
         return Series(path, name, *log.broken(values), color, width, **more)  # type: ignore[arg-type]
 
-    rows = [row("tilt/measured", "measured", np.degrees(log["y1_rad"]), YARDSTICKS["gyro"])]
+    rows = [row("tilt/measured", "measured", np.degrees(log["y1_rad"]), BASELINE_COLOURS["gyro"])]
     if "reference" in log.has:
-        rows.append(row("rate/true", "reference", log[REFERENCE], YARDSTICKS["true"], 3.0))
-    labels, names = shortened(list(replayed.estimates)), list(replayed.estimates)
+        rows.append(row("rate/true", "reference", log[REFERENCE], BASELINE_COLOURS["true"], 3.0))
+    labels, names = short_names(list(replayed.estimates)), list(replayed.estimates)
     for part, (name, color) in zip(numbered(names), colours(names).items(), strict=True):
         estimates = replayed.estimates[name]
         rate = estimates["x2_rad_s"]
@@ -65,7 +65,7 @@ def series(replayed: Replayed) -> list[Series]:
             rows.append(row(f"{folder}/{part}", labels[name], values, color, whole=False, observer=name))
     if "acceleration" in log.has:
         measured = log["acceleration_rad_s2"]
-        rows.append(row("acceleration/measured", "measured", measured, YARDSTICKS["gyro"], 1.0, whole=False))
+        rows.append(row("acceleration/measured", "measured", measured, BASELINE_COLOURS["gyro"], 1.0, whole=False))
     if "gimbals" in log.has:
         rows.append(row("command/u", "command", log["u_rad_s"], CONTROLLER))
         rows.append(row("gimbal/y2", "measured", np.degrees(log["y2_rad"]), CUBES[0]))

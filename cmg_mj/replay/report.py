@@ -11,14 +11,14 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from cmg_mj.replay.log_replay import Replayed, described
+from cmg_mj.replay.log_replay import ReplayResult, described
 from cmg_mj.replay.reference import remarks_on
 from cmg_mj.replay.scores import RECONSTRUCTED_S
 from cmg_mj.results import markdown
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import Key
-from cmg_mj.visualization.plots.readability import best
+from cmg_mj.visualization.plots.readability import observers_to_draw
 
 FIGURES = {
     "velocity_rms_error_rad_s": Key("RMS error", "rad/s", "{:.4f}"),
@@ -33,12 +33,12 @@ FIGURES = {
 """What a table of a replay can show, in this order."""
 
 
-def shown_first(replayed: Replayed) -> list[str]:
+def shown_first(replayed: ReplayResult) -> list[str]:
     """The few observers that can be followed over each other: with a reference the best, else the first."""
-    return best({name: replayed.summaries[name] for name in replayed.estimates})
+    return observers_to_draw({name: replayed.summaries[name] for name in replayed.estimates})
 
 
-def figures_of(replays: Sequence[Replayed]) -> dict[str, Any]:
+def figures_of(replays: Sequence[ReplayResult]) -> dict[str, Any]:
     """What `cmg-mj replay --json` prints."""
     found: dict[str, Any] = {"logs": [_figures(replayed) for replayed in replays]}
     if len(replays) > 1:
@@ -46,7 +46,7 @@ def figures_of(replays: Sequence[Replayed]) -> dict[str, Any]:
     return found
 
 
-def _figures(replayed: Replayed) -> dict[str, Any]:
+def _figures(replayed: ReplayResult) -> dict[str, Any]:
     log = replayed.log
     return {
         "log": log.name,
@@ -75,7 +75,7 @@ def _figures(replayed: Replayed) -> dict[str, Any]:
     }
 
 
-def _means(replays: Sequence[Replayed]) -> dict[str, dict[str, Any]]:
+def _means(replays: Sequence[ReplayResult]) -> dict[str, dict[str, Any]]:
     """Of every observer the means over the logs that have the figure, and their 95 % intervals."""
     names = [name for name in dict.fromkeys(n for r in replays for n in r.summaries) if name != ZERO]
     found: dict[str, dict[str, Any]] = {}
@@ -94,11 +94,11 @@ def _means(replays: Sequence[Replayed]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _keys(replays: Sequence[Replayed]) -> list[str]:
+def _keys(replays: Sequence[ReplayResult]) -> list[str]:
     return [key for key in FIGURES if any(key in f for r in replays for f in r.summaries.values())]
 
 
-def replay_tables(replays: Sequence[Replayed]) -> Group:
+def replay_tables(replays: Sequence[ReplayResult]) -> Group:
     """What `cmg-mj replay` prints: a table a log, and one over them."""
     parts: list[Any] = []
     for replayed in replays:
@@ -118,7 +118,7 @@ def replay_tables(replays: Sequence[Replayed]) -> Group:
     return Group(*parts, _text(note(replays)))
 
 
-def replay_markdown(replays: Sequence[Replayed]) -> str:
+def replay_markdown(replays: Sequence[ReplayResult]) -> str:
     """The same in Markdown."""
     parts = []
     for replayed in replays:
@@ -170,7 +170,7 @@ def _text(line: str) -> Text:
     return Text(line, overflow="fold")
 
 
-def remarks(replayed: Replayed) -> list[str]:
+def remarks(replayed: ReplayResult) -> list[str]:
     """What was done to one log, what its reference is, and who did not take part."""
     lines = remarks_on(replayed.log, replayed.alignment)
     reasons: dict[str, list[str]] = {}
@@ -179,7 +179,7 @@ def remarks(replayed: Replayed) -> list[str]:
     return [*lines, *(f"Without {', '.join(names)}: {reason}." for reason, names in reasons.items())]
 
 
-def note(replays: Sequence[Replayed]) -> str:
+def note(replays: Sequence[ReplayResult]) -> str:
     """What the tables do not say by themselves."""
     first = replays[0]
     keys = _keys(replays)

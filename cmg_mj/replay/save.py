@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from cmg_mj.replay.log_replay import Replayed
+from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.plot import plot_replay
 from cmg_mj.replay.report import figures_of
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
@@ -45,7 +45,7 @@ def files_of_replay(names: Sequence[str]) -> list[str]:
 
 def save_replay(
     folder: RunFolder | Path,
-    replays: Sequence[Replayed],
+    replays: Sequence[ReplayResult],
     names: Sequence[str],
     settings_toml: str,
     *,
@@ -77,7 +77,7 @@ def save_replay(
         return it.write(dict(zip(files_of_replay(names), writers, strict=True)), complete=complete)
 
 
-def signals(replayed: Replayed) -> Trajectory:
+def signals(replayed: ReplayResult) -> Trajectory:
     """All signals and estimates of a log as one table, evenly sampled, in SI and radians."""
     log = replayed.log
     kept = [name for name in log.columns if np.isfinite(log[name]).any()]
@@ -104,7 +104,7 @@ def finite_throughout(value: Any) -> Any:
     return finite(value)
 
 
-def _record(path: Path, replays: Sequence[Replayed], names: Sequence[str], settings_toml: str) -> None:
+def _record(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:
     from cmg_mj.replay.recording import write_replay  # 0.4 s of import, needed only here
 
     write_replay(path, replays, names, settings_toml)

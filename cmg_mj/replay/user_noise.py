@@ -44,10 +44,10 @@ def noise_of(
     if log.tilt is not None:
         density = NOISE_DENSITY_UG_RTHZ if accelerometer_ug_rthz is None else accelerometer_ug_rthz
         sensor = Accelerometer(rate_hz=1.0 / log.dt, noise_density_ug_rthz=density)
-        return dataclasses.replace(log.tilt.noise(sensor.deviation, STANDARD_GRAVITY), gimbal=Encoder().deviation)
+        return dataclasses.replace(log.tilt.noise(sensor.sample_sigma, STANDARD_GRAVITY), gimbal=Encoder().sample_sigma)
     tilt = TILT_NOISE_DEG if tilt_deg is None else tilt_deg
     acceleration = ACCELERATION_NOISE_RAD_S2 if acceleration_rad_s2 is None else acceleration_rad_s2
-    return TiltNoise(math.radians(tilt), acceleration, 0.0, Encoder().deviation)
+    return TiltNoise(math.radians(tilt), acceleration, 0.0, Encoder().sample_sigma)
 
 
 def noise_numbers(text: str) -> dict[str, float]:

@@ -6,7 +6,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay.parameter_options import numbers
 from cmg_mj.scenario.loading import parse_scenario
-from cmg_mj.scenario.plant_parameters import RigFacts
+from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import prepare
 
@@ -43,8 +43,8 @@ def model_of(text: str) -> ReducedModel:
     return ReducedModel(inertia, added, found.get("momentum", 0.0), 1.0, found["gravity_torque"])
 
 
-def rig_of(scenario: Scenario) -> RigFacts:
+def rig_of(scenario: Scenario) -> PlantParameters:
     """The parameters of a scenario's rig."""
     experiment = prepare(scenario)
-    experiment.only_axis("replay")
-    return experiment.plant.facts
+    experiment.require_single_axis("replay")
+    return experiment.plant.parameters

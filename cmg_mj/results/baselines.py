@@ -8,7 +8,7 @@ import numpy as np
 
 from cmg_mj.results.error_bounds import FLOORS
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.sensors.sampled import AN_AXIS, normals
+from cmg_mj.sensors.sampled import STREAMS_PER_AXIS, normals
 
 ZERO, MEMS_GYRO = "zero", "mems_gyro"
 RATES = (ZERO, MEMS_GYRO)
@@ -16,7 +16,7 @@ RATES = (ZERO, MEMS_GYRO)
 REFERENCES = (*RATES, *FLOORS)
 """The names of all, in the order of every table."""
 
-STREAM = 3
+MEMS_GYRO_STREAM = 3
 """The gyro's noise: streams 0 to 2 are those of the sensors that the controller reads."""
 
 
@@ -32,7 +32,9 @@ class References:
     """
 
     def __init__(self, gyro: MemsGyro, dt: float, seed: int, worlds: int | Sequence[int], axis: int = 0) -> None:
-        self._read = gyro.meter(dt, normals(seed, worlds, STREAM + AN_AXIS * axis, gyro.channels))
+        self._read = gyro.make_reading_function(
+            dt, normals(seed, worlds, MEMS_GYRO_STREAM + STREAMS_PER_AXIS * axis, gyro.channels)
+        )
 
     def rates(self, x2: np.ndarray) -> dict[str, np.ndarray]:
         """What each says at the next ticks.

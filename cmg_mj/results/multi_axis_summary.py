@@ -8,7 +8,7 @@ from typing import Any
 from cmg_mj.results.summary_keys import AXES, KEYS
 
 
-def of_the_rig(axes: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+def combine_axes(axes: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     """One world's summary.
 
     Args:

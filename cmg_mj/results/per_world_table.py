@@ -7,14 +7,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cmg_mj.results.summary_keys import NESTED, RODE_ALONG
+from cmg_mj.results.summary_keys import NESTED, OPEN_LOOP_SECTIONS
 from cmg_mj.results.trajectory import whole_file
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 
-class Ended(Protocol):
+class WorldEnd(Protocol):
     """How a world ended."""
 
     kind: Any
@@ -22,7 +22,7 @@ class Ended(Protocol):
     reason: str
 
 
-FIRST = {
+ID_COLUMNS = {
     "observer": "string",
     "in_loop_of": "string",
     "world": "int64",
@@ -43,7 +43,7 @@ def world_rows(
     who: str,
     seed: int,
     worlds: Sequence[int],
-    outcomes: Sequence[Ended],
+    outcomes: Sequence[WorldEnd],
     summaries: Sequence[Mapping[str, Any]],
 ) -> list[dict[str, Any]]:
     """One observer's rows.
@@ -61,7 +61,7 @@ def world_rows(
     """
     rows = []
     for number, outcome, summary in zip(worlds, outcomes, summaries, strict=True):
-        figures = summary if who == loop else riding_along(summary)[who]
+        figures = summary if who == loop else open_loop_figures(summary)[who]
         rows.append(
             {
                 "observer": who,
@@ -78,9 +78,9 @@ def world_rows(
     return rows
 
 
-def riding_along(summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+def open_loop_figures(summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """Of a summary the figures of everything that rode along, by name: open-loop observers, then references."""
-    return {name: figures for nested in RODE_ALONG for name, figures in summary.get(nested, {}).items()}
+    return {name: figures for nested in OPEN_LOOP_SECTIONS for name, figures in summary.get(nested, {}).items()}
 
 
 def as_table(rows: Iterable[Mapping[str, Any]]) -> pa.Table:
@@ -88,8 +88,8 @@ def as_table(rows: Iterable[Mapping[str, Any]]) -> pa.Table:
     import pyarrow as pa
 
     kept = list(rows)
-    figures = dict.fromkeys(key for row in kept for key in row if key not in FIRST)
-    schema = pa.schema([*FIRST.items(), *((key, "float64") for key in figures)])
+    figures = dict.fromkeys(key for row in kept for key in row if key not in ID_COLUMNS)
+    schema = pa.schema([*ID_COLUMNS.items(), *((key, "float64") for key in figures)])
     return pa.table({name: [row.get(name) for row in kept] for name in schema.names}, schema=schema)
 
 

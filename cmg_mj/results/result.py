@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.results.per_world_table import as_table, riding_along, world_rows
+from cmg_mj.results.per_world_table import as_table, open_loop_figures, world_rows
 from cmg_mj.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -92,10 +92,10 @@ class Result:
         """
         of = self.summaries
         if estimator is not None:
-            riding = riding_along(self.summaries[0])
+            riding = open_loop_figures(self.summaries[0])
             if estimator not in riding:
                 raise InputError(f"{estimator!r}: no open-loop observer of this run; {nearest(estimator, riding)}")
-            of = [riding_along(summary)[estimator] for summary in of]
+            of = [open_loop_figures(summary)[estimator] for summary in of]
         if key not in of[0]:
             raise InputError(f"{key!r}: not in the summary; {nearest(key, of[0])}")
         numbers = np.array([math.nan if s[key] is None else s[key] for s in of], dtype=float)
@@ -120,10 +120,10 @@ class Result:
             Columns `observer`, `in_loop_of`, `world`, `seed`, `outcome`, `stood`, `end_time_s`, `reason`, then
             every figure of the summary, null where there is none. Where `stood` is false they are those until the end.
         """
-        names = [self.observers[0], *riding_along(self.summaries[0])]
+        names = [self.observers[0], *open_loop_figures(self.summaries[0])]
         return as_table(row for name in names for row in self.rows(name))
 
-    def groups(self, count: int) -> list[Result]:
+    def split(self, count: int) -> list[Result]:
         """The worlds in so many groups of equal size, in their order, as `run_many` was given them."""
         worlds = len(self.outcomes)
         if count < 1 or worlds % count:
@@ -131,9 +131,9 @@ class Result:
         if count == 1:
             return [self]
         size = worlds // count
-        return [self.part(slice(i * size, (i + 1) * size)) for i in range(count)]
+        return [self.select(slice(i * size, (i + 1) * size)) for i in range(count)]
 
-    def part(self, worlds: slice) -> Result:
+    def select(self, worlds: slice) -> Result:
         """Some of the worlds, that stand beside each other."""
         return replace(
             self,

@@ -51,13 +51,13 @@ KEYS = {
 
 AXES = "axes"
 """The part of a summary that holds the figures of each axis of several, by name."""
-RODE_ALONG = ("open_loop_observers", "references")
+OPEN_LOOP_SECTIONS = ("open_loop_observers", "references")
 """Parts that hold the figures of what rode along, by name."""
-NESTED = (*RODE_ALONG, AXES)
+NESTED = (*OPEN_LOOP_SECTIONS, AXES)
 """Parts that hold figures of others by name."""
 
 
-RIDING = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "velocity_fit", "velocity_fit_push")
+OPEN_LOOP_COLUMNS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "velocity_fit", "velocity_fit_push")
 """What tables show of everything that rode along."""
 
 

@@ -14,13 +14,13 @@ from rich.text import Text
 
 from cmg_mj.controllers.laws.registry import OF_LAWS
 from cmg_mj.inputs.bundled import bundled
-from cmg_mj.inputs.user_classes import Kind
+from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.observers.registry import OF_OBSERVERS
 from cmg_mj.results import markdown
-from cmg_mj.results.per_world_table import riding_along
-from cmg_mj.results.summary_keys import AXES, KEYS, RIDING, difference, heading, spread, written
+from cmg_mj.results.per_world_table import open_loop_figures
+from cmg_mj.results.summary_keys import AXES, KEYS, OPEN_LOOP_COLUMNS, difference, heading, spread, written
 from cmg_mj.scenario.description import assignments
-from cmg_mj.scenario.differences import in_words
+from cmg_mj.scenario.differences import describe_differences
 from cmg_mj.scenario.loading import load_scenario
 
 WIDEST = 8
@@ -119,7 +119,7 @@ def run_title(summary: Mapping[str, Any]) -> str:
     """Above what a run prints and draws: scenario, observer, seed, world, what differs from the bundled scenario."""
     place = " on the board" if summary.get("driver") == "board" else ""
     world = f", world {summary['world']}" if "world" in summary else ""
-    differs = in_words(summary["differs"])
+    differs = describe_differences(summary["differs"])
     return f"{summary['scenario'] or 'Run'}: {summary['observer']}{place}, seed {summary['seed']}{world}{differs}"
 
 
@@ -150,10 +150,10 @@ def _riding(axis: str, summary: Mapping[str, Any]) -> Table:
     """How well those that rode along estimated an axis' rate."""
     riding = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1))
     riding.add_column(f"Riding along, {axis}" if axis else "Riding along", vertical="bottom", overflow="fold")
-    for key in RIDING:
+    for key in OPEN_LOOP_COLUMNS:
         riding.add_column(heading(key).replace(" [", "\n["), justify="right", vertical="bottom")
-    for name, figures in riding_along(summary).items():
-        riding.add_row(name, *(written(key, figures.get(key)) for key in RIDING))
+    for name, figures in open_loop_figures(summary).items():
+        riding.add_row(name, *(written(key, figures.get(key)) for key in OPEN_LOOP_COLUMNS))
     return riding
 
 
@@ -183,7 +183,7 @@ def law_list() -> str:
     return _class_list(OF_LAWS)
 
 
-def _class_list(kind: Kind) -> str:
+def _class_list(kind: UserClassKind) -> str:
     """All of a kind: name, the defaults of its parameters, what it is."""
     width = max(len(name) for name in kind.known)
     lines = [f"{kind.what.capitalize()}s, and the defaults of their parameters (--set {kind.section}.NAME=VALUE)"]

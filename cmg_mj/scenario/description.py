@@ -9,14 +9,14 @@ from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
-from cmg_mj.scenario.plant_parameters import RigFacts
+from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.stability_check import closed_loop, hints
 from cmg_mj.scenario.time_grid import physics_step
 
 
-def description(name: str, scenario: Scenario, design: Design, rig: RigFacts, axis: str = "") -> str:
+def description(name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "") -> str:
     """What `cmg-mj check` prints: what a scenario amounts to.
 
     Args:
@@ -71,7 +71,7 @@ def _about(torque: Push | Swing) -> str:
 
 
 def _law_rows(
-    scenario: Scenario, design: Design, rig: RigFacts, fields: Mapping[str, Any]
+    scenario: Scenario, design: Design, rig: PlantParameters, fields: Mapping[str, Any]
 ) -> Iterator[tuple[str, str]]:
     """What the law is, what it is fed, and of the papers' what it makes of the reduced model."""
     controller, law = scenario.controller, design.law
@@ -93,7 +93,7 @@ def _law_rows(
         yield "", "your own code, which was imported and tried on two samples"
 
 
-def rig_description(name: str, scenario: Scenario, design: Design, rig: RigFacts, axis: str = "") -> str:
+def rig_description(name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "") -> str:
     """What `cmg-mj check` prints of a model file by itself.
 
     Args:

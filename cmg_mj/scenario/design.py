@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmg_mj.controllers.dry_run import rehearse, rehearse_law
-from cmg_mj.controllers.integrator_trim import trim_of
+from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
+from cmg_mj.controllers.integrator_trim import integrator_trim
 from cmg_mj.controllers.laws import LAWS, Law
 from cmg_mj.controllers.laws.protocol import NEEDS, needs
 from cmg_mj.controllers.laws.registry import OF_LAWS, law_class
@@ -16,8 +16,8 @@ from cmg_mj.observers import Observer, make_observer, observer_class
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.observers.registry import OF_OBSERVERS
-from cmg_mj.scenario.loading import located, unknown_to_law
-from cmg_mj.scenario.plant_parameters import RigFacts
+from cmg_mj.scenario.loading import unknown_to_law, with_source
+from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.time_grid import check_times
 from cmg_mj.sensors.tilt import TiltNoise
@@ -36,7 +36,7 @@ class Design:
     """
 
     scenario: Scenario
-    rig: RigFacts
+    rig: PlantParameters
     law: Law
 
     @property
@@ -71,16 +71,16 @@ class Design:
         with np.errstate(all="ignore"):
             for field, name, observer in tried:
                 try:
-                    rehearse(observer, worlds)
+                    dry_run_observer(observer, worlds)
                 except InputError as error:
                     raise InputError(f"{field} {name!r}: {error}") from error
             try:
-                rehearse_law(self.fresh_law(), len(extra_signals(tried[0][2])), worlds)
+                dry_run_law(self.fresh_law(), len(extra_signals(tried[0][2])), worlds)
             except InputError as error:
                 raise InputError(f"controller.kind = {self.scenario.controller.kind!r}: {error}") from error
 
 
-def design(scenario: Scenario, rig: RigFacts) -> Design:
+def design(scenario: Scenario, rig: PlantParameters) -> Design:
     """Check what pydantic could not, construct the law and the observers, and try them once.
 
     Args:
@@ -100,9 +100,9 @@ def design(scenario: Scenario, rig: RigFacts) -> Design:
         _check_law(controller)
         made = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
         made.rehearse()
-        trim_of(controller.bias_trim_s, made.law, extra_signals(made.observer()))
+        integrator_trim(controller.bias_trim_s, made.law, extra_signals(made.observer()))
     except InputError as error:
-        raise InputError(located(scenario._where, str(error))) from error
+        raise InputError(with_source(scenario._source, str(error))) from error
     return made
 
 

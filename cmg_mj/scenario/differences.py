@@ -11,7 +11,7 @@ LONGEST_NAME = 60
 """Of a folder's name, what differs [characters]."""
 SHOWN = 3
 """So many differences are shown in one line."""
-TOLD_OTHERWISE = {"title", "seed", "observer.kind", "compare", "based_on", "versions"}
+NOT_DIFFERENCES = {"title", "seed", "observer.kind", "compare", "based_on", "versions"}
 """Fields that differ without being called a difference: they have a place of their own wherever a run is named."""
 
 
@@ -26,7 +26,7 @@ def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[st
         Field, `section.field` -> its value in the other; None where it has no such field. The parameters of different
         observers are not compared.
     """
-    left_out = TOLD_OTHERWISE | ({"observer"} if base["observer"]["kind"] != scenario["observer"]["kind"] else set())
+    left_out = NOT_DIFFERENCES | ({"observer"} if base["observer"]["kind"] != scenario["observer"]["kind"] else set())
     return {
         name: value
         for name, value in _differing(base, scenario)
@@ -50,13 +50,13 @@ def _are_sections(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
 
 
-def in_words(differing: Mapping[str, Any]) -> str:
+def describe_differences(differing: Mapping[str, Any]) -> str:
     """The first few, after a comma, as `--set` takes them; nothing if nothing differs."""
     named = [f"{name}={_value(value)}" for name, value in zip(_short(differing), differing.values(), strict=True)]
     return "".join(f", {text}" for text in _first(named, SHOWN, " and {} more"))
 
 
-def in_a_name(differing: Mapping[str, Any]) -> str:
+def folder_suffix(differing: Mapping[str, Any]) -> str:
     """As the end of a folder's name: letters that every system takes, and not too many."""
     named = [
         re.sub(r"[^\w.=+-]+", "_", f"{name}={_value(value)}", flags=re.ASCII).strip("_")

@@ -90,7 +90,7 @@ def inside(time: np.ndarray, windows: Sequence[Window]) -> np.ndarray:
     return found
 
 
-def swung(torques: list[Scalar], swings: Sequence[Swing], axes: Sequence[str], time: float) -> list[Scalar]:
+def add_swing_torques(torques: list[Scalar], swings: Sequence[Swing], axes: Sequence[str], time: float) -> list[Scalar]:
     """Each axis' torque with that of the swings.
 
     Args:

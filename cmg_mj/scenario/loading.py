@@ -19,7 +19,7 @@ from cmg_mj.inputs.messages import complaint
 from cmg_mj.inputs.overrides import override
 from cmg_mj.inputs.sanity import out_of_size, unreadable
 from cmg_mj.inputs.user_classes import as_json
-from cmg_mj.scenario.schema import ANY_LAWS, AxisSettings, ControllerSettings, ObserverSettings, Scenario
+from cmg_mj.scenario.schema import COMMON_LAW_FIELDS, AxisSettings, ControllerSettings, ObserverSettings, Scenario
 
 LARGEST_FILE = 1_000_000
 """Bytes of a scenario file; the longest that a run writes has three thousand."""
@@ -129,7 +129,7 @@ def find_model(scenario: Scenario, beside: Path) -> Scenario:
     try:
         model = find("models", scenario.plant.model, ".xml", "plant.model =", beside)
     except InputError as error:
-        raise InputError(f"{scenario._where}: {error}") from error
+        raise InputError(f"{scenario._source}: {error}") from error
     return scenario.model_copy(update={"plant": dataclasses.replace(scenario.plant, model=str(model))})
 
 
@@ -148,23 +148,23 @@ def parse_scenario(fields: Mapping[str, Any], where: str = "") -> Scenario:
     """
     wrong = list(unreadable(fields))
     if wrong:
-        raise InputError(located(where, _clauses(wrong)))
+        raise InputError(with_source(where, _clauses(wrong)))
     try:
         # By way of JSON, pydantic takes a list for a tuple and still no text or true for a number.
         scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True)
     except ValidationError as error:
         complaints = [complaint(Scenario, detail, fields) for detail in error.errors()]
-        raise InputError(located(where, _clauses([*complaints, *_unknown_to_law(fields)]))) from error
+        raise InputError(with_source(where, _clauses([*complaints, *_unknown_to_law(fields)]))) from error
     wrong = [*_unknown_to_law(fields), *out_of_size(fields)]
     if wrong:
-        raise InputError(located(where, _clauses(wrong)))
-    scenario._where = where
+        raise InputError(with_source(where, _clauses(wrong)))
+    scenario._source = where
     for axis in scenario.axes:
-        of_axis(scenario, axis)
+        scenario_of_axis(scenario, axis)
     return scenario
 
 
-def of_axis(scenario: Scenario, axis: str) -> Scenario:
+def scenario_of_axis(scenario: Scenario, axis: str) -> Scenario:
     """A scenario as one axis of several has it.
 
     Args:
@@ -182,14 +182,14 @@ def of_axis(scenario: Scenario, axis: str) -> Scenario:
     if own is None:
         return scenario.model_copy(update={"axes": {}})
     fields = as_fields(scenario.model_copy(update={"axes": {}}))
-    where = f"{scenario._where}, [axes.{axis}]".removeprefix(", ")
+    where = f"{scenario._source}, [axes.{axis}]".removeprefix(", ")
     for whole in ("rate_hz", "compensate_turning"):
         if whole in own.controller:
-            raise InputError(located(where, f"controller.{whole}: is the same on all axes; set it in [controller]"))
-    for name, section in as_fields_of(own).items():
+            raise InputError(with_source(where, f"controller.{whole}: is the same on all axes; set it in [controller]"))
+    for name, section in axis_fields(own).items():
         common = fields.setdefault(name, {})
         if section.get("kind", common.get("kind")) != common.get("kind"):
-            kept = ANY_LAWS if name == "controller" else ()
+            kept = COMMON_LAW_FIELDS if name == "controller" else ()
             common = {field: common[field] for field in kept if field in common}
         if name == "controller" and {"gains", "lqr"} & section.keys():
             common = {field: value for field, value in common.items() if field not in ("gains", "lqr")}
@@ -197,7 +197,7 @@ def of_axis(scenario: Scenario, axis: str) -> Scenario:
     return parse_scenario(fields, where)
 
 
-def as_fields_of(own: AxisSettings) -> dict[str, Any]:
+def axis_fields(own: AxisSettings) -> dict[str, Any]:
     """What an axis has of its own as the content of its section, empty sections left out."""
     return {name: section for name, section in own.model_dump(mode="json", exclude_none=True).items() if section}
 
@@ -252,6 +252,6 @@ def _clauses(wrong: Iterable[str]) -> str:
     return "; ".join(each[:MOST_CLAUSES] + more)
 
 
-def located(where: str, wrong: str) -> str:
+def with_source(where: str, wrong: str) -> str:
     """What is wrong, with where it is before it."""
     return f"{where}: {wrong}" if where else wrong

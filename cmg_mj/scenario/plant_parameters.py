@@ -12,7 +12,7 @@ from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 
 
-class RigFacts(NamedTuple):
+class PlantParameters(NamedTuple):
     """What a scenario's controller and observers are made from.
 
     Attributes:
@@ -35,5 +35,5 @@ class RigFacts(NamedTuple):
 
     def noise(self, sensors: Sensors) -> TiltNoise:
         """The noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""
-        gimbal = sensors.encoder.deviation / math.sqrt(self.reduced.gimbals)
-        return replace(self.tilt.noise(sensors.accelerometer.deviation, self.gravity), gimbal=gimbal)
+        gimbal = sensors.encoder.sample_sigma / math.sqrt(self.reduced.gimbals)
+        return replace(self.tilt.noise(sensors.accelerometer.sample_sigma, self.gravity), gimbal=gimbal)

@@ -13,9 +13,9 @@ from typing import Any
 import tomli_w
 from pydantic import TypeAdapter
 
-from cmg_mj.controllers.laws.registry import GIVEN as GIVEN_TO_LAWS
+from cmg_mj.controllers.laws.registry import BENCH_PARAMETERS as GIVEN_TO_LAWS
 from cmg_mj.inputs.bundled import folder
-from cmg_mj.observers import GIVEN
+from cmg_mj.observers import BENCH_PARAMETERS
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.scenario.schema import AxisPlant, ControllerSettings, Scenario
@@ -49,7 +49,7 @@ def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float)
     fields["open_loop_observers"] = scenario.open_loop_names()
     fields["observer"] = {
         "kind": scenario.observer.kind,
-        **_parameters(scenario.observer.parameters, design.observer(), GIVEN),
+        **_parameters(scenario.observer.parameters, design.observer(), BENCH_PARAMETERS),
     }
     for rare in ("axes", "swing"):
         if not fields[rare]:

@@ -76,7 +76,7 @@ class ControllerSettings(BaseModel):
         return make_law(self.kind, 1.0 / self.rate_hz, self.rate_limit_rad_s, model, noise, **parameters)
 
 
-ANY_LAWS = tuple(name for name in ControllerSettings.model_fields if name not in ("kind", "gains", "lqr"))
+COMMON_LAW_FIELDS = tuple(name for name in ControllerSettings.model_fields if name not in ("kind", "gains", "lqr"))
 """Fields of [controller] that every law has."""
 
 
@@ -177,7 +177,7 @@ class Scenario(BaseModel):
     """The bundled scenario that this one is told apart from in folders' names, titles and summaries."""
     versions: dict[str, str] = Field(default_factory=dict)
     """Written by a run, not read."""
-    _where: str = PrivateAttr("")
+    _source: str = PrivateAttr("")
     """What to call it in an error: the file, and what was changed in it."""
 
     def with_observer(self, kind: str) -> Scenario:
@@ -199,12 +199,14 @@ class Scenario(BaseModel):
         axes = {
             name: own
             if own.controller.get("kind", common) == kind
-            else own.model_copy(update={"controller": {n: v for n, v in own.controller.items() if n in ANY_LAWS}})
+            else own.model_copy(
+                update={"controller": {n: v for n, v in own.controller.items() if n in COMMON_LAW_FIELDS}}
+            )
             for name, own in self.axes.items()
         }
         if kind == common:
             return self.model_copy(update={"axes": axes})
-        fields: dict[str, Any] = {name: getattr(self.controller, name) for name in ANY_LAWS}
+        fields: dict[str, Any] = {name: getattr(self.controller, name) for name in COMMON_LAW_FIELDS}
         return self.model_copy(update={"controller": ControllerSettings(**fields, kind=kind), "axes": axes})
 
     def open_loop_names(self) -> list[str]:

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
 from cmg_mj.scenario.design import Design
-from cmg_mj.scenario.plant_parameters import RigFacts
+from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
 
 POOR_DAMPING = 0.4
@@ -124,7 +124,7 @@ def _distance(K: np.ndarray, A: np.ndarray, B: np.ndarray, along: np.ndarray, de
     return float(np.min(np.abs(1.0 + transfer[:, 0, 0] * delayed)))
 
 
-def hints(scenario: Scenario, design: Design, rig: RigFacts) -> list[str]:
+def hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]:
     """What is no mistake and yet likely to make a rig fall.
 
     Args:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from fractions import Fraction
 
 from cmg_mj.errors import InputError
-from cmg_mj.scenario.loading import of_axis
+from cmg_mj.scenario.loading import scenario_of_axis
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.timing import whole_steps
@@ -84,7 +84,10 @@ def common_period(scenario: Scenario) -> float:
         InputError: It is shorter than `FINEST_S`; the first field that makes it so is named.
     """
     periods, times = [], []
-    for prefix, own in [("", scenario), *((f"axes.{name}.", of_axis(scenario, name)) for name in scenario.axes)]:
+    for prefix, own in [
+        ("", scenario),
+        *((f"axes.{name}.", scenario_of_axis(scenario, name)) for name in scenario.axes),
+    ]:
         periods += [(prefix + field, 1 / _fraction(rate), f"{rate:g} Hz") for field, rate in _rates(own)]
         periods += [(prefix + field, _fraction(period), shown) for field, period, shown in _inside(own)]
         times += [(prefix + field, _fraction(time), f"{time:g} s") for field, time in _times(own)]

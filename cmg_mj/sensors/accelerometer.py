@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, digitise
 from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Positive, Rate
-from cmg_mj.sensors.ideal import Ideal
+from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.low_pass import low_pass, noise_gain
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
@@ -102,17 +102,17 @@ class Accelerometer:
         return self.noise_density_ug_rthz * 1e-6 * STANDARD_GRAVITY * math.sqrt(self.raw_rate_hz / 2.0)
 
     @property
-    def sigma(self) -> float:
+    def white_noise_sigma(self) -> float:
         """Standard deviation of the white noise of one sample that is delivered [m/s^2]."""
         if not self.bandwidth_hz:
             return self.raw_sigma
         return self.raw_sigma * math.sqrt(noise_gain(self.bandwidth_hz, INSIDE_HZ))
 
     @property
-    def deviation(self) -> float:
+    def sample_sigma(self) -> float:
         """Of one sample from the mean, with what the resolution adds: what a filter is told [m/s^2]."""
         step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
-        return math.hypot(self.sigma, step / math.sqrt(12.0))
+        return math.hypot(self.white_noise_sigma, step / math.sqrt(12.0))
 
     @property
     def bias(self) -> tuple[float, float]:
@@ -121,7 +121,7 @@ class Accelerometer:
         return inner, outer
 
     @property
-    def floor(self) -> float:
+    def flicker_floor(self) -> float:
         """Of the Allan deviation of each axis' 1/f noise [m/s^2]."""
         return self.bias_instability_ug * 1e-6 * STANDARD_GRAVITY
 
@@ -167,7 +167,9 @@ class Accelerometer:
 
         return distorted
 
-    def meter(self, drift: Callable[[], Any] | None = None) -> Callable[[Ideal, Sequence[Scalar]], Any]:
+    def make_reading_function(
+        self, drift: Callable[[], Any] | None = None
+    ) -> Callable[[IdealReading, Sequence[Scalar]], Any]:
         """The parts at work: to be called once for every sample that they take (`raw_rate_hz`).
 
         Args:
@@ -189,7 +191,7 @@ class Accelerometer:
                 filters.append(low_pass(self.bandwidth_hz, INSIDE_HZ, x))
             return filters[number](x)
 
-        def measure(ideal: Ideal, normal: Sequence[Scalar]) -> Any:
+        def measure(ideal: IdealReading, normal: Sequence[Scalar]) -> Any:
             forces = erring(ideal.accelerations)
             wander = drift() if drift else None
             if isinstance(forces, np.ndarray):

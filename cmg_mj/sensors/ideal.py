@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from cmg_mj.elementwise import Scalar
 
 
-class Ideal(NamedTuple):
+class IdealReading(NamedTuple):
     """What perfect sensors would show at one instant (floats, or arrays (n_worlds,))."""
 
     accelerations: Any
@@ -21,10 +21,10 @@ class Ideal(NamedTuple):
     """The true tilt rate, q_b' [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
 
 
-class Ideals(NamedTuple):
+class MultiAxisReading(NamedTuple):
     """The same of a rig of several axes."""
 
-    axes: Sequence[Ideal]
+    axes: Sequence[IdealReading]
     """What those of each axis would show."""
     turn_rate: Scalar
     """What a gyro on the frame shows upward [rad/s]."""

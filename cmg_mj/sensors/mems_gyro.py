@@ -50,7 +50,7 @@ class MemsGyro:
 
     channels = 1 + len(CORNERS_HZ)
 
-    def sigma(self, dt: float) -> float:
+    def white_noise_sigma(self, dt: float) -> float:
         """Standard deviation of one sample's white noise [rad/s].
 
         Args:
@@ -59,11 +59,11 @@ class MemsGyro:
         return math.radians(self.noise_density_deg_s_rthz) * math.sqrt(0.5 / dt)
 
     @property
-    def floor(self) -> float:
+    def flicker_floor(self) -> float:
         """Of the Allan deviation of the 1/f noise [rad/s]."""
         return math.radians(self.bias_instability_deg_h) / 3600.0
 
-    def meter(self, dt: float, noise: Iterator) -> Callable[[np.ndarray], np.ndarray]:
+    def make_reading_function(self, dt: float, noise: Iterator) -> Callable[[np.ndarray], np.ndarray]:
         """The gyro at work.
 
         Args:
@@ -73,7 +73,7 @@ class MemsGyro:
         Returns:
             A function: the next samples' true rate (n_rows, n_worlds) -> what the gyro shows, the same shape [rad/s].
         """
-        sigma = self.sigma(dt)
+        sigma = self.white_noise_sigma(dt)
         limit = math.radians(self.range_deg_s)
         step = math.radians(1.0 / self.counts_per_deg_s) if self.counts_per_deg_s else 0.0
 
@@ -81,7 +81,7 @@ class MemsGyro:
             """(n, channels, n_worlds)."""
             return np.array(list(islice(noise, n))).reshape(n, self.channels, -1)
 
-        flicker = Flicker(self.floor, dt, drawn(1)[0, 1:])
+        flicker = Flicker(self.flicker_floor, dt, drawn(1)[0, 1:])
 
         def errors(n: int) -> np.ndarray:
             """Of the next n samples, (n, n_worlds) [rad/s]."""

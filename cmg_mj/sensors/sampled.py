@@ -22,13 +22,13 @@ from cmg_mj.elementwise import Scalar, clip, digitise, radians
 from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Positive, Rate
 from cmg_mj.sensors.accelerometer import INSIDE_HZ, Accelerometer
 from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
-from cmg_mj.sensors.ideal import Ideal
+from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.mems_gyro import MemsGyro
 from cmg_mj.sensors.timing import steps_until, whole_steps
 
-FLICKER = 4
+FLICKER_STREAM = 4
 """The stream of the accelerometers' 1/f noise: 0 to 2 are the sensors' white noise, 3 is the cheap gyro's."""
-AN_AXIS = 16
+STREAMS_PER_AXIS = 16
 """So many streams are an axis'."""
 
 
@@ -49,11 +49,11 @@ class Encoder:
     channels = 0
 
     @property
-    def deviation(self) -> float:
+    def sample_sigma(self) -> float:
         """Of one reading from the angle, by the resolution [rad]."""
         return 2.0 * math.pi / self.counts_per_revolution / math.sqrt(12.0) if self.counts_per_revolution else 0.0
 
-    def meter(self) -> Callable[[Ideal, Sequence[Scalar]], Sequence[Scalar]]:
+    def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Sequence[Scalar]]:
         """A function (ideal reading, nothing) -> gimbal angles [rad]."""
         if not self.counts_per_revolution:
             return lambda ideal, normal: ideal.gimbals
@@ -87,20 +87,20 @@ class Fog:
     channels = 1
 
     @property
-    def sigma(self) -> float:
+    def white_noise_sigma(self) -> float:
         """Standard deviation of one sample [rad/s]."""
         return radians(self.angle_random_walk_deg_rth) / 60.0 * math.sqrt(self.rate_hz)
 
-    def meter(self) -> Callable[[Ideal, Sequence[Scalar]], Scalar]:
+    def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Scalar]:
         """A function (ideal reading, standard normals) -> tilt rate [rad/s]. It remembers its low-pass."""
-        sigma = self.sigma
+        sigma = self.white_noise_sigma
         bias = math.radians(self.bias_deg_h) / 3600.0
         limit = math.radians(self.range_deg_s)
         # The share of a step that a first-order low-pass has taken after one sample period.
         share = 1.0 - math.exp(-2.0 * math.pi * self.bandwidth_hz / self.rate_hz) if self.bandwidth_hz else 1.0
         passed: Scalar = None
 
-        def measure(ideal: Ideal, normal: Sequence[Scalar]) -> Scalar:
+        def measure(ideal: IdealReading, normal: Sequence[Scalar]) -> Scalar:
             nonlocal passed
             passed = ideal.gyro if passed is None else passed + share * (ideal.gyro - passed)
             return clip(passed + bias + sigma * normal[0], -limit, limit)
@@ -160,7 +160,7 @@ class SampledSensor:
         measure: What it makes of an ideal reading and a sample's normals; by default that of its datasheet.
 
     Attributes:
-        beat: Physics steps between the moments at which it may be due.
+        steps_per_sample: Physics steps between the moments at which it may be due.
     """
 
     def __init__(
@@ -169,19 +169,19 @@ class SampledSensor:
         timestep: float,
         noise: Iterator,
         where: str,
-        measure: Callable[[Ideal, Any], Any] | None = None,
+        measure: Callable[[IdealReading, Any], Any] | None = None,
     ) -> None:
         self.period = whole_steps(1.0 / sensor.rate_hz, timestep, f"{where}.rate_hz", f"{sensor.rate_hz:g} Hz")
-        self.beat = self.period
+        self.steps_per_sample = self.period
         self.latency = steps_until(sensor.latency_s, timestep)
-        self._measure = measure or sensor.meter()
+        self._measure = measure or sensor.make_reading_function()
         self._noise = noise
         self._on_the_way: deque = deque()
         self._newest: Any = None
         self._delivered: Any = None
 
-    def sample(self, step: int, ideal: Ideal) -> None:
-        """Take what is due, at a physics step that is a multiple of `beat`, or at the first one."""
+    def sample(self, step: int, ideal: IdealReading) -> None:
+        """Take what is due, at a physics step that is a multiple of `steps_per_sample`, or at the first one."""
         self._newest = self._measure(ideal, next(self._noise))
         if self.latency:
             self._on_the_way.append((step + self.latency, self._newest))
@@ -204,7 +204,7 @@ class UnevenPair(SampledSensor):
         timestep: float,
         noise: Iterator,
         where: str,
-        measure: Callable[[Ideal, Any], Any] | None = None,
+        measure: Callable[[IdealReading, Any], Any] | None = None,
     ) -> None:
         super().__init__(sensor, timestep, noise, where, measure)
         inside = f"{sensor.bandwidth_hz:g} Hz, sampled at {INSIDE_HZ:g} Hz inside the part"
@@ -212,12 +212,12 @@ class UnevenPair(SampledSensor):
         if sensor.bandwidth_hz:
             self._raw = whole_steps(1.0 / INSIDE_HZ, timestep, f"{where}.bandwidth_hz", inside)
         self._skew = whole_steps(sensor.skew_s, timestep, f"{where}.skew_s", f"{sensor.skew_s:g} s")
-        self.beat = math.gcd(self.period, self._raw, self._skew)
+        self.steps_per_sample = math.gcd(self.period, self._raw, self._skew)
         # So long a low-pass needs to forget its start, all but 1e-4 of it.
         self._settling = math.ceil(2.0 * INSIDE_HZ / sensor.bandwidth_hz) if sensor.bandwidth_hz else 0
         self._outer: deque = deque()
 
-    def sample(self, step: int, ideal: Ideal) -> None:
+    def sample(self, step: int, ideal: IdealReading) -> None:
         """Take what is due: a sample of the inner one, together with the outer's that is older by the skew."""
         first = self._newest is None
         if self._skew:
@@ -228,7 +228,7 @@ class UnevenPair(SampledSensor):
         if not first and step % self._raw:
             return
         if self._skew:
-            ideal = ideal._replace(accelerations=_together(ideal.accelerations, self._outer[0][1]))
+            ideal = ideal._replace(accelerations=_combine_samples(ideal.accelerations, self._outer[0][1]))
         reading = self._measure(ideal, next(self._noise))
         if first:  # before the start the rig stood still
             for _ in range(self._settling):
@@ -239,21 +239,21 @@ class UnevenPair(SampledSensor):
                 self._on_the_way.append((step + self.latency, reading))
 
 
-def _together(inner: Any, outer: Any) -> Any:
+def _combine_samples(inner: Any, outer: Any) -> Any:
     """The inner accelerometer's forces at one instant and the outer's at another."""
     if isinstance(inner, np.ndarray):
         return np.concatenate([inner[:2], outer[2:]])
     return (*inner[:2], *outer[2:])
 
 
-def _drift(sensor: Accelerometer, noise: Iterator) -> Callable[[], Any]:
+def _flicker_source(sensor: Accelerometer, noise: Iterator) -> Callable[[], Any]:
     """What the 1/f noise adds to the next sample of each channel: four floats, or an array (4, n_worlds) [m/s^2]."""
 
     def drawn() -> np.ndarray:
         numbers = np.asarray(next(noise))
         return numbers.reshape(len(CORNERS_HZ), sensor.channels, *numbers.shape[1:])
 
-    flicker = Flicker(sensor.floor, 1.0 / sensor.raw_rate_hz, drawn())
+    flicker = Flicker(sensor.flicker_floor, 1.0 / sensor.raw_rate_hz, drawn())
 
     def drift() -> Any:
         added = flicker.advance(drawn()[None])[0]
@@ -262,7 +262,7 @@ def _drift(sensor: Accelerometer, noise: Iterator) -> Callable[[], Any]:
     return drift
 
 
-def at_work(
+def sampled_sensors(
     sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence[int], axis: int = 0
 ) -> list[SampledSensor]:
     """What the controller reads, at work: the accelerometers, the encoders, the gyro.
@@ -282,13 +282,17 @@ def at_work(
     """
 
     def noise(stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
-        return normals(seed, worlds, stream + AN_AXIS * axis, channels) if channels else itertools.repeat(())
+        return normals(seed, worlds, stream + STREAMS_PER_AXIS * axis, channels) if channels else itertools.repeat(())
 
     pair = sensors.accelerometer
-    drift = _drift(pair, noise(FLICKER, len(CORNERS_HZ) * pair.channels)) if pair.bias_instability_ug else None
+    drift = (
+        _flicker_source(pair, noise(FLICKER_STREAM, len(CORNERS_HZ) * pair.channels))
+        if pair.bias_instability_ug
+        else None
+    )
     kind = UnevenPair if pair.skew_s or pair.bandwidth_hz else SampledSensor
     return [
-        kind(pair, timestep, noise(0, pair.channels), "sensors.accelerometer", pair.meter(drift)),
+        kind(pair, timestep, noise(0, pair.channels), "sensors.accelerometer", pair.make_reading_function(drift)),
         SampledSensor(sensors.encoder, timestep, noise(1, sensors.encoder.channels), "sensors.encoder"),
         SampledSensor(sensors.fog, timestep, noise(2, sensors.fog.channels), "sensors.fog"),
     ]

@@ -14,17 +14,17 @@ from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.experiment import Experiment, of_one_batch, run_together
-from cmg_mj.simulation.pool import structure
+from cmg_mj.simulation.experiment import Experiment, batch_inputs, run_batch
+from cmg_mj.simulation.pool import batch_key
 
 MOST_WORLDS = 1024
 """Of one batch: beyond, Python's share of a world no longer falls and memory grows."""
 
 TOLD = "the sensors' noise, which "
-"""How `structure` begins to say what noise an observer is told."""
+"""How `batch_key` begins to say what noise an observer is told."""
 
 
-class Run(NamedTuple):
+class BatchJob(NamedTuple):
     """What `Experiment.run_many` would run by itself.
 
     Attributes:
@@ -36,12 +36,12 @@ class Run(NamedTuple):
     worlds: Sequence[int]
 
 
-def run_of(experiment: Experiment, worlds: int) -> Run:
+def run_of(experiment: Experiment, worlds: int) -> BatchJob:
     """Worlds 0 to n - 1 of one experiment."""
-    return Run([experiment] * worlds, range(worlds))
+    return BatchJob([experiment] * worlds, range(worlds))
 
 
-class SideBySide:
+class BatchedObservers:
     """Observers that stand beside each other in one batch, each in worlds of its own.
 
     Args:
@@ -79,7 +79,7 @@ def _of(y: Measurement, worlds: slice) -> Measurement:
     return Measurement(y1[worlds], y2[worlds], y.acceleration[worlds])  # type: ignore[index]
 
 
-def run_side_by_side(runs: Sequence[Run], **options: Any) -> list[Result]:
+def run_side_by_side(runs: Sequence[BatchJob], **options: Any) -> list[Result]:
     """Run what differs in the observer, its parameters, or in numbers that worlds of one batch may differ in.
 
     Args:
@@ -99,12 +99,12 @@ def run_side_by_side(runs: Sequence[Run], **options: Any) -> list[Result]:
             results = _shared([runs[i] for i in batch], options)
         if not results or any(outcome.kind == "stopped" for result in results for outcome in result.outcomes):
             # An observer that raises stops all worlds of its batch: what the others do is seen without it.
-            results = [run_together(*runs[i], **options) for i in batch]
+            results = [run_batch(*runs[i], **options) for i in batch]
         found |= zip(batch, results, strict=True)
     return [found[i] for i in range(len(runs))]
 
 
-def _batches(runs: Sequence[Run]) -> Iterator[list[int]]:
+def _batches(runs: Sequence[BatchJob]) -> Iterator[list[int]]:
     """The runs' indices, those together that may share a batch."""
     alike: dict[Any, list[int]] = {}
     for i, run in enumerate(runs):
@@ -119,7 +119,7 @@ def _batches(runs: Sequence[Run]) -> Iterator[list[int]]:
         yield batch
 
 
-def _common(run: Run) -> Any:
+def _common(run: BatchJob) -> Any:
     """What runs of one batch have in common; None for one that has to be by itself."""
     first = run.experiments[0]
     if first.axes or first.scenario.open_loop_names() or len({repr(_structure(e)) for e in _once(run.experiments)}) > 1:
@@ -141,14 +141,14 @@ def _once(experiments: Sequence[Experiment]) -> list[Experiment]:
 
 
 def _structure(experiment: Experiment) -> dict[str, str]:
-    return structure(experiment.scenario, experiment.design)
+    return batch_key(experiment.scenario, experiment.design)
 
 
 def _of_observer(name: str) -> bool:
     return name.split(".")[0] == "observer" or name.startswith(TOLD)
 
 
-def _shared(runs: Sequence[Run], options: dict[str, Any]) -> list[Result]:
+def _shared(runs: Sequence[BatchJob], options: dict[str, Any]) -> list[Result]:
     """Results of runs in one batch."""
     parts = []
     # Neighbours with the same observer, told the same, are one part.
@@ -157,11 +157,11 @@ def _shared(runs: Sequence[Run], options: dict[str, Any]) -> list[Result]:
         parts.append((of[0].experiments[0].design.observer(), sum(len(run.worlds) for run in of)))
     experiments = [each for run in runs for each in run.experiments]
     numbers = [int(number) for run in runs for number in run.worlds]
-    rigs, controller, pushes = of_one_batch(experiments, numbers, observer=SideBySide(parts))
+    rigs, controller, pushes = batch_inputs(experiments, numbers, observer=BatchedObservers(parts))
     whole = experiments[0].simulate(rigs, controller, pushes, **options)
     ends = np.cumsum([len(run.worlds) for run in runs]).tolist()
     return [
-        _renamed(whole.part(slice(end - len(run.worlds), end)), run.experiments[0].scenario.observer.kind)
+        _renamed(whole.select(slice(end - len(run.worlds), end)), run.experiments[0].scenario.observer.kind)
         for run, end in zip(runs, ends, strict=True)
     ]
 

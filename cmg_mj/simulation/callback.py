@@ -10,13 +10,13 @@ import mujoco
 import numpy as np
 
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.multi_axis import AxesController
+from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.plant.mujoco_state import control_callback
+from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.plant import Plant
 
 
-def control(plant: Plant, controller: Controller | AxesController, data: mujoco.MjData) -> bool:
+def control(plant: Plant, controller: Controller | MultiAxisController, data: mujoco.MjData) -> bool:
     """Sample what is due at this physics step, and set the servos' commands if it is a control tick.
 
     Call it before every `mujoco.mj_step`, after the torques from outside have been set. Where something is due it runs
@@ -34,7 +34,7 @@ def control(plant: Plant, controller: Controller | AxesController, data: mujoco.
         InputError: Steps at which something was due were left out.
         RunStopped: The plant diverged, or an observer failed.
     """
-    with control_callback(None):  # the forward pass is a look at the sensors, no step
+    with set_control_callback(None):  # the forward pass is a look at the sensors, no step
         return _tick(plant, controller, data, lambda: _forward(plant.model, data))
 
 
@@ -44,34 +44,34 @@ def _forward(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
 
 
 def _tick(
-    plant: Plant, controller: Controller | AxesController, data: mujoco.MjData, sense: Callable[[], np.ndarray]
+    plant: Plant, controller: Controller | MultiAxisController, data: mujoco.MjData, sense: Callable[[], np.ndarray]
 ) -> bool:
     """Sample what is due, from sensordata as `sense` gives it, and set the servos if it is a control tick."""
     step = round(data.time / plant.model.opt.timestep)
-    if step % controller.beat:
+    if step % controller.steps_per_sample:
         return False
     if controller.step is not None:
         if step < controller.step:  # the simulation was reset
             controller.reset()
-        elif step > controller.step + controller.beat:
+        elif step > controller.step + controller.steps_per_sample:
             raise InputError(
                 f"control() was last called at step {controller.step} and now at step {step}: call it at least every "
-                f"{controller.beat} physics steps, before the step"
+                f"{controller.steps_per_sample} physics steps, before the step"
             )
-    if not math.isfinite(plant.lean(data.qpos)):
+    if not math.isfinite(plant.largest_tilt(data.qpos)):
         raise RunStopped(f"the plant diverged at t = {data.time:g} s")
-    if not controller.update(step, plant.ideal(sense().tolist(), data.qvel.tolist())):
+    if not controller.update(step, plant.ideal_readings(sense().tolist(), data.qvel.tolist())):
         return False
     _hold(plant, controller, data)
     return True
 
 
-def _hold(plant: Plant, controller: Controller | AxesController, data: mujoco.MjData) -> None:
+def _hold(plant: Plant, controller: Controller | MultiAxisController, data: mujoco.MjData) -> None:
     """Set the servos' commands to those of the last tick."""
     for axis, part in zip(plant.axes, controller.parts, strict=True):
-        if part.turning is not None:
+        if part.gimbal_rate is not None:
             for cube in axis.cubes:
-                data.ctrl[cube.servo] = cube.direction * part.turning
+                data.ctrl[cube.servo] = cube.direction * part.gimbal_rate
 
 
 class ControlCallback:
@@ -89,7 +89,7 @@ class ControlCallback:
         controller: Its controller.
     """
 
-    def __init__(self, plant: Plant, controller: Controller | AxesController) -> None:
+    def __init__(self, plant: Plant, controller: Controller | MultiAxisController) -> None:
         self.plant = plant
         self.controller = controller
         self._scratch = mujoco.MjData(plant.model)
@@ -110,7 +110,7 @@ class ControlCallback:
         """Sensordata at the present state and commands, by a pass of its own: MuJoCo is in the middle of one."""
         model = self.plant.model
         mujoco.mj_copyState(model, data, self._scratch, int(mujoco.mjtState.mjSTATE_INTEGRATION))
-        with control_callback(None):
+        with set_control_callback(None):
             return _forward(model, self._scratch)
 
     def _is_instant(self, h: float, t: float) -> bool:
@@ -136,7 +136,7 @@ class ControlCallback:
 
 
 @contextmanager
-def installed(plant: Plant, controller: Controller | AxesController) -> Iterator[ControlCallback]:
+def control_callback(plant: Plant, controller: Controller | MultiAxisController) -> Iterator[ControlCallback]:
     """Install the controller as MuJoCo's control callback, and take it out again even on an exception.
 
     `mjcb_control` is one pointer for the whole process: while it is installed, only this plant may be stepped.
@@ -150,5 +150,5 @@ def installed(plant: Plant, controller: Controller | AxesController) -> Iterator
         The callback.
     """
     callback = ControlCallback(plant, controller)
-    with control_callback(callback):
+    with set_control_callback(callback):
         yield callback

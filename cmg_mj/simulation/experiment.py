@@ -14,7 +14,7 @@ import tomli_w
 from cmg_mj.codegen.board import Board, on_a_board
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
-from cmg_mj.controllers.multi_axis import AxesController
+from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.controllers.processor import Processor
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.bundled import folder
@@ -25,14 +25,14 @@ from cmg_mj.results.trajectory import whole_file
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.differences import differences
 from cmg_mj.scenario.disturbances import Push
-from cmg_mj.scenario.loading import as_fields, base_of, located, of_axis, parse_scenario
+from cmg_mj.scenario.loading import as_fields, base_of, parse_scenario, scenario_of_axis, with_source
 from cmg_mj.scenario.resolve import resolved, with_axes
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.stability_check import hints
 from cmg_mj.scenario.time_grid import check_steps, common_period
-from cmg_mj.simulation.pool import differs, pooled, structure
+from cmg_mj.simulation.pool import batch_key, batched, first_difference
 from cmg_mj.simulation.simulate import simulate
-from cmg_mj.simulation.stacked import stacked
+from cmg_mj.simulation.stacked import batch_values
 
 ON_THE_BOARD = "Run on the emulated board (docs/board.md), whose numbers are not quite the host's."
 ANOTHER_WORLD = "World {world}: its noise is not that of world 0."
@@ -84,14 +84,14 @@ class Experiment:
             **others: `observer`, `law`, `sensors`, `tilt` and `backlash` instead of the scenario's.
 
         Returns:
-            The controller; of several axes an `AxesController`.
+            The controller; of several axes a `MultiAxisController`.
 
         Raises:
             InputError: A processor is to take the decisions of several axes.
         """
         if self.axes:
             if processor is not None:
-                self.only_axis("a board or other processor")
+                self.require_single_axis("a board or other processor")
                 others["processor"] = processor
             return self._of_axes([own.controller(worlds, **others, axis=i) for i, own in enumerate(self.axes)])
         settings = self.scenario.controller
@@ -114,12 +114,14 @@ class Experiment:
         if len(controllers) == 1:
             return controllers[0]
         against = self.scenario.controller.compensate_turning
-        return AxesController(controllers, self.plant.turning if against else None, self.scenario.sensors.mems_gyro)
+        return MultiAxisController(
+            controllers, self.plant.turning if against else None, self.scenario.sensors.mems_gyro
+        )
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
         """Run one world. Options are those of `simulate`."""
         if driver == "board":
-            self.only_axis("the board")
+            self.require_single_axis("the board")
             with on_a_board(self.controller()) as board:
                 return self.run_on(board, world, **options)
         return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
@@ -155,10 +157,10 @@ class Experiment:
         if vary is not None and plants is not None:
             raise InputError("run_many: give plants or vary, not both")
         if vary is not None:
-            return run_together(self.varied(vary), numbers, **options)
+            return run_batch(self.with_varied(vary), numbers, **options)
         rigs = [self.plant] * len(numbers) if plants is None else list(plants)
-        _require_alike([self.plant, *rigs], len(rigs), len(numbers))
-        controllers = [own.controller(numbers, **_of_the_rigs(rigs, i)) for i, own in enumerate(self.parts)]
+        _require_same_structure([self.plant, *rigs], len(rigs), len(numbers))
+        controllers = [own.controller(numbers, **_batched_rig_parameters(rigs, i)) for i, own in enumerate(self.parts)]
         return self.simulate(rigs, self._of_axes(controllers), **options)
 
     @property
@@ -166,7 +168,7 @@ class Experiment:
         """One an axis."""
         return self.axes or (self,)
 
-    def varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
+    def with_varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
         """The scenario with other settings in each world; worlds with equal settings share one.
 
         Args:
@@ -192,11 +194,11 @@ class Experiment:
         experiments = []
         for row in zip(*lists, strict=True):
             if repr(row) not in made:
-                made[repr(row)] = self.with_values(dict(zip(names, row, strict=True)))
+                made[repr(row)] = self.with_settings(dict(zip(names, row, strict=True)))
             experiments.append(made[repr(row)])
         return experiments
 
-    def with_values(self, values: Mapping[str, Any]) -> Experiment:
+    def with_settings(self, values: Mapping[str, Any]) -> Experiment:
         """The same with other values of some fields.
 
         Args:
@@ -212,8 +214,8 @@ class Experiment:
         for name, value in values.items():
             assign(fields, name, value, f"vary: {name!r}")
         settings = ", ".join(f"{name}={value}" for name, value in values.items())
-        scenario = parse_scenario(fields, f"{self.scenario._where} with {settings}".strip())
-        return prepare(scenario, load_rig(scenario, self.plant))
+        scenario = parse_scenario(fields, f"{self.scenario._source} with {settings}".strip())
+        return prepare(scenario, load_scenario_plant(scenario, self.plant))
 
     def simulate(
         self,
@@ -245,7 +247,7 @@ class Experiment:
             **options,
         )
 
-    def only_axis(self, what: str) -> None:
+    def require_single_axis(self, what: str) -> None:
         """What takes one axis refuses a rig of several.
 
         Args:
@@ -265,7 +267,7 @@ class Experiment:
     def hints(self) -> list[str]:
         """What is no mistake and yet likely to make the rig fall, in clauses."""
         if not self.axes:
-            return hints(self.scenario, self.design, self.plant.facts)
+            return hints(self.scenario, self.design, self.plant.parameters)
         return [f"{own.plant.axis.name}: {hint}" for own in self.axes for hint in own.hints]
 
     def rehearse(self, worlds: int | None = None) -> None:
@@ -313,7 +315,7 @@ class Experiment:
             temporary.write_text(self.as_toml(driver, world), encoding="utf-8")
 
 
-def run_together(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Any) -> Result:
+def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Any) -> Result:
     """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
 
     Args:
@@ -332,17 +334,17 @@ def run_together(experiments: Sequence[Experiment], worlds: Sequence[int], **opt
         raise InputError(
             f"run_many: {len(worlds)} worlds and {len(experiments)} plants; give at least one, and as many of each"
         )
-    _require_alike([each.plant for each in experiments], len(experiments), len(worlds))
+    _require_same_structure([each.plant for each in experiments], len(experiments), len(worlds))
     common = _structure(first)
     for other in {id(each): each for each in experiments}.values():
-        field = differs(common, _structure(other))
+        field = first_difference(common, _structure(other))
         if field:
             raise InputError(f"run_many: {field} differs, which worlds of one batch must have in common")
-    rigs, controller, pushes = of_one_batch(experiments, worlds)
+    rigs, controller, pushes = batch_inputs(experiments, worlds)
     return first.simulate(rigs, controller, pushes, **options)
 
 
-def of_one_batch(
+def batch_inputs(
     experiments: Sequence[Experiment], worlds: Sequence[int], **others: Any
 ) -> tuple[list[Plant], Controller, Sequence[Push]]:
     """What a batch of different experiments is run with: a rig a world, a controller and the pushes of all worlds.
@@ -360,10 +362,10 @@ def of_one_batch(
     controllers, pushes = [], ()
     for i, own in enumerate(first.parts):
         parts = [each.parts[i] for each in experiments]
-        law, sensors, pushes = pooled(
+        law, sensors, pushes = batched(
             [(each.design.fresh_law(), each.scenario.sensors, tuple(each.scenario.push)) for each in parts]
         )
-        given = {"law": law, "sensors": sensors} | _of_the_rigs(rigs, i) | others
+        given = {"law": law, "sensors": sensors} | _batched_rig_parameters(rigs, i) | others
         controllers.append(own.controller(worlds, **given))
     return rigs, first._of_axes(controllers), pushes
 
@@ -371,18 +373,18 @@ def of_one_batch(
 def _structure(experiment: Experiment) -> dict[str, str]:
     """What worlds that run together have in common, of every axis."""
     if not experiment.axes:
-        return structure(experiment.scenario, experiment.design)
+        return batch_key(experiment.scenario, experiment.design)
     parts = [(own.plant.axis.name, _structure(own)) for own in experiment.axes]
     return {f"axes.{name}.{field}": value for name, found in parts for field, value in found.items()}
 
 
-def _of_the_rigs(rigs: Sequence[Plant], axis: int) -> dict[str, Any]:
+def _batched_rig_parameters(rigs: Sequence[Plant], axis: int) -> dict[str, Any]:
     """What a controller of many worlds has of an axis of their rigs."""
-    tilts = stacked([rig.axes[axis].radial_tilt for rig in rigs])
-    return {"tilt": tilts, "backlash": stacked([rig.backlash for rig in rigs]), "axis": axis}
+    tilts = batch_values([rig.axes[axis].radial_tilt for rig in rigs])
+    return {"tilt": tilts, "backlash": batch_values([rig.backlash for rig in rigs]), "axis": axis}
 
 
-def _require_alike(rigs: Sequence[Plant], plants: int, worlds: int) -> None:
+def _require_same_structure(rigs: Sequence[Plant], plants: int, worlds: int) -> None:
     """What the plants of one batch must have in common."""
     if not plants or plants != worlds:
         raise InputError(f"run_many: {worlds} worlds and {plants} plants; give at least one, and as many of each")
@@ -395,7 +397,7 @@ def _require_alike(rigs: Sequence[Plant], plants: int, worlds: int) -> None:
         )
 
 
-def load_rig(scenario: Scenario, like: Plant | None = None) -> Plant:
+def load_scenario_plant(scenario: Scenario, like: Plant | None = None) -> Plant:
     """Load a scenario's rig.
 
     Args:
@@ -408,7 +410,7 @@ def load_rig(scenario: Scenario, like: Plant | None = None) -> Plant:
     try:
         period = common_period(scenario) if scenario.plant.timestep_s is None else None
         settings = scenario.plant
-        of_axes = {name: of_axis(scenario, name).plant for name in scenario.axes}
+        of_axes = {name: scenario_of_axis(scenario, name).plant for name in scenario.axes}
         same = ("model", "lock_thrust_bearing", "locked_axes")
         if like is not None and all(getattr(like.settings, name) == getattr(settings, name) for name in same):
             plant = like.changed(settings, period, of_axes)
@@ -420,7 +422,7 @@ def load_rig(scenario: Scenario, like: Plant | None = None) -> Plant:
             _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
         return plant
     except InputError as error:
-        raise InputError(located(scenario._where, str(error))) from error
+        raise InputError(with_source(scenario._source, str(error))) from error
 
 
 def prepare(scenario: Scenario, plant: Plant | None = None) -> Experiment:
@@ -436,15 +438,15 @@ def prepare(scenario: Scenario, plant: Plant | None = None) -> Experiment:
     Raises:
         InputError: Something in the scenario does not fit.
     """
-    plant = load_rig(scenario) if plant is None else plant
+    plant = load_scenario_plant(scenario) if plant is None else plant
     try:
         check_axes(scenario, plant)
     except InputError as error:
-        raise InputError(located(scenario._where, str(error))) from error
+        raise InputError(with_source(scenario._source, str(error))) from error
     if len(plant.axes) == 1 and not scenario.axes:
-        return Experiment(scenario, plant, design(scenario, plant.facts))
-    rigs = [(of_axis(scenario, name), plant.along(name)) for name in plant.axis_names]
-    axes = tuple(Experiment(own, rig, design(own, rig.facts)) for own, rig in rigs)
+        return Experiment(scenario, plant, design(scenario, plant.parameters))
+    rigs = [(scenario_of_axis(scenario, name), plant.single_axis(name)) for name in plant.axis_names]
+    axes = tuple(Experiment(own, rig, design(own, rig.parameters)) for own, rig in rigs)
     return Experiment(scenario, plant, axes[0].design, axes)
 
 

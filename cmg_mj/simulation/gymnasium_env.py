@@ -19,11 +19,11 @@ from cmg_mj.results.baselines import MEMS_GYRO, References
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.sampled import at_work
+from cmg_mj.sensors.sampled import sampled_sensors
 from cmg_mj.sensors.timing import whole_steps
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
-from cmg_mj.simulation.schedule import moments, swinging
+from cmg_mj.simulation.schedule import sampling_instants, with_swing_instants
 
 try:
     import gymnasium
@@ -43,7 +43,7 @@ VIEW = (132.0, -18.0)
 """From where it is taken: azimuth and elevation [deg]."""
 
 
-class ScissoredPair(gymnasium.Env):
+class ScissoredPairEnv(gymnasium.Env):
     """A scenario's rig with its sensors, pushes and noise; the agent takes the observer's and the law's place.
 
     - **Action** (1,): the gimbal rate, held for a control period, in shares of its limit; [rad/s] with `in_rad_s`.
@@ -138,7 +138,7 @@ class ScissoredPair(gymnasium.Env):
     def _changed(self, settings: Mapping[str, Any]) -> Experiment:
         if not settings:
             return self._given
-        changed = self._given.with_values(settings)
+        changed = self._given.with_settings(settings)
         law, given = changed.law, self._given.law
         if (law.dt, law.rate_limit) != (given.dt, given.rate_limit):
             raise InputError("reset: settings: the control rate and the gimbals' limit stay those of the environment")
@@ -147,18 +147,20 @@ class ScissoredPair(gymnasium.Env):
     def _start(self, experiment: Experiment, seed: int) -> None:
         self.experiment = experiment
         scenario, plant, dt = experiment.scenario, experiment.plant, experiment.law.dt
-        self.experiment.only_axis("an environment")
+        self.experiment.require_single_axis("an environment")
         self._worlds = OneWorld(plant)
-        self._sensors = at_work(scenario.sensors, plant.timestep, seed, self._world)
+        self._sensors = sampled_sensors(scenario.sensors, plant.timestep, seed, self._world)
         self._gyro = References(scenario.sensors.mems_gyro, dt, seed, self._world)
         self._y2 = GimbalAngle(tuple(plant.axis.directions), tuple(cube.gimbal_zero for cube in plant.axis.cubes))
         self._backlash = Backlash(plant.backlash, dt) if plant.backlash else None
         self._fall = np.radians(scenario.metrics.fall_angle_deg).item()
         self._period = whole_steps(dt, plant.timestep, "controller.rate_hz", f"{1.0 / dt:g} Hz")
-        self._beat = math.gcd(self._period, *(sensor.beat for sensor in self._sensors))
+        self._steps_per_sample = math.gcd(self._period, *(sensor.steps_per_sample for sensor in self._sensors))
         self._steps = whole_steps(scenario.duration_s, plant.timestep, "duration_s", f"{scenario.duration_s:g} s")
-        looks = moments(self._steps, self._beat, scenario.push, plant.timestep, plant.axis_names)
-        self._moments = swinging(looks, scenario.swing, plant.timestep, plant.axis_names) if scenario.swing else looks
+        looks = sampling_instants(self._steps, self._steps_per_sample, scenario.push, plant.timestep, plant.axis_names)
+        self._moments = (
+            with_swing_instants(looks, scenario.swing, plant.timestep, plant.axis_names) if scenario.swing else looks
+        )
         self._torque: Any = 0.0
         self._step = -1
         self._running = True
@@ -175,7 +177,7 @@ class ScissoredPair(gymnasium.Env):
             q, _ = worlds.state()
             if not abs(plant.axis.line.lean(q)) <= self._fall:
                 return "fall"
-            if step % self._beat == 0:
+            if step % self._steps_per_sample == 0:
                 self._sample(first)
                 if step % self._period == 0:
                     return "tick"
@@ -185,9 +187,9 @@ class ScissoredPair(gymnasium.Env):
         return "end"
 
     def _sample(self, first: bool) -> None:
-        ideal = self.experiment.plant.ideal(self._worlds.sense(), self._worlds.state()[1])
+        ideal = self.experiment.plant.ideal_readings(self._worlds.sense(), self._worlds.state()[1])
         for sensor in self._sensors:
-            if self._step % sensor.beat == 0 or first:
+            if self._step % sensor.steps_per_sample == 0 or first:
                 sensor.sample(self._step, ideal)
 
     @quiet()
@@ -277,4 +279,4 @@ class ScissoredPair(gymnasium.Env):
             self._renderer = None
 
 
-gymnasium.register(id=ID, entry_point="cmg_mj.simulation.gymnasium_env:ScissoredPair")
+gymnasium.register(id=ID, entry_point="cmg_mj.simulation.gymnasium_env:ScissoredPairEnv")

@@ -14,7 +14,7 @@ from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import as_fields
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.simulation.stacked import stacked
+from cmg_mj.simulation.stacked import batch_values
 
 ARRAYS = frozenset(
     {
@@ -48,7 +48,7 @@ OF_THE_LAW = {"controller.gains": "gains", "controller.lqr": "gains", "controlle
 UNUSED = frozenset({"title", "based_on", "versions", "compare"})
 
 
-def structure(scenario: Scenario, design: Design) -> dict[str, str]:
+def batch_key(scenario: Scenario, design: Design) -> dict[str, str]:
     """What worlds that run together have in common.
 
     Args:
@@ -62,7 +62,7 @@ def structure(scenario: Scenario, design: Design) -> dict[str, str]:
     found = {
         field: value
         for field, value in _leaves(as_fields(scenario))
-        if field.split(".")[0] not in UNUSED and not pools(field, law)
+        if field.split(".")[0] not in UNUSED and not can_vary_in_batch(field, law)
     }
     _, model, noise = design.given
     found["the reduced model"] = repr(model)
@@ -74,24 +74,24 @@ def structure(scenario: Scenario, design: Design) -> dict[str, str]:
     return found
 
 
-def differs(a: Mapping[str, str], b: Mapping[str, str]) -> str | None:
+def first_difference(a: Mapping[str, str], b: Mapping[str, str]) -> str | None:
     """The first field in which two structures differ."""
     return next((field for field in (*a, *b) if a.get(field) != b.get(field)), None)
 
 
-def pooled(
+def batched(
     worlds: Sequence[tuple[Law, Sensors, tuple[Push, ...]]],
 ) -> tuple[Law, Sensors, tuple[Push, ...]]:
     """Law, sensors and pushes of many worlds as one, with arrays (n_worlds,) where they differ."""
     laws, sensors, pushes = zip(*worlds, strict=True)
-    return _one_law(laws), stacked(sensors), tuple(stacked(each) for each in zip(*pushes, strict=True))
+    return _one_law(laws), batch_values(sensors), tuple(batch_values(each) for each in zip(*pushes, strict=True))
 
 
 def _one_law(laws: Sequence[Law]) -> Law:
     """One law that stands for a law a world, which differ in what may be arrays alone."""
     law = laws[0]
     names = getattr(law, "arrays", ())
-    together = {name: stacked([getattr(each, name) for each in laws]) for name in names}
+    together = {name: batch_values([getattr(each, name) for each in laws]) for name in names}
     if all(values is getattr(law, name) for name, values in together.items()):
         return law
     made = copy.copy(law)
@@ -108,7 +108,7 @@ def _leaves(fields: Any, at: str = "") -> list[tuple[str, str]]:
     return [leaf for name, value in fields.items() for leaf in _leaves(value, f"{at}.{name}" if at else name)]
 
 
-def pools(field: str, law: str) -> bool:
+def can_vary_in_batch(field: str, law: str) -> bool:
     """Whether worlds of one batch may differ in a field, under a law of this kind."""
     parts = [part for part in field.split(".") if not part.isdecimal()]
     found = next((name for i in range(len(parts)) if (name := ".".join(parts[: i + 1])) in ARRAYS), None)

@@ -19,7 +19,7 @@ TICKS_A_PIECE = 256
 """So many ticks wait until they are made into columns together, which is much cheaper than one by one."""
 
 
-class Piece(NamedTuple):
+class TickBlock(NamedTuple):
     """Ticks as columns, (n_ticks, n_worlds) each."""
 
     x1: np.ndarray
@@ -36,7 +36,7 @@ class Piece(NamedTuple):
     """Which worlds have ended; None for one world."""
 
 
-class Rows:
+class TickRecorder:
     """Collects the ticks of one or many worlds.
 
     Args:
@@ -107,7 +107,7 @@ class Rows:
                 columns = [np.where(ended, np.nan, column) for column in columns]
             self._pieces.append(columns)
 
-    def _piece(self, waiting: Sequence[tuple]) -> Piece:
+    def _piece(self, waiting: Sequence[tuple]) -> TickBlock:
         qs, vs, ticks, torques, runnings = zip(*waiting, strict=True)
         q, v = self._columns(qs), self._columns(vs)
         *signals, estimates = zip(*ticks, strict=True)
@@ -136,7 +136,7 @@ class Rows:
             *(q if self._joints else ()),
             *(v if self._joints else ()),
         ]
-        return Piece(x1, x2, x3, y1, fog, u, named, columns, ended)
+        return TickBlock(x1, x2, x3, y1, fog, u, named, columns, ended)
 
     def _columns(self, ticks: Sequence) -> np.ndarray:
         """(n_ticks, n_signals[, n_worlds]) -> (n_signals, n_ticks, n_worlds)."""
@@ -171,14 +171,14 @@ class Rows:
         return Trajectory({"time_s": np.arange(first, first + n_ticks) * self._dt, **columns}, layout=self._layout)
 
 
-class RowsOfAxes:
+class MultiAxisRecorder:
     """The rows of a rig of several axes.
 
     Args:
         rows: Those of each axis, by its name; the first have the joints.
     """
 
-    def __init__(self, rows: Mapping[str, Rows]) -> None:
+    def __init__(self, rows: Mapping[str, TickRecorder]) -> None:
         self.rows = rows
 
     def trajectory(self) -> Trajectory | None:
@@ -186,7 +186,7 @@ class RowsOfAxes:
         return self._joined({name: rows.trajectory() for name, rows in self.rows.items()})
 
     def since(self, tick: int) -> Trajectory:
-        """The ticks from one on: see `Rows.since`."""
+        """The ticks from one on: see `TickRecorder.since`."""
         found = self._joined({name: rows.since(tick) for name, rows in self.rows.items()})
         assert found is not None
         return found

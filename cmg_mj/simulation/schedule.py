@@ -6,13 +6,13 @@ import itertools
 from collections.abc import Iterable, Iterator, Sequence
 
 from cmg_mj.elementwise import Scalar, where
-from cmg_mj.scenario.disturbances import Push, Swing, swung
+from cmg_mj.scenario.disturbances import Push, Swing, add_swing_torques
 from cmg_mj.sensors.timing import whole_steps
 
 
-def moments(
+def sampling_instants(
     steps: int,
-    beat: int,
+    steps_per_sample: int,
     pushes: Sequence[Push],
     timestep: float,
     axes: Sequence[str] = ("",),
@@ -34,19 +34,19 @@ def moments(
     for start, end in itertools.pairwise(edges):
         torques = [torque + change for torque, change in zip(torques, changes[start], strict=True)]
         held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in torques]
-        first = min(-(-start // beat) * beat, end)  # the first beat not before the push's edge
+        first = min(-(-start // steps_per_sample) * steps_per_sample, end)  # the first beat not before the push's edge
         if first > start:
             yield start, first - start, held
-        last = max(end // beat * beat, first)
-        for step in range(first, last, beat):
-            yield step, beat, held
+        last = max(end // steps_per_sample * steps_per_sample, first)
+        for step in range(first, last, steps_per_sample):
+            yield step, steps_per_sample, held
         if last < end:
             yield last, end - last, held
 
 
-def swinging(
-    looks: Iterable[tuple[int, int, list[Scalar]]], swings: Sequence[Swing], timestep: float, axes: Sequence[str]
+def with_swing_instants(
+    instants: Iterable[tuple[int, int, list[Scalar]]], swings: Sequence[Swing], timestep: float, axes: Sequence[str]
 ) -> Iterator[tuple[int, int, list[Scalar]]]:
     """The moments with the swings' torques in their middle."""
-    for step, count, held in looks:
-        yield step, count, swung(held, swings, axes, (step + 0.5 * count) * timestep)
+    for step, count, held in instants:
+        yield step, count, add_swing_torques(held, swings, axes, (step + 0.5 * count) * timestep)

@@ -13,7 +13,7 @@ from cmg_mj.errors import InputError
 T = TypeVar("T")
 
 
-def stacked(values: Sequence[T]) -> T:
+def batch_values(values: Sequence[T]) -> T:
     """One value that stands for a value a world.
 
     Args:
@@ -32,29 +32,29 @@ def stacked(values: Sequence[T]) -> T:
         made = object.__new__(type(first))
         for field in dataclasses.fields(first):
             try:
-                of_all = stacked([getattr(value, field.name) for value in values])
+                of_all = batch_values([getattr(value, field.name) for value in values])
             except InputError as error:
                 raise InputError(f"{field.name}: {error}") from error
             object.__setattr__(made, field.name, of_all)
         return made  # type: ignore[return-value]
     if isinstance(first, tuple) and {len(value) for value in values} == {len(first)}:  # type: ignore[arg-type]
-        return tuple(map(stacked, zip(*values, strict=True)))  # type: ignore[call-overload,return-value]
+        return tuple(map(batch_values, zip(*values, strict=True)))  # type: ignore[call-overload,return-value]
     if not all(type(value) in (int, float) for value in values):
         raise InputError("must be the same in worlds that run together")
     return np.array(values, dtype=float)  # type: ignore[return-value]
 
 
-def of_worlds(value: T, worlds: int) -> list[T]:
+def split_values(value: T, worlds: int) -> list[T]:
     """What a value, stacked or not, is in each world."""
-    first = of_world(value, 0)
-    return [first] * worlds if first is value else [of_world(value, world) for world in range(worlds)]
+    first = value_of_world(value, 0)
+    return [first] * worlds if first is value else [value_of_world(value, world) for world in range(worlds)]
 
 
-def of_world(value: T, world: int) -> T:
+def value_of_world(value: T, world: int) -> T:
     """What a stacked value is in one world.
 
     Args:
-        value: What `stacked` returned.
+        value: What `batch_values` returned.
         world: The world's index.
 
     Returns:
@@ -63,11 +63,11 @@ def of_world(value: T, world: int) -> T:
     if isinstance(value, np.ndarray):
         return value[world].item()
     if isinstance(value, tuple):
-        parts = tuple(of_world(part, world) for part in value)
+        parts = tuple(value_of_world(part, world) for part in value)
         return value if all(a is b for a, b in zip(parts, value, strict=True)) else parts  # type: ignore[return-value]
     if not dataclasses.is_dataclass(value):
         return value
-    parts = {field.name: of_world(getattr(value, field.name), world) for field in dataclasses.fields(value)}
+    parts = {field.name: value_of_world(getattr(value, field.name), world) for field in dataclasses.fields(value)}
     if all(part is getattr(value, name) for name, part in parts.items()):
         return value
     made = object.__new__(type(value))

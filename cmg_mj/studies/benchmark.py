@@ -252,7 +252,7 @@ def _finished(result: Result) -> Result:
 
 def _looks(experiment: Experiment) -> tuple[int, int]:
     """How often a run looks at its sensors, and the physics steps in between."""
-    steps = experiment.controller().beat
+    steps = experiment.controller().steps_per_sample
     return round(experiment.scenario.duration_s / (experiment.plant.timestep * steps)), steps
 
 

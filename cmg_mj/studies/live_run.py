@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.simulation.recorder import Rows, RowsOfAxes
+from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
 from cmg_mj.studies.save import recording_title, to_record
 
 if TYPE_CHECKING:
-    from cmg_mj.visualization.recording.streaming import Shown
+    from cmg_mj.visualization.recording.streaming import StreamHeader
 
 PIECES_HZ = 20.0
 """So often a viewer is given what there is: the eye takes it for motion."""
@@ -22,7 +22,7 @@ TOO_LATE_S = 0.25
 """A run that is so far behind its clock, as after Ctrl-Z, does not hurry to make up for it."""
 
 
-class Pace:
+class RealTimeClock:
     """Holds a run to a clock.
 
     Args:
@@ -56,9 +56,9 @@ class Pace:
             self._start -= ahead
 
 
-def shown_before(experiment: Experiment, driver: Driver = "native", world: int = 0) -> Shown:
+def shown_before(experiment: Experiment, driver: Driver = "native", world: int = 0) -> StreamHeader:
     """What a viewer is told of a run before its first tick."""
-    from cmg_mj.visualization.recording.streaming import Named, Shown
+    from cmg_mj.visualization.recording.streaming import BranchSpec, StreamHeader
 
     scenario = experiment.scenario
     several = len(experiment.parts) > 1
@@ -66,8 +66,8 @@ def shown_before(experiment: Experiment, driver: Driver = "native", world: int =
     for own in experiment.parts:
         bias = math.degrees(own.plant.apparent_bias(own.scenario.sensors.accelerometer))
         axis = own.plant.axis.name if several else None
-        branches.append(Named(axis or scenario.observer.kind, bias, axis))
-    return Shown(
+        branches.append(BranchSpec(axis or scenario.observer.kind, bias, axis))
+    return StreamHeader(
         branches,
         experiment.plant,
         experiment.law.dt,
@@ -93,16 +93,16 @@ class LiveRun:
     """
 
     def __init__(
-        self, experiment: Experiment, url: str, pace: Pace, *, driver: Driver = "native", world: int = 0
+        self, experiment: Experiment, url: str, pace: RealTimeClock, *, driver: Driver = "native", world: int = 0
     ) -> None:
-        from cmg_mj.visualization.recording.live import Live  # 0.4 s of import, needed only here
+        from cmg_mj.visualization.recording.live import ViewerStream  # 0.4 s of import, needed only here
 
         self._experiment = experiment
         self._pace = pace
         self._ticks = 0
         self._shown_at = -math.inf
-        self._rows: Rows | RowsOfAxes | None = None
-        self._view = Live(url, shown_before(experiment, driver, world))
+        self._rows: TickRecorder | MultiAxisRecorder | None = None
+        self._view = ViewerStream(url, shown_before(experiment, driver, world))
 
     @property
     def lost(self) -> str:
@@ -139,7 +139,7 @@ class LiveRun:
 
         return {"on_start": self._begin, "on_progress": tick}
 
-    def _begin(self, rows: Rows | RowsOfAxes) -> None:
+    def _begin(self, rows: TickRecorder | MultiAxisRecorder) -> None:
         self._rows = rows
         self._view.begin(rows.since(0))
         self._pace.start()

@@ -13,11 +13,11 @@ from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.per_world_table import save_table
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
-from cmg_mj.results.summary_keys import AXES, RODE_ALONG, finite
+from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, finite
 from cmg_mj.results.terminal_tables import run_title
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.studies.compare.comparison import Compared
+from cmg_mj.studies.compare.comparison import ComparedObserver
 from cmg_mj.studies.compare.plot import plot_worlds
 from cmg_mj.studies.compare.statistics import standings, worlds_table
 from cmg_mj.visualization.plots.run_plot import plot_run
@@ -92,7 +92,7 @@ def files_of_comparison(kinds: Sequence[str], *, plot: bool = False) -> list[str
 def save_comparison(
     folder: RunFolder | Path,
     experiment: Experiment,
-    compared: Sequence[Compared],
+    compared: Sequence[ComparedObserver],
     *,
     plot: bool = False,
     complete: bool = True,
@@ -113,11 +113,11 @@ def save_comparison(
         InputError: The folder, or a file, cannot be written.
     """
     writers = (
-        *(trajectory_with_metadata(entry.experiment, entry.example).save for entry in compared),
+        *(trajectory_with_metadata(entry.experiment, entry.world_0).save for entry in compared),
         lambda path: _write_json(path, standings(compared)),
         lambda path: save_table(path, worlds_table(compared), {"scenario": experiment.resolved()}),
         experiment.save,
-        lambda path: _record(path, [(entry.experiment, entry.example) for entry in compared]),
+        lambda path: _record(path, [(entry.experiment, entry.world_0) for entry in compared]),
         lambda path: plot_worlds(path, compared, experiment.scenario.title),
     )
     names = files_of_comparison([entry.kind for entry in compared], plot=plot)
@@ -185,7 +185,7 @@ def to_record(experiment: Experiment, result: Result, *, compared: bool = False)
     summary, outcome, observer = summary_of(experiment, result), result.outcomes[0], experiment.scenario.observer.kind
     if not result.trajectory.axes:
         return [Run(observer, result.trajectory, summary, outcome)]
-    common = {key: value for key, value in summary.items() if key not in (AXES, *RODE_ALONG)}
+    common = {key: value for key, value in summary.items() if key not in (AXES, *OPEN_LOOP_SECTIONS)}
     return [
         Run(f"{observer}, {axis}" if compared else axis, result.trajectory.along(axis), common | own, outcome, axis)
         for axis, own in summary[AXES].items()

@@ -15,7 +15,7 @@ import numpy as np
 from cmg_mj import load_scenario, prepare
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results import markdown
-from cmg_mj.simulation.batched_observers import Run, run_side_by_side
+from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 
 SEED, WORLDS, LARGEST_DEG, CUTS, PARTS = 30_000, 5, 4.0, 2, 8
 
@@ -38,7 +38,7 @@ def limits(cases: Sequence[Case]) -> list[np.ndarray]:
         worlds = np.repeat(np.arange(len(signs)) % WORLDS, len(parts)).tolist()
         tried = [low[:, None] + parts for low in lows]
         runs = [
-            Run(experiment.varied({"equilibrium_bias_deg": (signs[:, None] * of).ravel()}), worlds)
+            BatchJob(experiment.with_varied({"equilibrium_bias_deg": (signs[:, None] * of).ravel()}), worlds)
             for experiment, of in zip(experiments, tried, strict=True)
         ]
         for i, result in enumerate(run_side_by_side(runs, keep_trajectory=False)):

@@ -67,7 +67,7 @@ def cells(
     return (
         experiment(observer, noise, *more, seed=seed)
         .run_many(numbers, vary=vary, keep_trajectory=False)
-        .groups(len(biases))
+        .split(len(biases))
     )
 
 

@@ -37,7 +37,7 @@ def stood(experiment: Experiment, **settings: float) -> int:
 
 def simulated(experiment: Experiment, torque: float) -> float:
     """The simulated E in shares of what the reduced model says: pushed at 2 s, upright before."""
-    scenario = experiment.with_values({"duration_s": 8.0, "plant.initial_tilt_deg": 0.0, "push.0.start_s": 2.0})
+    scenario = experiment.with_settings({"duration_s": 8.0, "plant.initial_tilt_deg": 0.0, "push.0.start_s": 2.0})
     for last, share in zip([math.nan, *SHARES], SHARES, strict=False):
         if stood(scenario, push__0__torque_n_m=float(share * torque)) < WORLDS / 2:
             return float(last)
@@ -48,8 +48,8 @@ def row(name: str, robot: Robot, folder: Path) -> list[str]:
     """All of one robot."""
     model = mount(robot.path, **robot.options).save(folder / "balanced.xml")
     can = prospects(write_scenario(model, robot.path, "homogeneous"))
-    pushed = write_scenario(model, robot.path, "homogeneous", can).with_values({"duration_s": 30.0})
-    torque = can.bears.impulse / PUSH_S
+    pushed = write_scenario(model, robot.path, "homogeneous", can).with_settings({"duration_s": 30.0})
+    torque = can.push_margin.median_impulse / PUSH_S
     figures = can.figures()
     return [
         name,
@@ -59,7 +59,7 @@ def row(name: str, robot: Robot, folder: Path) -> list[str]:
         f"{can.ceiling.pole:.2f}, {can.pole:.2f}",
         f"{figures['ceiling_tilt_deg']:.1f}",
         f"{can.ceiling_push:.2f}",
-        f"{can.bears.impulse:.2f} ({can.share:.0%})",
+        f"{can.push_margin.median_impulse:.2f} ({can.fraction_of_limit:.0%})",
         f"{simulated(pushed, torque):.2f} E",
         f"{stood(pushed, push__0__torque_n_m=0.0)}, {stood(pushed, push__0__torque_n_m=0.6 * torque)}",
     ]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.results.per_world_table import riding_along
+from cmg_mj.results.per_world_table import open_loop_figures
 from tests.acceptance.cases import (
     FALLING,
     GROUP,
@@ -99,7 +99,7 @@ def loop(observer: str, reference: str | None = None) -> Figures:
 
 def riding(name: str) -> Figures:
     """World by world, of what rides along on the gyro's loop."""
-    return [{**s, **riding_along(s).get(name, {})} for s in ride_along(SEED, GROUP).summaries]
+    return [{**s, **open_loop_figures(s).get(name, {})} for s in ride_along(SEED, GROUP).summaries]
 
 
 def assert_less(key: str, smaller: Figures, larger: Figures) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.observers.protocol import needs
-from cmg_mj.results.per_world_table import riding_along
+from cmg_mj.results.per_world_table import open_loop_figures
 from tests.acceptance.cases import GROUP, closed_loop, ride_along
 
 SEED = 7
@@ -34,7 +34,7 @@ def test_these_see_y1_alone() -> None:
 def test_no_observer_of_y1_alone_is_below_its_floor(key: str) -> None:
     """On one and the same motion, in no world: the floor is found afterwards, in each world by itself."""
     result = ride_along(SEED, GROUP)
-    worlds = [{result.observers[0]: s, **riding_along(s)} for s in result.summaries]
+    worlds = [{result.observers[0]: s, **open_loop_figures(s)} for s in result.summaries]
     for name in OF_Y1:
         assert all(world[name][key] > world["floor_y1"][key] for world in worlds), name
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmg_mj.cli.pace import Pace
+from cmg_mj.cli.pace import ProgressRate
 from cmg_mj.cli.terminal import progress
 
 
@@ -27,7 +27,7 @@ class Clock:
 )
 def test_the_pace_is_of_what_was_done_since(seconds: float, done: int, said: str) -> None:
     clock = Clock()
-    pace = Pace("trials", 20_000, 400, clock)
+    pace = ProgressRate("trials", 20_000, 400, clock)
     clock.now += seconds
     assert pace.said(done) == said
 
@@ -35,7 +35,7 @@ def test_the_pace_is_of_what_was_done_since(seconds: float, done: int, said: str
 def test_without_a_terminal_a_line_a_minute(capsys: pytest.CaptureFixture[str]) -> None:
     """Two hours, of which every second is told."""
     clock = Clock()
-    with progress("sweep", 14_400, pace=Pace("trials", 14_400, 7_200, clock)) as on_progress:
+    with progress("sweep", 14_400, pace=ProgressRate("trials", 14_400, 7_200, clock)) as on_progress:
         for second in range(7_200):
             clock.now = 1000.0 + second
             on_progress(7_200 + second)

@@ -101,7 +101,7 @@ def test_a_users_own_loop_has_it_too() -> None:
         mujoco.mj_step(of.plant.model, data)
     assert data.qpos[of.plant.tilt] - of.plant.tilt_zero + of.plant.bias == trajectory(of)["x1_rad"][100]
     controller.reset()
-    assert controller.turning is None
+    assert controller.gimbal_rate is None
 
 
 def test_observers_are_told_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,14 +112,14 @@ def test_observers_are_told_the_command(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(type(observer), "step", _recorded(type(observer).step, told))
     commanded = []
     step = 0
-    ideal = of.plant.ideal(of.plant.new_data().sensordata.tolist(), of.plant.new_data().qvel.tolist())
+    ideal = of.plant.ideal_readings(of.plant.new_data().sensordata.tolist(), of.plant.new_data().qvel.tolist())
     while len(commanded) < 20:
         if controller.update(step, ideal):
             assert controller.tick is not None
             commanded.append(controller.tick.u)
-        step += controller.beat
+        step += controller.steps_per_sample
     assert told == commanded[:-1]
-    assert controller.turning != commanded[-1] or controller.turning == 0.0
+    assert controller.gimbal_rate != commanded[-1] or controller.gimbal_rate == 0.0
 
 
 def _recorded(step: Any, told: list[float]) -> Any:

@@ -12,13 +12,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.controllers.controller import RIDES_ALONG, Controller
+from cmg_mj.controllers.controller import TAKEOVER_TICKS, Controller
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
-from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, Ideal, Sensors
+from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, IdealReading, Sensors
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import DT, GRAVITY_TORQUE, J1, J2, PAPER
@@ -260,10 +260,10 @@ IDEAL_SENSORS = Sensors(
 )
 
 
-def reading(tilt: float, gimbal: float, rate: float) -> Ideal:
+def reading(tilt: float, gimbal: float, rate: float) -> IdealReading:
     """A still rig: gravity in both accelerometers, gimbals moved oppositely from a quarter turn."""
     x, z = -9.81 * math.sin(tilt), 9.81 * math.cos(tilt)
-    return Ideal((x, z, x, z), [math.pi / 2.0 + gimbal, math.pi / 2.0 - gimbal], rate, rate)
+    return IdealReading((x, z, x, z), [math.pi / 2.0 + gimbal, math.pi / 2.0 - gimbal], rate, rate)
 
 
 def controller(observer: Any, law: StateFeedback | None = None, **options: Any) -> Controller:
@@ -283,7 +283,7 @@ READINGS = [reading(0.01, 0.0, 0.5), reading(0.02, 0.1, 0.6), reading(-0.01, 0.2
 ESTIMATES = [Estimate(0.01, 0.0, 0.0), *(Estimate(0.001 * k, 0.1 * k, -0.05 * k) for k in (1, 2, 3))]
 
 
-def ticks(of: Controller, readings: list[Ideal] = READINGS) -> list[Any]:
+def ticks(of: Controller, readings: list[IdealReading] = READINGS) -> list[Any]:
     found = []
     for k, ideal in enumerate(readings):
         assert of.update(5 * k, ideal)
@@ -299,7 +299,7 @@ def test_measurements_are_tilt_and_half_the_difference_of_the_gimbals() -> None:
     ):
         assert tick.y1 == pytest.approx(tilt, abs=1e-14)
         assert tick.y2 == pytest.approx(gimbal, abs=1e-14)
-    lopsided = Ideal(READINGS[0].accelerations, [math.pi / 2.0 + 0.3, math.pi / 2.0 - 0.1], 0.0, 0.0)
+    lopsided = IdealReading(READINGS[0].accelerations, [math.pi / 2.0 + 0.3, math.pi / 2.0 - 0.1], 0.0, 0.0)
     assert ticks(controller(Script(ESTIMATES.__getitem__)), [lopsided])[0].y2 == pytest.approx(0.2)
 
 
@@ -411,7 +411,7 @@ def test_reset_starts_the_same_run_again() -> None:
 def test_nothing_is_due_between_ticks() -> None:
     observer = Script(ESTIMATES.__getitem__)
     of = controller(observer)
-    assert (of.period, of.beat) == (5, 5)
+    assert (of.period, of.steps_per_sample) == (5, 5)
     due = [of.update(step, READINGS[0]) for step in range(16)]
     assert [step for step, is_due in enumerate(due) if is_due] == [0, 5, 10, 15]
     assert len(observer.asked) == 3
@@ -428,7 +428,7 @@ def test_beat_is_where_anything_may_be_due() -> None:
         gimbal_zero=[0.0],
         timestep=0.0005,
     )
-    assert (of.period, of.beat) == (20, 2)
+    assert (of.period, of.steps_per_sample) == (20, 2)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
@@ -526,16 +526,16 @@ def test_another_observer_rides_along_and_takes_over() -> None:
     one, other = Script(lambda k: Estimate(0.0, 1.0, 0.0)), Script(lambda k: Estimate(0.0, -1.0, 0.0))
     of = controller(one)
     rates = []
-    for k in range(3 + RIDES_ALONG + 5):
+    for k in range(3 + TAKEOVER_TICKS + 5):
         if k == 3:
-            of.exchange(observer=other)
+            of.swap_components(observer=other)
         of.update(5 * k, READINGS[k % 4])
         assert of.tick is not None
         rates.append(of.tick.estimates[0][1])
-    assert rates == [0.0, *[1.0] * (2 + RIDES_ALONG), *[-1.0] * 5]
-    assert len(one.asked) == 2 + RIDES_ALONG
-    assert len(other.asked) == RIDES_ALONG + 4
-    assert other.asked == [*one.asked[3:], *other.asked[RIDES_ALONG - 1 :]]
+    assert rates == [0.0, *[1.0] * (2 + TAKEOVER_TICKS), *[-1.0] * 5]
+    assert len(one.asked) == 2 + TAKEOVER_TICKS
+    assert len(other.asked) == TAKEOVER_TICKS + 4
+    assert other.asked == [*one.asked[3:], *other.asked[TAKEOVER_TICKS - 1 :]]
 
 
 def test_it_takes_over_at_once_from_one_that_fails() -> None:
@@ -548,7 +548,7 @@ def test_it_takes_over_at_once_from_one_that_fails() -> None:
     rates = []
     for k in range(9):
         if k == 3:
-            of.exchange(observer=Script(lambda k: Estimate(0.0, -1.0, 0.0)))
+            of.swap_components(observer=Script(lambda k: Estimate(0.0, -1.0, 0.0)))
         of.update(5 * k, READINGS[0])
         assert of.tick is not None
         rates.append(of.tick.estimates[0][1])
@@ -557,7 +557,7 @@ def test_it_takes_over_at_once_from_one_that_fails() -> None:
 
 def test_before_the_first_tick_an_observer_is_exchanged_at_once() -> None:
     of = controller(Script(lambda k: Estimate(0.0, 1.0, 0.0)))
-    of.exchange(observer=Script(ESTIMATES.__getitem__))
+    of.swap_components(observer=Script(ESTIMATES.__getitem__))
     assert [tick.estimates[0] for tick in ticks(of)][1:] == ESTIMATES[1:]
 
 
@@ -566,7 +566,7 @@ def test_law_and_feedback_change_with_the_integrator_as_it_was() -> None:
     of.update(0, READINGS[0])
     of.update(5, READINGS[1])
     other = StateFeedback(DT, (30.0, 3.0, -0.5, 0.1))
-    of.exchange(law=other, feedback="truth")
+    of.swap_components(law=other, feedback="truth")
     of.update(10, READINGS[2])
     assert of.tick is not None
     assert of.tick.x_e == pytest.approx(-DT * 0.1)
@@ -587,7 +587,7 @@ def test_sensors_start_afresh_between_their_samples_too() -> None:
     of.update(5, READINGS[1])
     assert of.tick is not None
     assert of.tick.y1 == pytest.approx(0.01)
-    of.exchange(sensors=Sensors(Accelerometer(rate_hz=50.0, bias_mg=(1.0, 1.0)), slow.encoder, slow.fog))
+    of.swap_components(sensors=Sensors(Accelerometer(rate_hz=50.0, bias_mg=(1.0, 1.0)), slow.encoder, slow.fog))
     of.update(10, READINGS[2])
     assert of.tick.y1 != pytest.approx(0.01, abs=0.005)
 
@@ -595,6 +595,6 @@ def test_sensors_start_afresh_between_their_samples_too() -> None:
 def test_rates_stay_while_it_runs() -> None:
     of = controller(Script(ESTIMATES.__getitem__))
     with pytest.raises(InputError, match=r"controller.rate_hz: stays 200 Hz"):
-        of.exchange(law=StateFeedback(0.01))
+        of.swap_components(law=StateFeedback(0.01))
     with pytest.raises(InputError, match="sensors: their rates stay"):
-        of.exchange(sensors=Sensors(Accelerometer(rate_hz=1000.0)))
+        of.swap_components(sensors=Sensors(Accelerometer(rate_hz=1000.0)))

@@ -96,7 +96,8 @@ def test_plant(given: str, fragments: list[str]) -> None:
     (
         "typo",
         "rate = 200",
-        "controller.rate: no such field; did you mean 'rate_hz'? allowed: angle_source, bias_trim_s, compensate_turning",
+        "controller.rate: no such field; did you mean 'rate_hz'? allowed: angle_source, bias_trim_s, "
+        "compensate_turning",
     ),
     ("no rate", "rate_hz = 0", f"controller.rate_hz = 0: {RATE}"),
     ("a negative rate", "rate_hz = -200", f"controller.rate_hz = -200: {RATE}"),

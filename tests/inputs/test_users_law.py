@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydantic.dataclasses import dataclass
 
-from cmg_mj import Fed, InputError, Measurement, load_scenario, prepare
+from cmg_mj import FeedbackState, InputError, Measurement, load_scenario, prepare
 from cmg_mj.inputs.field_types import STRICT, Positive
 from tests.command import cmg_mj
 from tests.inputs.complaints import assert_in_order, table
@@ -26,7 +26,7 @@ class Mine:
     def init(self, y: Measurement) -> Any:
         return 0
 
-    def step(self, state: Any, y: Measurement, x: Fed, u: Any) -> Any:
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
         return state + 1, self.command(state, -35.0 * x.x1 - 4.0 * x.x2 + x.x3)
 
     def command(self, k: int, demanded: Any) -> Any:
@@ -45,7 +45,7 @@ class Typed:
     def init(self, y: Measurement) -> None:
         return None
 
-    def step(self, state: None, y: Measurement, x: Fed, u: Any) -> tuple[None, Any]:
+    def step(self, state: None, y: Measurement, x: FeedbackState, u: Any) -> tuple[None, Any]:
         return None, -self.stiffness * x.x1 - 4.0 * x.x2 + x.x3
 
 
@@ -80,12 +80,12 @@ class HasNoStep:
 
 
 class ReturnsNothing(Mine):
-    def step(self, state: Any, y: Measurement, x: Fed, u: Any) -> Any:
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
         return None
 
 
 class ReturnsACommand(Mine):
-    def step(self, state: Any, y: Measurement, x: Fed, u: Any) -> Any:
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
         return 0.5
 
 
@@ -152,7 +152,7 @@ class ReturnsTextLater(Mine):
 
 
 class ChangesWhatItIsGiven(Mine):
-    def step(self, state: Any, y: Measurement, x: Fed, u: Any) -> Any:
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
         rate = x.x2
         rate *= 2.0
         return state + 1, -35.0 * x.x1 - 4.0 * rate
@@ -163,7 +163,7 @@ class AsksForMuch(Mine):
 
     seen: ClassVar[list] = []
 
-    def step(self, state: Any, y: Measurement, x: Fed, u: Any) -> Any:
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
         self.seen.append(u)
         return state + 1, np.float64(1000.0)
 
@@ -378,6 +378,6 @@ def test_a_law_that_remembers_in_itself_is_fresh_in_every_run() -> None:
 class Remembers(Mine):
     count = 0
 
-    def step(self, state: Any, y: Measurement, x: Fed, u: Any) -> Any:
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
         self.count += 1
         return state, 0.01 * self.count + 0.0 * y.y1

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.observers import GIVEN, OBSERVERS, Estimate, Measurement
+from cmg_mj.observers import BENCH_PARAMETERS, OBSERVERS, Estimate, Measurement
 from tests.observers.reference import DT, PAPER, observer, rough_signals
 from tests.plant import paper_model as paper
 
@@ -159,7 +159,7 @@ def positive_gains() -> list[tuple[str, str]]:
     found = []
     for kind in EVERY:
         of: Any = observer(kind)
-        names = [field.name for field in dataclasses.fields(of) if field.name not in GIVEN]
+        names = [field.name for field in dataclasses.fields(of) if field.name not in BENCH_PARAMETERS]
         found += [(kind, name) for name in names if isinstance(value := getattr(of, name), float) and value > 0.0]
     may_be_zero = {("high_gain", "d_inf"), ("gyro_free", "bias_walk"), ("gyro_free", "jerk")}
     return [gain for gain in found if gain not in may_be_zero]

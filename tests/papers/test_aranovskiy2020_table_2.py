@@ -13,7 +13,7 @@ from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, TABLE_2
 from cmg_mj.papers.aranovskiy2020.tuning_procedure import Tried, loops_of, procedure_claim
 from cmg_mj.results.intervals import Interval
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.studies.tuning import Level, Study
+from cmg_mj.studies.tuning import NoiseLevelResult, TuningResult
 
 SEED = 910_001
 SCENARIO = load_scenario("observer_tuning")
@@ -55,18 +55,20 @@ def test_the_tuned_are_set_in_the_loop() -> None:
 WAVE = 0.001 * np.array([1.0, -1.0, 1.0, -1.0])
 
 
-def level(noise: float, ratio: float, tuned: float = 0.05, zero: float = 0.1, scatter: float = 1.0) -> Level:
+def level(noise: float, ratio: float, tuned: float = 0.05, zero: float = 0.1, scatter: float = 1.0) -> NoiseLevelResult:
     """Table 2's error by the tuned's is the ratio, beyond chance if its scatter is small."""
     rms = np.full(4, tuned)
-    return Level(noise, {}, {"tau": 0.02}, [], tuned, ratio * tuned, rms, ratio * rms + scatter * WAVE, zero, 0.0, 0)
+    return NoiseLevelResult(
+        noise, {}, {"tau": 0.02}, [], tuned, ratio * tuned, rms, ratio * rms + scatter * WAVE, zero, 0.0, 0
+    )
 
 
 def made(*levels: tuple[float, dict[str, float], float]) -> retuned.Studies:
     """Studies of one push: noise, ratios by observer, and the error of an estimate of zero."""
 
-    def study(name: str) -> Study:
+    def study(name: str) -> TuningResult:
         at = [level(noise, of_name[name], zero=zero) for noise, of_name, zero in levels]
-        return Study(SCENARIO, name, TABLE_2[name], [], [], 4, (2.0, 3.1), at)
+        return TuningResult(SCENARIO, name, TABLE_2[name], [], [], 4, (2.0, 3.1), at)
 
     return {"a push": {name: study(name) for name in OBSERVERS}}
 
@@ -141,7 +143,9 @@ def test_a_fit_to_the_gyro_need_not_be_one_for_the_loop() -> None:
 def test_the_loops_are_those_of_the_default_and_of_the_joint_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
-    def looped(tried: list[tuple[retuned.Tuned, Level, retuned.Push]], worlds: int, seed: int) -> list[Interval]:
+    def looped(
+        tried: list[tuple[retuned.Tuned, NoiseLevelResult, retuned.Push]], worlds: int, seed: int
+    ) -> list[Interval]:
         asked.extend((case.observer, level.noise_ug_rthz, push.words) for case, level, push in tried)
         return [ONE] * len(tried)
 

@@ -51,6 +51,6 @@ def test_tilt_noise_is_the_rigs(noise_ug: float) -> None:
     assert trajectory is not None
     plant = experiment.plant
     noise = trajectory["y1_rad"] - trajectory["x1_rad"] + plant.bias
-    expected = plant.facts.noise(experiment.scenario.sensors).tilt
+    expected = plant.parameters.noise(experiment.scenario.sensors).tilt
     assert noise.std() == pytest.approx(expected, rel=0.03)
     assert abs(noise.mean()) < 4.0 * expected / math.sqrt(noise.size)

@@ -12,7 +12,7 @@ from cmg_mj.papers.sokolov2019 import table_2
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import estimator, experiment
 from cmg_mj.replay import replay
-from cmg_mj.studies.tuning import Level
+from cmg_mj.studies.tuning import NoiseLevelResult
 
 SEED = 5_000
 
@@ -37,17 +37,19 @@ def test_tau_against_a_grid() -> None:
     assert level.verdict == "better"
 
 
-def level(printed: Sequence[float], tuned: Sequence[float]) -> Level:
+def level(printed: Sequence[float], tuned: Sequence[float]) -> NoiseLevelResult:
     """With these errors on the held-out worlds."""
     rms, given = np.array(tuned), np.array(printed)
-    return Level(400.0, {}, {"tau": 0.02}, (), float(rms.mean()), float(given.mean()), rms, given, 1.0, 1.0, 0)
+    return NoiseLevelResult(
+        400.0, {}, {"tau": 0.02}, (), float(rms.mean()), float(given.mean()), rms, given, 1.0, 1.0, 0
+    )
 
 
 BEATEN, TIED = level([1.2, 1.3, 1.25], [1.0, 1.05, 1.02]), level([1.0, 1.1, 1.05], [1.01, 1.09, 1.05])
 
 
 def test_the_printed_values_must_be_best_on_one_recording() -> None:
-    def verdict(*by_observer: Sequence[Level]) -> str:
+    def verdict(*by_observer: Sequence[NoiseLevelResult]) -> str:
         return table_2.claim({"a push": dict(zip(OBSERVERS, by_observer, strict=True))}).verdict
 
     within = "reproduced within stated conditions"

@@ -210,7 +210,7 @@ def test_what_they_feel_of_a_turn_grows_with_the_distance() -> None:
     data.qpos[plant.tilt], data.qvel[plant.tilt] = plant.tilt_zero + 0.2, 3.0
     mujoco.mj_forward(plant.model, data)
     alpha, rate = float(data.qacc[plant.tilt]), 3.0
-    ix, iz, ox, oz = plant.ideal(data.sensordata.tolist(), data.qvel.tolist()).accelerations
+    ix, iz, ox, oz = plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist()).accelerations
     assert ox - ix == pytest.approx((OUTER - INNER) * alpha, rel=1e-12)
     assert oz - iz == pytest.approx(-(OUTER - INNER) * rate**2, rel=1e-12)
     assert plant.radial_tilt(ix, iz, ox, oz) == pytest.approx(0.2, abs=1e-12)

@@ -12,7 +12,7 @@ from cmg_mj.observers import make_observer
 from cmg_mj.replay import replay
 from cmg_mj.replay.alignment import alignment
 from cmg_mj.replay.lag import lag
-from cmg_mj.replay.log_replay import Replayed, replay_log
+from cmg_mj.replay.log_replay import ReplayResult, replay_log
 from cmg_mj.replay.logs import read_log
 from cmg_mj.results.trajectory import Trajectory
 from tests.observers.reference import PAPER
@@ -23,7 +23,7 @@ GAIN = math.sin(OMEGA * DT / 2.0) / (OMEGA * DT / 2.0)
 """A difference over DT is the rate in the middle of it, by that much smaller."""
 
 
-def replayed(tmp_path: Path) -> Replayed:
+def replayed(tmp_path: Path) -> ReplayResult:
     return replay_log(read_log(write_csv(tmp_path / "sine.csv", sine()), COLUMNS), skip_s=1.0)
 
 

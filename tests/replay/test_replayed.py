@@ -15,7 +15,7 @@ from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, ob
 from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
 from cmg_mj.replay.logs import Log, read_log
-from cmg_mj.replay.observer_inputs import replay_ready, told
+from cmg_mj.replay.observer_inputs import observer_inputs, replay_prepared
 from cmg_mj.replay.parameter_options import parameters_of
 from cmg_mj.replay.user_noise import noise_numbers, noise_of
 from cmg_mj.replay.user_pendulum import model_of
@@ -48,7 +48,7 @@ def log(tmp_path: Path, **more: np.ndarray) -> Log:
 
 def test_a_run_replays_to_its_figures(run: Path) -> None:
     """Estimates bit for bit, of the loop's observer (whose k1 is not the default) and of every open-loop observer."""
-    replayed = replay_ready(read_log(run))
+    replayed = replay_prepared(read_log(run))
     summary = json.loads((run / "summary.json").read_text())
     kept = Trajectory.load(run / "trajectory.parquet")
     assert replayed.left_out == {}
@@ -69,9 +69,9 @@ def test_a_runs_file_is_the_same_as_its_folder(run: Path) -> None:
 
 def test_a_runs_parameters_model_and_noise_can_be_changed(run: Path) -> None:
     recorded = read_log(run)
-    as_it_was = replay_ready(recorded, ["homogeneous", "gyro_free"])
+    as_it_was = replay_prepared(recorded, ["homogeneous", "gyro_free"])
     other = {"homogeneous": {"alpha": 0.9}}
-    changed = replay_ready(recorded, ["homogeneous", "gyro_free"], parameters=other, noises={"tilt": 1.0})
+    changed = replay_prepared(recorded, ["homogeneous", "gyro_free"], parameters=other, noises={"tilt": 1.0})
     for name in ("homogeneous", "gyro_free"):
         assert np.abs(changed.estimates[name]["x2_rad_s"] - as_it_was.estimates[name]["x2_rad_s"]).max() > 1e-3
 
@@ -176,12 +176,12 @@ def test_noise_of_two_accelerometers_follows_from_theirs(tmp_path: Path) -> None
 def test_the_noise_of_a_runs_accelerometers_can_be_told(run: Path) -> None:
     """All else of its sensors stays: told what it had, it is the run's; of its resolution the rest."""
     recorded, of_the_run = read_log(run), prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]
-    assert told(recorded, noises={"accelerometer": 300.0}).noise == of_the_run
-    more = told(recorded, noises={"accelerometer": 600.0}).noise
+    assert observer_inputs(recorded, noises={"accelerometer": 300.0}).noise == of_the_run
+    more = observer_inputs(recorded, noises={"accelerometer": 600.0}).noise
     assert more.tilt == pytest.approx(2.0 * of_the_run.tilt, rel=1e-4)
     assert more.gimbal == of_the_run.gimbal
     with pytest.raises(InputError, match="give accelerometer"):
-        told(recorded, noises={"accelerometer": 300.0, "tilt": 0.1})
+        observer_inputs(recorded, noises={"accelerometer": 300.0, "tilt": 0.1})
 
 
 @pytest.mark.parametrize(
@@ -241,7 +241,7 @@ def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
     assert study.noises == [prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]]
     half = recorded.cut(slice(len(recorded) // 2, None))
     study = tune_on_logs([recorded], "gyro_free", parameters=["jerk"], skip_s=0.3)
-    error = half["reference_rad_s"] - replay_ready(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
+    error = half["reference_rad_s"] - replay_prepared(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
     stretches = np.array_split(error[half.scored(0.3)], len(study.level.given_rms))
     np.testing.assert_allclose(study.level.given_rms, [np.sqrt(np.mean(s**2)) for s in stretches], rtol=1e-9)
 

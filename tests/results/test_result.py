@@ -68,7 +68,7 @@ def test_the_table_has_a_row_per_observer_and_world() -> None:
 
 
 def test_the_table_of_a_group_and_of_one_world() -> None:
-    _, fell = result().groups(2)
+    _, fell = result().split(2)
     assert fell.table()["world"].to_pylist()[:2] == [2, 3]
     alone = experiment().run(world=5, keep_trajectory=False).table()
     assert alone["world"].to_pylist() == [5] * ROWS
@@ -83,7 +83,7 @@ def test_references_have_values_too() -> None:
 
 
 def test_groups_are_the_worlds_in_their_order() -> None:
-    stood, fell = result().groups(2)
+    stood, fell = result().split(2)
     assert stood.stood.all()
     assert fell.fell.all()
     assert fell.mean(ERROR) is None
@@ -104,7 +104,7 @@ def test_varied_rigs_are_those_of_their_own_scenarios() -> None:
 
 
 def test_equal_settings_share_one_rig() -> None:
-    rigs = [each.plant for each in experiment().varied({"equilibrium_bias_deg": BIASES})]
+    rigs = [each.plant for each in experiment().with_varied({"equilibrium_bias_deg": BIASES})]
     assert rigs[0] is rigs[1]
     assert rigs[2] is rigs[3] is not rigs[0]
 
@@ -147,12 +147,12 @@ def test_wrong_keys_and_groups_are_refused() -> None:
         result().values(ERROR, "liner")
     for count in (0, -1, 3):
         with pytest.raises(InputError, match="cannot be parted so"):
-            result().groups(count)
+            result().split(count)
 
 
 def test_one_world_is_one_group() -> None:
     single = experiment().run()
-    (same,) = single.groups(1)
+    (same,) = single.split(1)
     assert same is single
     assert math.isfinite(single.values(ERROR)[0])
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from cmg_mj import load_scenario, parse_scenario, prepare
-from cmg_mj.scenario.differences import LONGEST_NAME, differences, in_a_name, in_words, safe_name
+from cmg_mj.scenario.differences import LONGEST_NAME, describe_differences, differences, folder_suffix, safe_name
 from tests.command import cmg_mj
 from tests.run_folders import write
 
@@ -30,7 +30,7 @@ def test_nothing_differs() -> None:
         differing("title=other", "seed=4", "plant.equilibrium_bias_deg=0.5", "controller.gains=[35, 4, -1, 0.3]") == {}
     )
     assert prepare(parse_scenario({"duration_s": 1.0})).differences == {}
-    assert (in_words({}), in_a_name({})) == ("", "")
+    assert (describe_differences({}), folder_suffix({})) == ("", "")
 
 
 @pytest.mark.parametrize(
@@ -49,18 +49,18 @@ def test_nothing_differs() -> None:
 def test_one_field(setting: str, field: str, value: object, name: str) -> None:
     found = differing(setting.replace("[ltv]", '["ltv"]'))
     assert found == {field: value}
-    assert in_a_name(found) == f"-{name}"
+    assert folder_suffix(found) == f"-{name}"
 
 
 def test_names_that_need_their_section() -> None:
     found = {"sensors.encoder.rate_hz": 1.0, "sensors.fog.rate_hz": 2.0, "push.0.start_s": 1.0, "push.1.start_s": 2.0}
-    assert in_a_name(found) == "-encoder.rate_hz=1-fog.rate_hz=2-push.0.start_s=1-and-1-more"
-    assert in_words(found) == ", encoder.rate_hz=1, fog.rate_hz=2, push.0.start_s=1, and 1 more"
+    assert folder_suffix(found) == "-encoder.rate_hz=1-fog.rate_hz=2-push.0.start_s=1-and-1-more"
+    assert describe_differences(found) == ", encoder.rate_hz=1, fog.rate_hz=2, push.0.start_s=1, and 1 more"
 
 
 @pytest.mark.parametrize("value", ["ß" * 300, "\udcff/..\\ \n*?", "a" * 300, [0.1234567891] * 40, {"a": {}}])
 def test_any_value_makes_a_file_name(value: object) -> None:
-    name = in_a_name({"plant.x": value, "plant.y": value})
+    name = folder_suffix({"plant.x": value, "plant.y": value})
     assert name.isascii()
     assert len(name) <= LONGEST_NAME + len("-and-2-more")
     assert not set(name) & set('/\\:*?"<>| \n')
@@ -70,7 +70,7 @@ def test_any_value_makes_a_file_name(value: object) -> None:
 def test_a_field_that_is_not_there() -> None:
     observer = {"observer": {"kind": "ltv"}}
     assert differences({"a": {"x": 1, "y": 2}, **observer}, {"a": {"x": 1}, **observer}) == {"a.y": None}
-    assert in_a_name({"a.y": None}) == "-y=none"
+    assert folder_suffix({"a.y": None}) == "-y=none"
 
 
 def test_a_scenario_of_a_users_own_differs_from_none() -> None:

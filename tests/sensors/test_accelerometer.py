@@ -18,12 +18,12 @@ from scipy.signal import butter, lfilter, welch
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.errors import InputError
 from cmg_mj.plant.plant import load_plant
-from cmg_mj.results.baselines import STREAM
+from cmg_mj.results.baselines import MEMS_GYRO_STREAM
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.ideal import Ideal
+from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.low_pass import noise_gain
-from cmg_mj.sensors.sampled import FLICKER, Sensors, at_work
+from cmg_mj.sensors.sampled import FLICKER_STREAM, Sensors, sampled_sensors
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 from tests.sensors.test_sampled import G, assert_sigma
@@ -34,13 +34,13 @@ STILL = (0.0, G, 0.0, G)
 MS = 0.001
 
 
-def ideal(forces: Any) -> Ideal:
-    return Ideal(forces, [0.0], 0.0, 0.0)
+def ideal(forces: Any) -> IdealReading:
+    return IdealReading(forces, [0.0], 0.0, 0.0)
 
 
 def shown(forces: Any, **errors: Any) -> np.ndarray:
     """What parts without noise show of specific forces, (4,)."""
-    return np.array(Accelerometer(**QUIET, **errors).meter()(ideal(forces), (0.0,) * 4))
+    return np.array(Accelerometer(**QUIET, **errors).make_reading_function()(ideal(forces), (0.0,) * 4))
 
 
 def delivered(
@@ -51,9 +51,9 @@ def delivered(
     worlds: int | list[int] = 0,
 ) -> np.ndarray:
     """The first n samples that a pair delivers of forces over time, as the controller has it work, (n, 4, ...)."""
-    pair = at_work(Sensors(accelerometer=sensor), timestep, 7, worlds)[0]
+    pair = sampled_sensors(Sensors(accelerometer=sensor), timestep, 7, worlds)[0]
     found = []
-    for step in range(0, n * pair.period, pair.beat):
+    for step in range(0, n * pair.period, pair.steps_per_sample):
         pair.sample(step, ideal(forces(step * timestep)))
         if step % pair.period == 0:
             found.append(np.array(pair.read(step)))
@@ -183,12 +183,12 @@ def test_noise_after_the_low_pass(bandwidth_hz: float) -> None:
     # Samples so far apart that they are independent, all but those of the narrowest.
     noise = (delivered(sensor, 500, lambda _: np.zeros((4, 8)), worlds=list(range(8)))).swapaxes(0, 1).reshape(4, -1)
     if bandwidth_hz > 10.0:
-        assert_sigma(noise.ravel(), sensor.sigma)
+        assert_sigma(noise.ravel(), sensor.white_noise_sigma)
     else:
-        assert noise.std() == pytest.approx(sensor.sigma, rel=0.1)
+        assert noise.std() == pytest.approx(sensor.white_noise_sigma, rel=0.1)
         # A narrow filter's noise is the density's over pi/(2 sqrt 2) bandwidths.
         white = 400e-6 * G * math.sqrt(bandwidth_hz * math.pi / (2.0 * math.sqrt(2.0)))
-        assert sensor.sigma == pytest.approx(white, rel=1e-3)
+        assert sensor.white_noise_sigma == pytest.approx(white, rel=1e-3)
 
 
 def test_noise_in_the_pass_band_is_the_datasheets() -> None:
@@ -270,7 +270,7 @@ def test_the_drift_is_the_same_for_a_part_that_filters() -> None:
 
 
 def test_the_drift_has_a_stream_of_its_own() -> None:
-    assert FLICKER not in (0, 1, 2, STREAM)
+    assert FLICKER_STREAM not in (0, 1, 2, MEMS_GYRO_STREAM)
 
 
 # --- an unbalanced wheel -----------------------------------------------------------------------------------
@@ -295,7 +295,7 @@ def test_vibration_of_unbalanced_wheels_at_the_accelerometers() -> None:
             for cube in plant.cubes:
                 data.qpos[cube.flywheel] += math.copysign(angle, cube.speed)
             mujoco.mj_forward(plant.model, data)
-            forces.append(plant.ideal(data.sensordata.tolist(), data.qvel.tolist()).accelerations)
+            forces.append(plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist()).accelerations)
         shaken.append(np.subtract(*forces[::-1]))
     tangential = np.array(shaken)[:, [0, 2]]
     amplitude = np.abs(np.fft.rfft(tangential, axis=0)[1]) / 4.0

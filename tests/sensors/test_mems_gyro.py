@@ -28,7 +28,7 @@ def quiet(**settings: float) -> dict[str, Any]:
 def shown(rate: np.ndarray, dt: float = DT, seed: int = 0, world: int = 0, **settings: Any) -> np.ndarray:
     """What a gyro shows of one world's rate, (n,) [rad/s] -> (n,) [deg/s]."""
     gyro = MemsGyro(**settings)
-    return np.degrees(gyro.meter(dt, normals(seed, world, 3, gyro.channels))(rate[:, None])[:, 0])
+    return np.degrees(gyro.make_reading_function(dt, normals(seed, world, 3, gyro.channels))(rate[:, None])[:, 0])
 
 
 @pytest.mark.parametrize(("density", "dt", "sigma"), [(0.005, 0.005, 0.05), (0.02, 0.02, 0.1)])
@@ -89,7 +89,7 @@ def test_a_world_reads_the_same_alone_and_in_a_batch_and_in_any_pieces() -> None
 @pytest.mark.parametrize("stream", range(3))
 def test_its_noise_is_none_of_the_other_sensors(stream: int) -> None:
     rate, gyro = np.zeros((50, 1)), MemsGyro()
-    theirs = gyro.meter(DT, normals(5, 4, stream, gyro.channels))(rate)
+    theirs = gyro.make_reading_function(DT, normals(5, 4, stream, gyro.channels))(rate)
     assert not np.array_equal(References(gyro, DT, 5, 4).rates(rate)["mems_gyro"], theirs)
 
 

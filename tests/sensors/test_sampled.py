@@ -15,19 +15,19 @@ from scipy import stats
 
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, Ideal, SampledSensor, normals
+from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, IdealReading, SampledSensor, normals
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 
 G = 9.80665
-STILL = Ideal((0.0, G, 0.0, G), [0.0, 0.0], 0.0, 0.0)
+STILL = IdealReading((0.0, G, 0.0, G), [0.0, 0.0], 0.0, 0.0)
 QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
 N = 20_000
 
 
-def readings(sensor: Any, n: int, seed: int = 0, world: int = 0, ideal: Ideal = STILL) -> np.ndarray:
+def readings(sensor: Any, n: int, seed: int = 0, world: int = 0, ideal: IdealReading = STILL) -> np.ndarray:
     """n samples of one world, (n, channels)."""
-    measure, noise = sensor.meter(), normals(seed, world, 0, sensor.channels)
+    measure, noise = sensor.make_reading_function(), normals(seed, world, 0, sensor.channels)
     return np.array([np.atleast_1d(measure(ideal, next(noise))) for _ in range(n)])
 
 
@@ -86,7 +86,7 @@ def test_accelerometer_counts() -> None:
 
 @pytest.mark.parametrize(("force", "shown"), [(5.0, 2.0), (-5.0, -2.0), (1.5, 1.5)])
 def test_accelerometer_saturates_at_its_range(force: float, shown: float) -> None:
-    ideal = Ideal([force * G] * 4, [0.0, 0.0], 0.0, 0.0)
+    ideal = IdealReading([force * G] * 4, [0.0, 0.0], 0.0, 0.0)
     for sensor in (Accelerometer(noise_density_ug_rthz=0.0), Accelerometer(range_g=2.0, **QUIET)):
         np.testing.assert_allclose(readings(sensor, 1, ideal=ideal)[0], shown * G, rtol=1e-12)
     noisy = readings(Accelerometer(), 500, ideal=ideal)
@@ -126,16 +126,19 @@ def test_accelerometer_bias_and_equilibrium_bias_move_the_loop_alike() -> None:
 def test_encoder_shows_the_nearest_count(encoder: Encoder, counts: int) -> None:
     """12 bits (AS5045), and another resolution."""
     step = 2.0 * math.pi / counts
-    measure = encoder.meter()
+    measure = encoder.make_reading_function()
     for angle in np.linspace(-2.0, 2.0, 1001).tolist():
-        shown = measure(Ideal((), [angle, 0.5 * angle], 0.0, 0.0), ())
+        shown = measure(IdealReading((), [angle, 0.5 * angle], 0.0, 0.0), ())
         for ideal, reading in zip((angle, 0.5 * angle), shown, strict=True):
             assert abs(reading - ideal) <= step / 2.0 * (1.0 + 1e-9)
             assert reading / step == pytest.approx(round(reading / step), abs=1e-9)
 
 
 def test_encoder_without_resolution_is_ideal() -> None:
-    assert Encoder(counts_per_revolution=0.0).meter()(Ideal((), [0.1, 0.2], 0.0, 0.0), ()) == [0.1, 0.2]
+    assert Encoder(counts_per_revolution=0.0).make_reading_function()(IdealReading((), [0.1, 0.2], 0.0, 0.0), ()) == [
+        0.1,
+        0.2,
+    ]
 
 
 # --- fibre-optic gyro --------------------------------------------------------------------------------------
@@ -162,7 +165,7 @@ def test_fog_bias_and_range() -> None:
     quiet = {"angle_random_walk_deg_rth": 0.0}
     assert readings(Fog(bias_deg_h=30.0, **quiet), 1)[0, 0] == pytest.approx(math.radians(30.0 / 3600.0), rel=1e-12)
     for rate in (20.0, -20.0):
-        fast = Ideal((), [], rate, rate)
+        fast = IdealReading((), [], rate, rate)
         shown = readings(Fog(**quiet), 1, ideal=fast)[0, 0]
         assert shown == pytest.approx(math.copysign(math.radians(490.0), rate), rel=1e-12)
         assert readings(Fog(range_deg_s=2000.0, **quiet), 1, ideal=fast)[0, 0] == pytest.approx(rate)
@@ -178,16 +181,16 @@ def test_fog_bias_and_range() -> None:
 )
 def test_fog_step_response(given: dict[str, Any], bandwidth_hz: float, rate_hz: float) -> None:
     """A first-order low-pass: 1 - exp(-2 pi f t), the step coming right after the sample at t = 0."""
-    measure = Fog(angle_random_walk_deg_rth=0.0, **given).meter()
-    shown = [measure(Ideal((), [], 0.0 if k == 0 else 1.0, 0.0), (0.0,)) for k in range(30)]
+    measure = Fog(angle_random_walk_deg_rth=0.0, **given).make_reading_function()
+    shown = [measure(IdealReading((), [], 0.0 if k == 0 else 1.0, 0.0), (0.0,)) for k in range(30)]
     t = np.arange(30) / rate_hz
     np.testing.assert_allclose(shown, 1.0 - np.exp(-2.0 * math.pi * bandwidth_hz * t), rtol=1e-12, atol=1e-14)
 
 
 def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> None:
-    quick = Fog(bandwidth_hz=0.0, angle_random_walk_deg_rth=0.0).meter()
-    assert [quick(Ideal((), [], rate, rate), (0.0,)) for rate in (0.3, -0.2)] == [0.3, -0.2]
-    assert Fog(angle_random_walk_deg_rth=0.0).meter()(Ideal((), [], 0.3, 0.3), (0.0,)) == 0.3
+    quick = Fog(bandwidth_hz=0.0, angle_random_walk_deg_rth=0.0).make_reading_function()
+    assert [quick(IdealReading((), [], rate, rate), (0.0,)) for rate in (0.3, -0.2)] == [0.3, -0.2]
+    assert Fog(angle_random_walk_deg_rth=0.0).make_reading_function()(IdealReading((), [], 0.3, 0.3), (0.0,)) == 0.3
 
 
 # --- rates and latency -------------------------------------------------------------------------------------
@@ -199,7 +202,7 @@ def shown_by(sensor: Fog, timestep: float, steps: int, read_every: int) -> list[
     shown = []
     for step in range(steps):
         if step % sampled.period == 0:
-            sampled.sample(step, Ideal((), [], float(step), 0.0))
+            sampled.sample(step, IdealReading((), [], float(step), 0.0))
         if step % read_every == 0:
             shown.append(sampled.read(step))
     return shown

@@ -100,7 +100,7 @@ def test_apparent_bias_is_what_the_tilt_at_rest_lacks(errors: dict[str, Any]) ->
     plant = load_plant(equilibrium_bias_deg=0.8, initial_tilt_deg=0.0)
     accelerometer = Accelerometer(noise_density_ug_rthz=0.0, counts_per_g=0.0, **errors)
     data = plant.new_data()
-    ideal = plant.ideal(data.sensordata.tolist(), data.qvel.tolist())
-    shown = plant.radial_tilt(*accelerometer.meter()(ideal, (0.0, 0.0, 0.0, 0.0)))
+    ideal = plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist())
+    shown = plant.radial_tilt(*accelerometer.make_reading_function()(ideal, (0.0, 0.0, 0.0, 0.0)))
 
     assert plant.apparent_bias(accelerometer) == pytest.approx(-shown, abs=1e-9)

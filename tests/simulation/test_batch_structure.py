@@ -11,9 +11,9 @@ from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.sampled import Fog, Sensors
-from cmg_mj.simulation.experiment import Experiment, prepare, run_together
+from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.simulation.pool import ARRAYS
-from cmg_mj.simulation.stacked import of_world, stacked
+from cmg_mj.simulation.stacked import batch_values, value_of_world
 
 N = 6
 
@@ -68,7 +68,7 @@ def test_each_world_is_its_own_experiments(observer: str, more: tuple[str, ...])
     worlds = [5, 5, 0, 1, 2, 9]
     pool = of.run_many(worlds, vary=values())
     assert pool.trajectory is not None
-    for i, (own, world) in enumerate(zip(of.varied(values()), worlds, strict=True)):
+    for i, (own, world) in enumerate(zip(of.with_varied(values()), worlds, strict=True)):
         alone = own.run(world=world)
         assert alone.trajectory is not None
         assert pool.summaries[i] == alone.summaries[0]
@@ -98,25 +98,25 @@ def test_gains_by_other_weights_run_together() -> None:
 
 def test_as_many_experiments_as_worlds() -> None:
     with pytest.raises(InputError, match="2 worlds and 1 plants"):
-        run_together([experiment("linear")], [0, 1])
+        run_batch([experiment("linear")], [0, 1])
 
 
 # --- stacked -------------------------------------------------------------------------------------------------
 
 
 def test_what_is_equal_stays_as_it_is() -> None:
-    assert stacked([Sensors(), Sensors()]) == Sensors()
-    assert stacked([1.0, 1.0]) == 1.0
+    assert batch_values([Sensors(), Sensors()]) == Sensors()
+    assert batch_values([1.0, 1.0]) == 1.0
 
 
 def test_a_stack_gives_every_world_its_own_back() -> None:
     worlds = [Sensors(Accelerometer(bias_mg=(0.0, float(i))), fog=Fog(bias_deg_h=float(i))) for i in range(3)]
-    stack = stacked(worlds)
+    stack = batch_values(worlds)
     np.testing.assert_array_equal(stack.fog.bias_deg_h, [0.0, 1.0, 2.0])
-    assert [of_world(stack, i) for i in range(3)] == worlds
-    assert of_world(worlds[0], 2) is worlds[0]
+    assert [value_of_world(stack, i) for i in range(3)] == worlds
+    assert value_of_world(worlds[0], 2) is worlds[0]
 
 
 def test_what_is_no_number_cannot_differ() -> None:
     with pytest.raises(InputError, match="must be the same in worlds that run together"):
-        stacked(["a", "b"])
+        batch_values(["a", "b"])

@@ -9,8 +9,8 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation import batched_observers as side_by_side
-from cmg_mj.simulation.batched_observers import Run, run_of, run_side_by_side
-from cmg_mj.simulation.experiment import Experiment, prepare, run_together
+from cmg_mj.simulation.batched_observers import BatchJob, run_of, run_side_by_side
+from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 
 
 def experiment(observer: str, *more: str) -> Experiment:
@@ -44,7 +44,7 @@ class Batches:
 
 def test_every_observer_beside_the_others_is_as_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [run_of(experiment(name), 3) for name in OBSERVERS]
-    alone = [run_together(*run) for run in runs]
+    alone = [run_batch(*run) for run in runs]
     batches = Batches(monkeypatch)
     for a, b in zip(run_side_by_side(runs), alone, strict=True):
         same(a, b)
@@ -58,11 +58,11 @@ def test_parameters_noise_and_rigs_may_differ_too(monkeypatch: pytest.MonkeyPatc
     runs = [
         run_of(experiment("homogeneous"), 2),
         run_of(experiment("homogeneous", "observer.k1=30.0", noise), 2),
-        Run(experiment("gyro_free").varied({"equilibrium_bias_deg": [0.0, 1.0, 1.0]}), [4, 4, 2]),
+        BatchJob(experiment("gyro_free").with_varied({"equilibrium_bias_deg": [0.0, 1.0, 1.0]}), [4, 4, 2]),
         run_of(experiment("gyro_free", noise), 1),
         run_of(experiment("homogeneous"), 1),
     ]
-    alone = [run_together(*run, keep_trajectory=False) for run in runs]
+    alone = [run_batch(*run, keep_trajectory=False) for run in runs]
     batches = Batches(monkeypatch)
     for a, b in zip(run_side_by_side(runs, keep_trajectory=False), alone, strict=True):
         same(a, b)
@@ -74,7 +74,7 @@ def test_what_a_batch_has_in_common_keeps_runs_apart(monkeypatch: pytest.MonkeyP
         run_of(experiment("linear", *more), 2)
         for more in ((), ("controller.angle_source=estimated",), ("seed=3",), ("controller.rate_hz=100",), ())
     ]
-    alone = [run_together(*run) for run in runs]
+    alone = [run_batch(*run) for run in runs]
     batches = Batches(monkeypatch)
     for a, b in zip(run_side_by_side(runs), alone, strict=True):
         same(a, b)

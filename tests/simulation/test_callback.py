@@ -23,7 +23,7 @@ from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.sampled import Accelerometer, Sensors
-from cmg_mj.simulation.callback import control, installed
+from cmg_mj.simulation.callback import control, control_callback
 from cmg_mj.simulation.experiment import Experiment, prepare
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1")
@@ -106,7 +106,7 @@ class Loop:
         return self
 
     def by_callback(self, between: Callable[[], object] = lambda: None) -> Loop:
-        with installed(self.plant, self.controller):
+        with control_callback(self.plant, self.controller):
             for _ in self.steps():
                 self.step()
                 between()
@@ -175,7 +175,7 @@ def test_forward_passes_in_between_change_nothing(integrator: str) -> None:
 
 def test_a_forward_pass_before_the_first_step_changes_nothing() -> None:
     loop = Loop(experiment(), cold=True)
-    with installed(loop.plant, loop.controller):
+    with control_callback(loop.plant, loop.controller):
         mujoco.mj_forward(loop.plant.model, loop.data)
         for _ in loop.steps():
             loop.step()
@@ -197,7 +197,7 @@ def test_resetting_after_the_very_first_step_restarts_the_controller(integrator:
 def assert_restarts(integrator: str, steps: int) -> None:
     settings = (f"plant.integrator={integrator}",)
     loop = Loop(experiment(settings), cold=True)
-    with installed(loop.plant, loop.controller):
+    with control_callback(loop.plant, loop.controller):
         for _ in range(steps):
             loop.step()
         loop.start()
@@ -249,7 +249,7 @@ def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) 
     of, controller, calls = counting(*settings)
     plant, data = of.plant, of.plant.new_data()
     seen: Counter[str] = Counter()
-    with installed(plant, controller) as callback:
+    with control_callback(plant, controller) as callback:
 
         def counted(model: mujoco.MjModel, data: mujoco.MjData) -> None:
             seen["callback"] += 1
@@ -265,7 +265,7 @@ def test_half_steps_of_the_user_advance_it_once_too() -> None:
     """mj_step1 and mj_step2, which step RK4 models by Euler's method."""
     of, controller, calls = counting("plant.timestep_s=0.001")
     plant, data = of.plant, of.plant.new_data()
-    with installed(plant, controller):
+    with control_callback(plant, controller):
         for _ in range(200):
             mujoco.mj_step1(plant.model, data)
             mujoco.mj_step2(plant.model, data)
@@ -291,7 +291,7 @@ def somebody_elses() -> Iterator[None]:
 def test_it_takes_itself_out() -> None:
     of = experiment()
     assert mujoco.get_mjcb_control() is None
-    with installed(of.plant, of.controller()) as callback:
+    with control_callback(of.plant, of.controller()) as callback:
         assert mujoco.get_mjcb_control() is callback
     assert mujoco.get_mjcb_control() is None
 
@@ -299,8 +299,8 @@ def test_it_takes_itself_out() -> None:
 def test_it_restores_what_was_there() -> None:
     of = experiment()
     with somebody_elses():
-        with installed(of.plant, of.controller()) as outer:
-            with installed(of.plant, of.controller()) as inner:
+        with control_callback(of.plant, of.controller()) as outer:
+            with control_callback(of.plant, of.controller()) as inner:
                 assert mujoco.get_mjcb_control() is inner
             assert mujoco.get_mjcb_control() is outer
         assert mujoco.get_mjcb_control() is other_callback
@@ -318,7 +318,7 @@ def test_an_exception_comes_out_of_mj_step_and_takes_the_callback_out() -> None:
     plant, data = of.plant, of.plant.new_data()
     message = r"Counted raised KeyError: 'lost' at t = 0\.035 s"
     with somebody_elses():
-        with pytest.raises(RunStopped, match=message) as caught, installed(plant, controller):
+        with pytest.raises(RunStopped, match=message) as caught, control_callback(plant, controller):
             mujoco.mj_step(plant.model, data, 400)
         assert mujoco.get_mjcb_control() is other_callback
     assert isinstance(caught.value.__cause__, KeyError)
@@ -363,7 +363,7 @@ def test_rollout_runs_the_callback() -> None:
     full = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
     start = np.zeros(mujoco.mj_stateSize(plant.model, full))
     mujoco.mj_getState(plant.model, plant.new_data(), start, full)
-    with installed(plant, plant.controller("ltv")):
+    with control_callback(plant, plant.controller("ltv")):
         states, _ = rollout.rollout(plant.model, mujoco.MjData(plant.model), start[None], nstep=2000)
     lean = states[0, :, 1 + plant.tilt] - plant.tilt_zero  # after the time
     assert np.abs(np.degrees(lean)).max() < 3.0

@@ -17,7 +17,7 @@ from cmg_mj.controllers.controller import Tick
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
-from cmg_mj.simulation.gymnasium_env import ID, READINGS, STATE_COST, ScissoredPair
+from cmg_mj.simulation.gymnasium_env import ID, READINGS, STATE_COST, ScissoredPairEnv
 from tests.command import ROOT, environment
 
 SHORT = ["duration_s=3.0", "push.0.start_s=0.5"]
@@ -31,7 +31,7 @@ UNEVEN = [
 ]
 
 
-def acting(env: ScissoredPair, seed: int, **options: Any) -> tuple[list[Tick], list[dict[str, Any]], float]:
+def acting(env: ScissoredPairEnv, seed: int, **options: Any) -> tuple[list[Tick], list[dict[str, Any]], float]:
     """The bench's own controller at the environment's sensors: its ticks, the infos, the sum of rewards."""
     _, info = env.reset(seed=seed, options=options)
     controller = env.experiment.controller()
@@ -58,7 +58,7 @@ def acting(env: ScissoredPair, seed: int, **options: Any) -> tuple[list[Tick], l
 )
 def test_our_controller_gives_the_runners_trajectory(scenario: str, settings: list[str], seed: int, world: int) -> None:
     """Bit for bit: what is measured, estimated, commanded, and where the rig is."""
-    env = ScissoredPair(scenario, settings, in_rad_s=True)
+    env = ScissoredPairEnv(scenario, settings, in_rad_s=True)
     ticks, infos, _ = acting(env, seed, world=world)
     result = prepare(load_scenario(scenario, [*settings, f"seed={seed}"])).run(world=world)
     trajectory = result.trajectory
@@ -75,7 +75,7 @@ def test_our_controller_gives_the_runners_trajectory(scenario: str, settings: li
 
 def test_a_fall_ends_it_and_never_pays() -> None:
     """Who does nothing falls, and has less than who stands, though it is over sooner."""
-    env = ScissoredPair("push_recovery", ["duration_s=5.0"], in_rad_s=True)
+    env = ScissoredPairEnv("push_recovery", ["duration_s=5.0"], in_rad_s=True)
     _, _, standing = acting(env, 0)
     _, info = env.reset(seed=0)
     total, fell = 0.0, False
@@ -90,7 +90,7 @@ def test_a_fall_ends_it_and_never_pays() -> None:
 
 
 def test_the_reward_is_the_cost_of_the_state_and_the_action() -> None:
-    env = ScissoredPair()
+    env = ScissoredPairEnv()
     _, before = env.reset(seed=0)
     _, reward, *_ = env.step(np.array([0.25]))
     x = [before[name] for name in ("x1_rad", "x2_rad_s", "x3_rad")]
@@ -99,18 +99,18 @@ def test_the_reward_is_the_cost_of_the_state_and_the_action() -> None:
 
 
 def test_it_is_truncated_when_the_time_is_over() -> None:
-    env = ScissoredPair("push_recovery", SHORT)
+    env = ScissoredPairEnv("push_recovery", SHORT)
     env.reset(seed=0)
     results = [env.step(np.array([0.0]))[2:4] for _ in range(20)]
     assert not any(map(any, results))
-    env = ScissoredPair("push_recovery", ["duration_s=0.1", "push=[]"])
+    env = ScissoredPairEnv("push_recovery", ["duration_s=0.1", "push=[]"])
     env.reset(seed=0)
     results = [env.step(np.array([0.0]))[2:4] for _ in range(20)]
     assert results == [(False, False)] * 19 + [(False, True)]
 
 
 def test_an_observation_is_what_the_sensors_show() -> None:
-    env = ScissoredPair("push_recovery", SHORT, readings=READINGS, in_rad_s=True)
+    env = ScissoredPairEnv("push_recovery", SHORT, readings=READINGS, in_rad_s=True)
     observation, info = env.reset(seed=2)
     tick = env.experiment.controller().decide(*info["readings"])
     assert observation[:2].tolist() == [tick.y1, tick.y2]
@@ -121,25 +121,25 @@ def test_an_observation_is_what_the_sensors_show() -> None:
         rates.append((observation[2], info["x2_rad_s"]))
     shown, true = np.array(rates).T
     assert 1e-4 < np.std(shown - 1.03 * true) < 0.01
-    assert ScissoredPair("push_recovery", SHORT).reset(seed=2)[0].tolist() == observation_at(2, ())
+    assert ScissoredPairEnv("push_recovery", SHORT).reset(seed=2)[0].tolist() == observation_at(2, ())
 
 
 def observation_at(seed: int, readings: tuple[str, ...], **options: Any) -> list[float]:
-    return ScissoredPair("push_recovery", SHORT, readings=readings).reset(seed=seed, options=options)[0].tolist()
+    return ScissoredPairEnv("push_recovery", SHORT, readings=readings).reset(seed=seed, options=options)[0].tolist()
 
 
 def test_seeds_and_worlds() -> None:
     """A seed repeats; a reset without one goes on to the next world; without any, no two are alike."""
-    env = ScissoredPair("push_recovery", SHORT)
+    env = ScissoredPairEnv("push_recovery", SHORT)
     first = [env.reset(seed=5)[0].tolist(), env.reset()[0].tolist(), env.reset()[0].tolist()]
     assert first == [observation_at(5, (), world=world) for world in (0, 1, 2)]
     assert env.reset(seed=5)[0].tolist() == first[0]
-    assert ScissoredPair().reset()[0].tolist() != ScissoredPair().reset()[0].tolist()
+    assert ScissoredPairEnv().reset()[0].tolist() != ScissoredPairEnv().reset()[0].tolist()
 
 
 def test_settings_of_an_episode() -> None:
     """They hold for one episode."""
-    env = ScissoredPair("push_recovery", SHORT)
+    env = ScissoredPairEnv("push_recovery", SHORT)
     _, info = env.reset(seed=0, options={"settings": {"plant.initial_tilt_deg": 3.0}})
     assert math.degrees(info["x1_rad"]) == pytest.approx(3.0)
     assert math.degrees(env.reset(seed=0)[1]["x1_rad"]) == pytest.approx(1.0)
@@ -190,7 +190,7 @@ env.close()
 )
 def test_wrong_arguments(arguments: dict[str, Any], complaint: str) -> None:
     with pytest.raises(InputError, match=complaint):
-        ScissoredPair(**arguments)
+        ScissoredPairEnv(**arguments)
 
 
 @pytest.mark.parametrize(
@@ -204,12 +204,12 @@ def test_wrong_arguments(arguments: dict[str, Any], complaint: str) -> None:
 )
 def test_wrong_options(options: dict[str, Any], complaint: str) -> None:
     with pytest.raises(InputError, match=complaint):
-        ScissoredPair().reset(seed=0, options=options)
+        ScissoredPairEnv().reset(seed=0, options=options)
 
 
 @pytest.mark.parametrize("action", [np.array([math.nan]), np.zeros(2)], ids=["nan", "two"])
 def test_a_wrong_action(action: np.ndarray) -> None:
-    env = ScissoredPair()
+    env = ScissoredPairEnv()
     env.reset(seed=0)
     with pytest.raises(InputError, match="the action must be one finite number"):
         env.step(action)

@@ -25,12 +25,12 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.live_run import LiveRun, Pace, shown_before
+from cmg_mj.studies.live_run import LiveRun, RealTimeClock, shown_before
 from cmg_mj.studies.save import save_run, to_record
 from cmg_mj.visualization.recording import viewer
 from cmg_mj.visualization.recording.live import GONE, STUCK
 from cmg_mj.visualization.recording.stream import set_up
-from cmg_mj.visualization.recording.streaming import Growing
+from cmg_mj.visualization.recording.streaming import StreamedRun
 from cmg_mj.visualization.recording.viewer import Viewer, start_viewer, url_of
 from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, cmg_mj_process, environment
 from tests.run_folders import assert_whole
@@ -123,7 +123,7 @@ def assert_alike(streamed: Path, saved: Path) -> None:
 def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: tuple[str, ...]) -> None:
     """Every entity, every component, every value at its time."""
     experiment = prepare(load_scenario(scenario, settings))
-    view = LiveRun(experiment, receiver.url, Pace(5.0))
+    view = LiveRun(experiment, receiver.url, RealTimeClock(5.0))
     with view:
         result = experiment.run(**view.options())
         view.ended(result)
@@ -155,7 +155,7 @@ def test_wherever_several_axes_are_cut(ticks: int) -> None:
 def assert_alike_in_pieces(experiment: Experiment, ticks: int) -> None:
     result = experiment.run()
     assert result.trajectory is not None
-    growing = Growing(shown_before(experiment), rows(result.trajectory, 0, 0))
+    growing = StreamedRun(shown_before(experiment), rows(result.trajectory, 0, 0))
     with rr.RecordingStream("cmg-mj") as rec:
         memory = rec.memory_recording()
         set_up(rec, "")
@@ -316,7 +316,7 @@ class Clock:
 def test_a_pace_is_kept() -> None:
     """Twice real time; a tick that took long is made up for, a pause of seconds is not."""
     clock = Clock()
-    pace = Pace(2.0, clock, clock.sleep)
+    pace = RealTimeClock(2.0, clock, clock.sleep)
     clock.now += 5.0  # nothing counts before the start
     pace.start()
     pace.wait(0.1)
@@ -332,7 +332,7 @@ def test_a_pace_is_kept() -> None:
 
 def test_as_fast_as_it_goes_nothing_is_waited_for() -> None:
     clock = Clock()
-    pace = Pace(factor_of("max"), clock, clock.sleep)
+    pace = RealTimeClock(factor_of("max"), clock, clock.sleep)
     pace.wait(1000.0)
     assert clock.slept == []
     assert factor_of("0") == factor_of("max")

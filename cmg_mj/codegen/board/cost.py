@@ -40,7 +40,7 @@ COLUMNS = {
 """Heading -> the figure and how it is printed."""
 
 
-class Ended(Protocol):
+class EndedRun(Protocol):
     """What is needed of a `simulate.Result`, whose room uses MuJoCo and lies below this one."""
 
     @property
@@ -66,7 +66,7 @@ class Run(Protocol):
         """A fresh controller."""
         ...
 
-    def run_on(self, processor: Processor, /) -> Ended:
+    def run_on(self, processor: Processor, /) -> EndedRun:
         """One world, its control decisions taken by a processor."""
         ...
 
@@ -135,7 +135,7 @@ def cost_of(run: Run, controller: Controller | None = None) -> dict[str, Any]:
     }
 
 
-def _steps(board: Board, result: Ended) -> list[Cost]:
+def _steps(board: Board, result: EndedRun) -> list[Cost]:
     """What the observer alone takes, given what the controller around it has been given."""
     if result.outcomes[0].kind == "interrupted":
         raise KeyboardInterrupt

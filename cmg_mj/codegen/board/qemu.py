@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cmg_mj.codegen.board.serial_line import Closed, Line
+from cmg_mj.codegen.board.serial_line import Closed, SerialLine
 from cmg_mj.codegen.board.tools import EMULATOR
 from cmg_mj.controllers.processor import Decision
 from cmg_mj.errors import RunStopped
@@ -88,7 +88,7 @@ class Board:
                 raise RunStopped(f"{EMULATOR} cannot be run: {error.strerror}") from error
         self.close = weakref.finalize(self, _end, self._process, ours)
         self.costs: list[Cost] = []
-        self._line = Line(ours, patience_s)
+        self._line = SerialLine(ours, patience_s)
         try:
             self._told(self._line.await_ready)
             self.sizes = Sizes(*self._ask("i", b"", "<4I"))
@@ -140,7 +140,7 @@ class Board:
         counts, stack, *estimate = self._ask("o", self._packed(y1, y2, acceleration, u), layout)
         return tuple(estimate), self._cost("o", counts, stack)
 
-    def nops(self) -> list[int]:
+    def calibration_counts(self) -> list[int]:
         """How many instructions it counts where there are none, 100 and 1000: that it counts right."""
         nothing, _, hundred, _, thousand, _ = self._ask("c", b"", "<6I")
         return [round((counts - nothing) / self._per_instruction) for counts in (nothing, hundred, thousand)]
@@ -168,9 +168,9 @@ class Board:
         try:
             return of_line(*arguments)
         except Closed as error:
-            raise RunStopped(f"the board is gone: {self._last_words()}") from error
+            raise RunStopped(f"the board is gone: {self._exit_message()}") from error
 
-    def _last_words(self) -> str:
+    def _exit_message(self) -> str:
         with suppress(subprocess.TimeoutExpired):
             status = self._process.wait(1.0)
             assert self._process.stderr is not None

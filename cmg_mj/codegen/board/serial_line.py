@@ -25,7 +25,7 @@ def framed(kind: str, number: int, carried: bytes) -> bytes:
     return FIRST + body + struct.pack("<H", _crc(body))
 
 
-class Line:
+class SerialLine:
     """A serial line with a board at its other end.
 
     Args:

@@ -23,7 +23,7 @@ class Constants(NamedTuple):
         of_measure: Radii, then the gimbals' directions, then their zeros.
         of_law: The period, the gains, the limit.
         trimmed: For how many updates the integrator is trimmed.
-        trim_gain: See `controller.trim_of`.
+        trim_gain: See `integrator_trim`.
         trim_part: Which part of the estimate it is trimmed with.
         gimbals: How many there are.
     """

@@ -11,7 +11,7 @@ from typing import Any
 
 from cmg_mj.codegen.export.c_code import Precision
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.observers.registry import GIVEN
+from cmg_mj.observers.registry import BENCH_PARAMETERS
 
 WIDTH = 110
 """Of its lines."""
@@ -31,7 +31,7 @@ def about(name: str, controller: Controller, precision: Precision) -> str:
     observer = controller.observer
     cls = type(observer)
     first = (inspect.getdoc(cls) or "").split("\n\n")[0]
-    own = [parameter for parameter in inspect.signature(cls).parameters if parameter not in GIVEN]
+    own = [parameter for parameter in inspect.signature(cls).parameters if parameter not in BENCH_PARAMETERS]
     lines = [
         f"{name}: observer and control law, {precision} precision; by cmg_mj {version('cmg_mj')}.",
         "",

@@ -16,7 +16,7 @@ from cmg_mj.codegen.export.example import example, vector
 from cmg_mj.codegen.export.names import files_of, name_of
 from cmg_mj.codegen.export.trace import trace
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.dry_run import rehearse
+from cmg_mj.controllers.dry_run import dry_run_observer
 from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.errors import InputError, raised
 from cmg_mj.results.run_folder.folder import write_text
@@ -70,7 +70,7 @@ def _code(controller: Controller, precision: Precision, name: str) -> Code:
         tried, traced_one = copy.deepcopy(controller.observer), copy.deepcopy(controller.observer)
     except Exception as error:  # a user's observer may hold anything
         raise InputError(f"it cannot be copied: {raised(error)}") from error
-    rehearse(tried, None)
+    dry_run_observer(tried, None)
     constants = constants_of(controller)
     traced = trace(traced_one, constants)
     off = check.check_trace(controller, traced, constants, seeds=(1, 2, 3))

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.codegen.export.source_location import Refused
+from cmg_mj.codegen.export.source_location import NotExportable
 from cmg_mj.elementwise import Symbolic
 
 NUMBERS = (Symbolic, bool, int, float, np.bool_, np.integer, np.floating)
@@ -30,10 +30,10 @@ def numbers(tree: Any, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
     """All numbers of a state, in order.
 
     Raises:
-        Refused: It holds something else.
+        NotExportable: It holds something else.
     """
     if len(path) > DEEPEST:
-        raise Refused(
+        raise NotExportable(
             f"its state goes deeper than {DEEPEST} parts within parts, or holds itself: use a tuple of numbers"
         )
     parts = _parts(tree)
@@ -44,7 +44,7 @@ def numbers(tree: Any, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
         yield Leaf(path, tree)
     elif not isinstance(tree, STAY):
         where = f" ({'.'.join(path)})" if path else ""
-        raise Refused(
+        raise NotExportable(
             f"its state holds a {type(tree).__name__}{where}, for which C has no "
             "place; use numbers, in tuples, lists, dicts, dataclasses or arrays"
         )

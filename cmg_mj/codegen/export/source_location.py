@@ -12,21 +12,21 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 
-_NOT_THE_USERS = (
+_LIBRARY_PATHS = (
     str(Path(__file__).parent),
     str(Path(np.__file__).parent),
     str(Path(__file__).parents[2] / "elementwise"),
 )
 
 
-class Refused(InputError):
+class NotExportable(InputError):
     """Something that has no place in a formula."""
 
 
 def here() -> str:
     """The line that is at work now, the first one below what traces it: `(own.py, line 12: if y1 > 0.1:)`."""
     frame: FrameType | None = sys._getframe(1)
-    while frame is not None and frame.f_code.co_filename.startswith(_NOT_THE_USERS):
+    while frame is not None and frame.f_code.co_filename.startswith(_LIBRARY_PATHS):
         frame = frame.f_back
     return "" if frame is None else _shown(frame.f_code.co_filename, frame.f_lineno)
 
@@ -36,7 +36,7 @@ def raised_at(traceback: TracebackType | None) -> str:
     place = ""
     while traceback is not None:
         file = traceback.tb_frame.f_code.co_filename
-        if not file.startswith(_NOT_THE_USERS):
+        if not file.startswith(_LIBRARY_PATHS):
             place = _shown(file, traceback.tb_lineno)
         traceback = traceback.tb_next
     return place

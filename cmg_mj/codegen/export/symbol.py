@@ -15,7 +15,7 @@ import casadi
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from cmg_mj.codegen.export.source_location import Refused, here
+from cmg_mj.codegen.export.source_location import NotExportable, here
 from cmg_mj.elementwise import Symbolic
 
 OPERATIONS: dict[np.ufunc, int] = {
@@ -85,7 +85,7 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
         if method != "__call__" or kwargs:
-            raise Refused(f"numpy.{ufunc.__name__} with {', '.join(kwargs) or method} {here()}")
+            raise NotExportable(f"numpy.{ufunc.__name__} with {', '.join(kwargs) or method} {here()}")
         if any(isinstance(x, np.ndarray) and x.ndim for x in inputs):
             return np.frompyfunc(partial(_apply, ufunc), ufunc.nin, 1)(*map(_boxed, inputs))
         return _apply(ufunc, *inputs)
@@ -95,16 +95,16 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
             return _where(*args)
         if function is np.clip and len(args) == 3 and not kwargs:
             return np.minimum(np.maximum(args[0], args[1]), args[2])
-        raise Refused(f"numpy.{function.__name__} {here()}: it is not among the functions that can be exported")
+        raise NotExportable(f"numpy.{function.__name__} {here()}: it is not among the functions that can be exported")
 
     def __bool__(self) -> bool:
-        raise Refused(
+        raise NotExportable(
             f"a branch on a value {here()}: the exported C takes the same way always; use cmg_mj.elementwise "
             "(where, clip, sign), or numpy.where"
         )
 
     def _number(self, *_: Any) -> NoReturn:
-        raise Refused(
+        raise NotExportable(
             f"a plain number is asked for {here()}, as by float(), int(), round() or a function of math; use "
             "cmg_mj.elementwise, or numpy's functions"
         )
@@ -133,7 +133,7 @@ def expression(x: Any) -> casadi.SX:
     """CasADi's expression of a symbol or of a plain number.
 
     Raises:
-        Refused: It is neither.
+        NotExportable: It is neither.
     """
     if isinstance(x, np.ndarray) and x.ndim == 0:
         x = x[()]
@@ -141,7 +141,7 @@ def expression(x: Any) -> casadi.SX:
         return x.sx
     if isinstance(x, (bool, int, float, np.bool_, np.integer, np.floating)):
         return casadi.SX(float(x))
-    raise Refused(f"{type(x).__name__} where a real number belongs {here()}")
+    raise NotExportable(f"{type(x).__name__} where a real number belongs {here()}")
 
 
 def _boxed(x: Any) -> Any:
@@ -162,7 +162,7 @@ def _apply(ufunc: np.ufunc, *inputs: Any) -> Symbol:
         return Symbol(expression(inputs[0]))
     operation = OPERATIONS.get(ufunc)
     if operation is None:
-        raise Refused(f"numpy.{ufunc.__name__} {here()}: it is not among the functions that can be exported")
+        raise NotExportable(f"numpy.{ufunc.__name__} {here()}: it is not among the functions that can be exported")
     if ufunc in (np.maximum, np.minimum) and not isinstance(inputs[0], Symbol):
         inputs = inputs[::-1]  # what may be NaN comes first: see `c_code`
     make = casadi.SX.unary if len(inputs) == 1 else casadi.SX.binary

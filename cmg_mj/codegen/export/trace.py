@@ -11,7 +11,7 @@ import casadi
 from cmg_mj.codegen.export.c_identifiers import identifiers
 from cmg_mj.codegen.export.constants import Constants
 from cmg_mj.codegen.export.pytree import form, numbers, rebuilt
-from cmg_mj.codegen.export.source_location import Refused, raised_at
+from cmg_mj.codegen.export.source_location import NotExportable, raised_at
 from cmg_mj.codegen.export.symbol import Symbol, expression
 from cmg_mj.controllers.laws.state_feedback import StateFeedback
 from cmg_mj.errors import raised
@@ -55,7 +55,7 @@ def trace(observer: Observer, constants: Constants) -> Traced:
         The formulas.
 
     Raises:
-        Refused: The observer does what has no place in a formula.
+        NotExportable: The observer does what has no place in a formula.
     """
     with _as_written():
         return Traced(*_observed(observer, _measure(constants)), _law(constants))
@@ -80,13 +80,13 @@ def _observed(
     state = _called("init(y)", lambda: observer.init(Measurement(*first)))
     leaves = list(numbers(state))
     if len(leaves) > MOST_NUMBERS:
-        raise Refused(f"its state holds {len(leaves)} numbers; at most {MOST_NUMBERS} can be exported")
+        raise NotExportable(f"its state holds {len(leaves)} numbers; at most {MOST_NUMBERS} can be exported")
     held = _symbols([f"state {i}" for i in range(len(leaves))])
     before, y, (u,) = rebuilt(state, iter(held)), _symbols(MEASURED), _symbols(["u"])
     after, estimate = _called("step(state, y, u)", lambda: observer.step(before, Measurement(*y), u))
     moved = [expression(leaf.value) for leaf in numbers(after)]
     if form(after) != form(state):
-        raise Refused("its step returns a state that is made otherwise than the one of init")
+        raise NotExportable("its step returns a state that is made otherwise than the one of init")
     shown = [expression(part) for part in estimate]
 
     needed = _needed(held, moved, shown)
@@ -118,7 +118,7 @@ def _function(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX])
     given = [symbol.sx for symbol in inputs]
     made = casadi.Function(name, given, casadi.cse(list(outputs)) if outputs else [], {"allow_free": True})
     if made.has_free():
-        raise Refused(
+        raise NotExportable(
             "it remembers something outside of its state, in self or elsewhere, which C would not have: make it a part "
             "of the state that step returns"
         )
@@ -129,10 +129,10 @@ def _called(what: str, call: Callable[[], Any]) -> Any:
     """Call a user's code with symbols."""
     try:
         return call()
-    except Refused:
+    except NotExportable:
         raise
     except (Exception, SystemExit) as error:
-        raise Refused(f"{what} raised {raised(error)} {raised_at(error.__traceback__)}") from error
+        raise NotExportable(f"{what} raised {raised(error)} {raised_at(error.__traceback__)}") from error
 
 
 def _measure(constants: Constants) -> casadi.Function:

@@ -1,6 +1,6 @@
 """Control laws, one a file."""
 
-from cmg_mj.controllers.laws.protocol import Fed, Law
+from cmg_mj.controllers.laws.protocol import FeedbackState, Law
 from cmg_mj.controllers.laws.registry import LAWS, law_class, make_law
 from cmg_mj.controllers.laws.scaled_gains import scaled_gains
 from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS, StateFeedback, lqr_gains
@@ -8,7 +8,7 @@ from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS, StateFeedback,
 __all__ = [
     "LAWS",
     "TABLE_2_GAINS",
-    "Fed",
+    "FeedbackState",
     "Law",
     "StateFeedback",
     "law_class",

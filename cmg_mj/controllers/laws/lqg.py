@@ -10,7 +10,7 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 from scipy.linalg import expm
 
-from cmg_mj.controllers.laws.protocol import Fed
+from cmg_mj.controllers.laws.protocol import FeedbackState
 from cmg_mj.elementwise import Scalar, clip, where
 from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
 from cmg_mj.observers.kalman import COLUMNS, Kalman
@@ -149,7 +149,7 @@ class Lqg:
         zero = 0.0 * y.y1
         return LqgState(y.y1, zero, y.y2, zero, zero)
 
-    def step(self, state: LqgState, y: Measurement, x: Fed, u: Scalar) -> tuple[LqgState, Scalar]:
+    def step(self, state: LqgState, y: Measurement, x: FeedbackState, u: Scalar) -> tuple[LqgState, Scalar]:
         """Decide on one sample."""
         expected = state[:4]
         gain, ahead, per_torque = self._numbers

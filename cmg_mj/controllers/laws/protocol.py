@@ -10,7 +10,7 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.observers.protocol import Estimate, Measurement
 
 
-class Fed(Estimate):
+class FeedbackState(Estimate):
     """What is fed back to a law: x1 [rad], x2 [rad/s], x3 [rad], floats for one world, arrays (n_worlds,) for many.
 
     x1 and x3 are measured or estimated (`controller.angle_source`), x2 is the observer's, the gyro's or the true one
@@ -24,9 +24,9 @@ class Fed(Estimate):
 _new = tuple.__new__
 
 
-def fed(x1: Scalar, x2: Scalar, x3: Scalar, extra: Sequence[Scalar] = ()) -> Fed:
+def feedback_state(x1: Scalar, x2: Scalar, x3: Scalar, extra: Sequence[Scalar] = ()) -> FeedbackState:
     """Put together what is fed back to a law."""
-    x = _new(Fed, (x1, x2, x3))
+    x = _new(FeedbackState, (x1, x2, x3))
     if extra:
         x.extra = extra
     return x
@@ -63,7 +63,7 @@ class Law(Protocol):
         """The state before the first sample is fed back."""
         ...
 
-    def step(self, state: Any, y: Measurement, x: Fed, u: Scalar) -> tuple[Any, Scalar]:
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Scalar) -> tuple[Any, Scalar]:
         """Decide on one sample.
 
         Args:

@@ -6,7 +6,7 @@ from typing import Any
 
 from cmg_mj.controllers.laws.protocol import Law
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.user_classes import Kind
+from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.sensors.tilt import TiltNoise
 
@@ -16,10 +16,10 @@ LAWS = {
 }
 """Name a user types -> dotted path of the class."""
 
-GIVEN = ("dt", "model", "noise", "rate_limit")
+BENCH_PARAMETERS = ("dt", "model", "noise", "rate_limit")
 """What the bench gives: dt and the limit to every law, the others to those that take them."""
 
-OF_LAWS = Kind("law", "controller", LAWS, GIVEN, {"init": "y", "step": "state, y, x, u"})
+OF_LAWS = UserClassKind("law", "controller", LAWS, BENCH_PARAMETERS, {"init": "y", "step": "state, y, x, u"})
 """How a law is found, checked and made."""
 
 

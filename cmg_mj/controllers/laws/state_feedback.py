@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.laws.protocol import Fed, fed
+from cmg_mj.controllers.laws.protocol import FeedbackState, feedback_state
 from cmg_mj.elementwise import Scalar, clip, where
 from cmg_mj.errors import InputError
 from cmg_mj.observers.protocol import Measurement
@@ -89,7 +89,7 @@ class StateFeedback:
         """Nothing integrated yet."""
         return Integrated(0.0 * y.y1)
 
-    def step(self, state: Integrated, y: Measurement, x: Fed, u: Scalar) -> tuple[Integrated, Scalar]:
+    def step(self, state: Integrated, y: Measurement, x: FeedbackState, u: Scalar) -> tuple[Integrated, Scalar]:
         """Decide on one sample."""
         x1, x2, x3 = x
         (x_e,) = state
@@ -115,5 +115,5 @@ class StateFeedback:
         Returns:
             The gimbal rate u [rad/s] to hold for a period, and x_e at the next tick.
         """
-        state, u = self.step(Integrated(x_e), Measurement(x1, x3), fed(x1, x2, x3), 0.0)
+        state, u = self.step(Integrated(x_e), Measurement(x1, x3), feedback_state(x1, x2, x3), 0.0)
         return u, state.x_e

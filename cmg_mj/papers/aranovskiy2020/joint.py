@@ -9,14 +9,14 @@ from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, level_at, worth_it
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import listed_and
-from cmg_mj.studies.tuning import Level
+from cmg_mj.studies.tuning import NoiseLevelResult
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 ROUNDED = 1.05
 """What printing a parameter to one digit costs: tau = 0.02 stands for 0.015 to 0.025."""
 
 
-def is_best(level: Level) -> bool:
+def is_best(level: NoiseLevelResult) -> bool:
     """Whether the given parameters are the best ones: a tie with the tuned, or as near as rounding."""
     return level.verdict == "tie" or level.ratio.mean <= ROUNDED
 
@@ -26,7 +26,7 @@ class Together(NamedTuple):
 
     push: str
     noise_ug_rthz: float
-    levels: Mapping[str, Level]
+    levels: Mapping[str, NoiseLevelResult]
     """Observer -> what came out."""
 
     @property

@@ -103,6 +103,6 @@ def run_all(
     for rig, (mismatch, size) in zip(rigs[1:], cases, strict=True):
         mismatch.change(rig, size)
     plants = [rig for rig in rigs for _ in range(worlds)]
-    symmetric, *broken = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).groups(len(rigs))
+    symmetric, *broken = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).split(len(rigs))
     kinds = [(mismatch.kind, size) for mismatch, size in cases]
     return Ran(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))

@@ -12,7 +12,7 @@ from cmg_mj.results.intervals import Interval, ratio_interval
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
-from cmg_mj.studies.tuning import Level, Recorded, Study, halves, recorder, tune
+from cmg_mj.studies.tuning import NoiseLevelResult, Recorded, TuningResult, halves, recorder, tune
 
 SEED = 74_000
 WORLDS = 12
@@ -76,7 +76,7 @@ LTV = Tuned("ltv", "(10)", ["Q[1]"], "Q = diag(1, 5e6, 1)", 0.4)
 HOMOGENEOUS = Tuned("homogeneous", "(11)", ["k1", "k2", "alpha"], "[k1, k2, alpha] = [20, 150, 0.85]", 0.45)
 CASES = (LINEAR, LTV, HOMOGENEOUS)
 
-Studies = Mapping[str, Mapping[str, Study]]
+Studies = Mapping[str, Mapping[str, TuningResult]]
 """Words of the push -> observer -> its study."""
 
 
@@ -91,7 +91,7 @@ def study_of(
     worlds: int,
     recorded: Callable[..., Recorded] | None = None,
     on_share: OnShare | None = None,
-) -> Study:
+) -> TuningResult:
     """Tune one observer.
 
     Args:
@@ -119,9 +119,9 @@ def study_of(
 
 def all_studies(
     seed: int, worlds: int, on_share: OnShare, pushes: Sequence[Push] = PUSHES, cases: Sequence[Tuned] = CASES
-) -> dict[str, dict[str, Study]]:
+) -> dict[str, dict[str, TuningResult]]:
     """Tune every observer on the same recordings of every push."""
-    studies: dict[str, dict[str, Study]] = {}
+    studies: dict[str, dict[str, TuningResult]] = {}
     wanted = [each for p in pushes for each in halves(_scenario(cases[0], p, seed), worlds, p.noise_ug_rthz)]
     recorded, done = recorder(wanted, warm_up_s=WARM_UP_S), 0.0
     for push in pushes:
@@ -137,17 +137,17 @@ def all_studies(
     return studies
 
 
-def level_at(study: Study, noise_ug_rthz: float) -> Level:
+def level_at(study: TuningResult, noise_ug_rthz: float) -> NoiseLevelResult:
     """The level of one noise."""
     return next(level for level in study.levels if level.noise_ug_rthz == noise_ug_rthz)
 
 
-def worth_it(level: Level) -> bool:
+def worth_it(level: NoiseLevelResult) -> bool:
     """Whether the tuned observer is closer to the gyro than an estimate of zero, on the held-out worlds."""
     return float(level.rms.mean()) < level.zero_rms
 
 
-def in_the_loop(tried: Sequence[tuple[Tuned, Level, Push]], worlds: int, seed: int) -> list[Interval]:
+def in_the_loop(tried: Sequence[tuple[Tuned, NoiseLevelResult, Push]], worlds: int, seed: int) -> list[Interval]:
     """Velocity RMS error in the closed loop, Table 2's by the tuned, world by world, under that push and noise."""
     runs = []
     for case, level, push in tried:

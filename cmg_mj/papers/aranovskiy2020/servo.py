@@ -78,7 +78,7 @@ def run(worlds: int, seed: int, duration_s: float = DURATION_S) -> Servos:
     for rig, case in zip(rigs, cases, strict=True):
         in_velocity_mode(rig, *case)
     plants = [rig for rig in rigs for _ in range(worlds)]
-    *groups, soft = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).groups(len(rigs))
+    *groups, soft = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).split(len(rigs))
     return Servos(experiment.run_many(worlds), dict(zip(DEADBANDS, groups, strict=True)), soft)
 
 

@@ -15,7 +15,7 @@ from cmg_mj.papers.aranovskiy2020.retuned import (
 )
 from cmg_mj.papers.aranovskiy2020.tuning_procedure import LOOP_SHARE, loops_of, procedure_claim
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.studies.tuning import Level
+from cmg_mj.studies.tuning import NoiseLevelResult
 
 
 def table_2_claim(case: Tuned, studies: Studies, together: Together) -> Claim:
@@ -98,16 +98,16 @@ def _alone(case: Tuned, studies: Studies) -> str:
     )
 
 
-def least_lost(case: Tuned, studies: Studies) -> Level:
+def least_lost(case: Tuned, studies: Studies) -> NoiseLevelResult:
     """The level at which Table 2's line loses least under the first push, that of Figs 5 to 7."""
     return min(next(iter(studies.values()))[case.observer].levels, key=lambda level: level.ratio.mean)
 
 
-def _sizes(level: Level) -> str:
+def _sizes(level: NoiseLevelResult) -> str:
     return ", ".join(f"{name} = {size:.4g}" for name, size in level.sizes.items())
 
 
-def _ratio(level: Level) -> str:
+def _ratio(level: NoiseLevelResult) -> str:
     return f"{level.ratio.mean:.3f} ({level.ratio.low:.3f} to {level.ratio.high:.3f})"
 
 

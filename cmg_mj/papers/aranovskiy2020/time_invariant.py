@@ -11,7 +11,7 @@ from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import listed_and
 from cmg_mj.results.summary_keys import written
-from cmg_mj.simulation.batched_observers import Run, run_side_by_side
+from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 72_002
@@ -92,11 +92,13 @@ def fates_of(
     biases = {"equilibrium_bias_deg": [e for e in biases_deg for _ in range(worlds)]}
     numbers = [*range(worlds)] * len(biases_deg)
     prepared = [push_recovery(observer, seed, settings, duration_s) for observer, settings in observers]
-    results = run_side_by_side([Run(each.varied(biases), numbers) for each in prepared], keep_trajectory=False)
+    results = run_side_by_side(
+        [BatchJob(each.with_varied(biases), numbers) for each in prepared], keep_trajectory=False
+    )
     return [
         {
             e: Fate(float(group.fell.mean()), group.mean("velocity_rms_error_rad_s"))
-            for e, group in zip(biases_deg, result.groups(len(biases_deg)), strict=True)
+            for e, group in zip(biases_deg, result.split(len(biases_deg)), strict=True)
         }
         for result in results
     ]

@@ -59,7 +59,7 @@ def league(
                 "update_us": update_us(kind, motion),
             }
             experiment = push_recovery(kind, seed, [noise, *settings])
-            sigma = experiment.plant.facts.noise(experiment.scenario.sensors).tilt
+            sigma = experiment.plant.parameters.noise(experiment.scenario.sensors).tilt
             floor = velocity_floor(experiment.plant.reduced, experiment.law.dt, sigma)
             results = on_rigs(experiment, worlds, "equilibrium_bias_deg", biases_deg)
             for bias_deg, result in zip(biases_deg, results, strict=True):

@@ -43,7 +43,7 @@ def on_rigs(experiment: Experiment, worlds: int, field: str, values: Sequence[fl
     """
     each = [value for value in values for _ in range(worlds)]
     numbers = [*range(worlds)] * len(values)
-    return experiment.run_many(numbers, vary={field: each}, keep_trajectory=False).groups(len(values))
+    return experiment.run_many(numbers, vary={field: each}, keep_trajectory=False).split(len(values))
 
 
 def gain(before: np.ndarray, after: np.ndarray) -> Interval | None:

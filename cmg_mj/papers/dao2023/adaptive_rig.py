@@ -14,7 +14,7 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.simulation.batched_observers import Run, run_side_by_side
+from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 from cmg_mj.simulation.experiment import prepare
 
 DURATION_S, LATE_S = 10.0, 5.0
@@ -99,7 +99,7 @@ def velocity_errors(
     runs = []
     for name in observers:
         prepared = prepare(without_push(seed, f"observer.kind={name}"))
-        runs.append(Run(prepared.varied({"equilibrium_bias_deg": each}), range(len(each))))
+        runs.append(BatchJob(prepared.with_varied({"equilibrium_bias_deg": each}), range(len(each))))
     return {
         name: errors(result, "velocity_rms_error_rad_s").reshape(len(biases_deg), worlds)
         for name, result in zip(observers, run_side_by_side(runs, keep_trajectory=False), strict=True)

@@ -15,7 +15,7 @@ from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.result import Result
-from cmg_mj.simulation.batched_observers import Run, run_side_by_side
+from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 
 SEED, WORLDS = 83_000, 20
 DURATION_S = 15.0
@@ -57,9 +57,9 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
     cases = len(BIASES_DEG) + 1
     gaps = np.repeat([*[0.0] * len(BIASES_DEG), GAP_ARCMIN], worlds)
     varied = {"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds), "gimbal_backlash_arcmin": gaps}
-    runs = [Run(experiment(settings, name).varied(varied), [*range(worlds)] * cases) for name in OBSERVERS]
+    runs = [BatchJob(experiment(settings, name).with_varied(varied), [*range(worlds)] * cases) for name in OBSERVERS]
     for name, result in zip(OBSERVERS, run_side_by_side(runs), strict=True):
-        *own, gap[name] = result.groups(cases)
+        *own, gap[name] = result.split(cases)
         for e, found in zip(BIASES_DEG, own, strict=True):
             by_bias[e][name] = found
     on_share(0.8)

@@ -12,7 +12,7 @@ from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, experiment, rig_with, servo_of
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.batched_observers import Run, run_side_by_side
+from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 
 RELEASE = (
     *NO_NOISE,
@@ -54,7 +54,7 @@ def releases(servos: Mapping[str, Sequence[Servo]], settings: Sequence[str] = ()
     for observer, own in servos.items():
         prepared = experiment([*RELEASE, FINE, *settings], observer)
         rigs = [replace(prepared, plant=rig_with(prepared.scenario.plant, servo)) for servo in own]
-        runs.append(Run(rigs, range(len(rigs))))
+        runs.append(BatchJob(rigs, range(len(rigs))))
     results = run_side_by_side(runs)
     return {observer: trajectory_of(result) for observer, result in zip(servos, results, strict=True)}
 

@@ -9,7 +9,7 @@ from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.results import markdown
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.studies.tuning import Level, Recorded, halves, recorder, tune
+from cmg_mj.studies.tuning import NoiseLevelResult, Recorded, halves, recorder, tune
 
 SEED, WORLDS = 85_000, 10
 WARM_UP_S = 0.5
@@ -24,7 +24,7 @@ PUSHES: dict[str, tuple[Sequence[str], Sequence[float]]] = {
 }
 """What pushes, and at which noises [ug/sqrt(Hz)]: the same for all three, which were tuned on one recording."""
 
-Tuned = Mapping[str, Mapping[str, Sequence[Level]]]
+Tuned = Mapping[str, Mapping[str, Sequence[NoiseLevelResult]]]
 """Push -> observer -> what came out, one a noise."""
 
 
@@ -40,7 +40,7 @@ def levels_of(
     seed: int,
     noises: Sequence[float],
     recorded: Callable[..., Recorded] | None = None,
-) -> Sequence[Level]:
+) -> Sequence[NoiseLevelResult]:
     """Tune one estimator at several sensor noises, on recordings that `recorded` hands out or that are made."""
     return tune(
         scenario_of(name, settings, seed),
@@ -53,9 +53,11 @@ def levels_of(
     ).levels
 
 
-def tuned(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> dict[str, dict[str, Sequence[Level]]]:
+def tuned(
+    on_share: OnShare, worlds: int = WORLDS, seed: int = SEED
+) -> dict[str, dict[str, Sequence[NoiseLevelResult]]]:
     """Tune all three under both pushes."""
-    found: dict[str, dict[str, Sequence[Level]]] = {push: {} for push in PUSHES}
+    found: dict[str, dict[str, Sequence[NoiseLevelResult]]] = {push: {} for push in PUSHES}
     wanted = [
         each
         for settings, noises in PUSHES.values()
@@ -69,7 +71,7 @@ def tuned(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> dict[str
     return found
 
 
-def none_better(levels: Sequence[Level]) -> bool:
+def none_better(levels: Sequence[NoiseLevelResult]) -> bool:
     """Whether at one noise none of the tuned estimators is better on the held-out seeds than the printed one."""
     return all(level.verdict != "better" for level in levels)
 

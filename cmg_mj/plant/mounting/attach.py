@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.plant.mounting.module import EDGE_M, module
-from cmg_mj.plant.parts import LINE, SENSORS
+from cmg_mj.plant.parts import SENSORS, TILT_ELEMENT
 
 INNER, OUTER = 0.25, 0.75
 """Where the accelerometers sit, between the line and the robot's highest point above it, as on the papers' rig."""
@@ -23,7 +23,7 @@ def cube_names(prefix: str, cubes: int) -> list[str]:
 
 def site_names(prefix: str) -> dict[str, str]:
     """What the sites of an axis are called: the line's, and that of each sensor, which bears its name."""
-    return {name: prefix + name for name in (LINE, *SENSORS)}
+    return {name: prefix + name for name in (TILT_ELEMENT, *SENSORS)}
 
 
 def attach_cubes(
@@ -85,7 +85,7 @@ def add_sensors(
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
     names = site_names(prefix)
-    places = {LINE: 0.0, "accelerometer_inner": INNER, "accelerometer_outer": OUTER, "fog": OUTER}
+    places = {TILT_ELEMENT: 0.0, "accelerometer_inner": INNER, "accelerometer_outer": OUTER, "fog": OUTER}
     for name, share in places.items():
         size = 0.01 * height
         spot = {"size": [size, size, size], "rgba": [0.8, 0.1, 0.5, 1.0] if "acc" in name else [0.1, 0.6, 0.6, 1.0]}

@@ -10,11 +10,11 @@ import mujoco
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import find_axis
-from cmg_mj.plant.parts import KEYFRAME, axes_in, lacks
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, axes_in, missing_parts
 from cmg_mj.plant.tilt_line import HingeLine
 
 
-class Earlier(NamedTuple):
+class ExistingAxes(NamedTuple):
     """Axes that a robot has already."""
 
     lines: Sequence[str]
@@ -27,7 +27,7 @@ class Earlier(NamedTuple):
     """Of their flywheels' motors, by actuator."""
 
 
-def earlier_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, path: Path) -> Earlier:
+def earlier_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, path: Path) -> ExistingAxes:
     """Look for axes that a robot has.
 
     Args:
@@ -44,23 +44,23 @@ def earlier_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, path: Pa
     """
     elements = [element.name for kind in (spec.joints, spec.sites, spec.sensors) for element in kind]
     names = axes_in(elements)
-    if not names or not any(key.name == KEYFRAME for key in spec.keys):
+    if not names or not any(key.name == EQUILIBRIUM_KEY for key in spec.keys):
         taken = [element for element in elements if names and axes_in([element])]
-        taken += [f"keyframe {key.name}" for key in spec.keys if key.name == KEYFRAME]
+        taken += [f"keyframe {key.name}" for key in spec.keys if key.name == EQUILIBRIUM_KEY]
         if taken:
             raise InputError(f"{path}: has an element {taken[0]!r} already, which a mounted pair brings: rename it")
-        return Earlier((), (), {}, {})
-    missing = lacks(spec)
+        return ExistingAxes((), (), {}, {})
+    missing = missing_parts(spec)
     if missing:
         raise InputError(f"{path}: has an axis already, and yet {missing[0]}")
     if not name:
         known = f" {', '.join(filter(None, names))}" if any(names) else ""
         raise InputError(f"{path}: has an axis{known} already: give the new one a name, such as --name pitch")
-    key = model.key(KEYFRAME).id
+    key = model.key(EQUILIBRIUM_KEY).id
     axes = [find_axis(model, key, axis) for axis in names]
     cubes = [cube for axis in axes for cube in axis.cubes]
     lines = [model.joint(axis.line.joint).name for axis in axes if isinstance(axis.line, HingeLine)]
-    return Earlier(
+    return ExistingAxes(
         lines,
         [f"{cube.name}/{joint}" for cube in cubes for joint in ("gimbal", "flywheel")],
         {f"{cube.name}/flywheel": cube.speed for cube in cubes},

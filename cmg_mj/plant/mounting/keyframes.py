@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.plant.mounting.robot import joint_sizes
 from cmg_mj.plant.mounting.servos import at_rest
-from cmg_mj.plant.parts import KEYFRAME
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY
 
 Poses = Mapping[str, np.ndarray]
 """Where each joint stands, by its name."""
@@ -62,10 +62,12 @@ def write_keyframe(
     spec.add_key(name=name, qpos=qpos, qvel=qvel, act=act, ctrl=controls)
 
 
-def taken_out(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[tuple[str, dict[str, np.ndarray]]]:
+def pop_keyframes(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[tuple[str, dict[str, np.ndarray]]]:
     """Take a robot's own keyframes out, before it gets more joints: their names, and where the joints stand."""
     kept = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
-    kept = [(name, poses) for name, poses in kept if name != KEYFRAME]  # of an axis mounted earlier: written anew
+    kept = [
+        (name, poses) for name, poses in kept if name != EQUILIBRIUM_KEY
+    ]  # of an axis mounted earlier: written anew
     for key in list(spec.keys):
         spec.delete(key)
     return kept

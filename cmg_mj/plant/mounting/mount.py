@@ -16,17 +16,17 @@ from cmg_mj.plant.mjcf import compile_model, parse
 from cmg_mj.plant.mounting.attach import add_sensors, attach_cubes, cube_names, site_names
 from cmg_mj.plant.mounting.axes import AxisLike
 from cmg_mj.plant.mounting.clearance import check_room
-from cmg_mj.plant.mounting.existing_axes import Earlier, earlier_axes
+from cmg_mj.plant.mounting.existing_axes import ExistingAxes, earlier_axes
 from cmg_mj.plant.mounting.fall_check import TRIED_DEG, falls_with
 from cmg_mj.plant.mounting.held_joints import Hold, hold_joints
-from cmg_mj.plant.mounting.keyframes import Poses, as_qpos, poses_of, taken_out, write_keyframe
-from cmg_mj.plant.mounting.mounted import Mounted
+from cmg_mj.plant.mounting.keyframes import Poses, as_qpos, pop_keyframes, poses_of, write_keyframe
+from cmg_mj.plant.mounting.mounted import MountedRobot
 from cmg_mj.plant.mounting.physics_options import set_options
-from cmg_mj.plant.mounting.request import Asked
+from cmg_mj.plant.mounting.request import MountRequest
 from cmg_mj.plant.mounting.robot import body_of, check_chains, check_names, free_base, pose_of, read_robot
 from cmg_mj.plant.mounting.stance import axes_along, check_unturned, find_place, posed, stand_upright, under_and_height
-from cmg_mj.plant.mujoco_state import control_callback, quiet
-from cmg_mj.plant.parts import KEYFRAME
+from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY
 
 
 @quiet()
@@ -43,7 +43,7 @@ def mount(
     hold: Hold = "constraints",
     free: Sequence[str] = (),
     base: str = "as_is",
-) -> Mounted:
+) -> MountedRobot:
     """Mount control moment gyroscopes on a robot, so that they balance it about one axis.
 
     Args:
@@ -66,12 +66,12 @@ def mount(
     Raises:
         InputError: The robot, or what is asked for, does not admit it; why, in one line.
     """
-    asked = Asked(body, axis, at, cubes, scale, name, keyframe, hold, free, base)
-    with control_callback(None):
-        return _mounted(*read_robot(robot), asked)
+    asked = MountRequest(body, axis, at, cubes, scale, name, keyframe, hold, free, base)
+    with set_control_callback(None):
+        return _mount_on_spec(*read_robot(robot), asked)
 
 
-def _mounted(spec: mujoco.MjSpec, path: Path, asked: Asked) -> Mounted:
+def _mount_on_spec(spec: mujoco.MjSpec, path: Path, asked: MountRequest) -> MountedRobot:
     """The robot's model, which is changed, with the pair on it."""
     body = body_of(spec, asked.body, path)
     check_chains(spec, path)
@@ -87,12 +87,12 @@ def _mounted(spec: mujoco.MjSpec, path: Path, asked: Asked) -> Mounted:
     )
 
     # The robot as it is to stand.
-    keyframe = asked.keyframe or (KEYFRAME if earlier.drives else None)
+    keyframe = asked.keyframe or (EQUILIBRIUM_KEY if earlier.drives else None)
     pose = pose_of(model, keyframe, path)
     place = find_place(model, pose, asked, path)
     if place.joint in earlier.lines:
         raise InputError(f"{path}: the hinge {place.joint!r} has an axis already: another one needs another hinge")
-    own = taken_out(spec, model)
+    own = pop_keyframes(spec, model)
     held = hold_joints(spec, model, pose, asked.hold, {place.joint, *earlier.lines, *earlier.drives}, asked.free, path)
 
     # With the modules on it.
@@ -112,10 +112,10 @@ def _mounted(spec: mujoco.MjSpec, path: Path, asked: Asked) -> Mounted:
     turn, origin = data.xmat[frame].reshape(3, 3), data.xpos[frame]
     add_sensors(spec, body, asked.prefix, turn.T @ (under - origin), turn.T @ axes_along(direction), height)
     model = _with_keyframes(spec, names, qpos, [(name, poses | gimbals) for name, poses in own], earlier, path)
-    key = model.key(KEYFRAME).id
+    key = model.key(EQUILIBRIUM_KEY).id
     if not falls_with(model, key, find_axis(model, key, asked.name).line):
         raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: it stands by itself")
-    return Mounted(spec, path, tuple(held), tuple(notes))
+    return MountedRobot(spec, path, tuple(held), tuple(notes))
 
 
 def _with_keyframes(
@@ -123,7 +123,7 @@ def _with_keyframes(
     names: Sequence[str],
     qpos: np.ndarray,
     own: Sequence[tuple[str, Poses]],
-    earlier: Earlier,
+    earlier: ExistingAxes,
     path: Path,
 ) -> mujoco.MjModel:
     """The model compiled with a keyframe in which the robot stands and all flywheels turn, and with the robot's own."""
@@ -132,7 +132,7 @@ def _with_keyframes(
     speeds = {f"{cube}/flywheel": speed * (-1.0) ** i for i, cube in enumerate(names)}
     controls = {f"{wheel}_motor": speed for wheel, speed in speeds.items()}
     speeds, controls = {**earlier.speeds, **speeds}, {**earlier.controls, **controls}
-    write_keyframe(spec, model, KEYFRAME, qpos, speeds, controls)
+    write_keyframe(spec, model, EQUILIBRIUM_KEY, qpos, speeds, controls)
     for name, poses in own:
         write_keyframe(spec, model, name, as_qpos(model, poses), speeds, controls)
     return compile_model(spec, path)
@@ -142,4 +142,4 @@ def nominal_speed() -> float:
     """At which the papers' flywheels turn [rad/s]."""
     rig = parse(folder("models") / "scissored_pair.xml")
     names = [actuator.name for actuator in rig.actuators]
-    return abs(float(rig.key(KEYFRAME).ctrl[names.index("cube1/flywheel_motor")]))
+    return abs(float(rig.key(EQUILIBRIUM_KEY).ctrl[names.index("cube1/flywheel_motor")]))

@@ -17,7 +17,7 @@ from cmg_mj.results.trajectory import whole_file
 
 
 @dataclass(frozen=True)
-class Mounted:
+class MountedRobot:
     """A robot with a pair on it.
 
     Attributes:

@@ -18,7 +18,7 @@ BASES = "as_is", "free"
 
 
 @dataclass(frozen=True)
-class Asked:
+class MountRequest:
     """The arguments of `mount`, which says what they mean."""
 
     body: str

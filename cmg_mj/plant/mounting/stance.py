@@ -16,7 +16,7 @@ from cmg_mj.plant.mjcf import compile_model
 from cmg_mj.plant.mounting.attach import place_cubes
 from cmg_mj.plant.mounting.axes import hinge_or_direction
 from cmg_mj.plant.mounting.keyframes import as_qpos
-from cmg_mj.plant.mounting.request import Asked
+from cmg_mj.plant.mounting.request import MountRequest
 from cmg_mj.plant.mounting.settling import UP, Support, stand
 
 SMALLEST_HEIGHT_M = 1e-3
@@ -37,7 +37,7 @@ class Place(NamedTuple):
     """Of the row of modules, in the body's frame, (3,) [m]."""
 
 
-def find_place(model: mujoco.MjModel, pose: np.ndarray, asked: Asked, path: Path) -> Place:
+def find_place(model: mujoco.MjModel, pose: np.ndarray, asked: MountRequest, path: Path) -> Place:
     """Look up what is asked for on a robot.
 
     Args:
@@ -67,7 +67,7 @@ def stand_upright(
     place: Place,
     mounts: Sequence[mujoco.MjsFrame],
     others: Sequence[str],
-    asked: Asked,
+    asked: MountRequest,
     path: Path,
 ) -> tuple[mujoco.MjModel, Support]:
     """Place the modules along the line, and stand the robot up with them.

@@ -22,7 +22,7 @@ FARTHEST_M = 10.0
 """Of an accelerometer from the pivot: nothing so large is balanced, and millimetres taken as metres are larger [m]."""
 
 
-def radial(found: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:
+def accelerometer_geometry(found: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:
     """Where the accelerometers are."""
     if "inner_x" not in found:
         if radii is not None:

@@ -10,7 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.replay.logs.checks import check_assumed, check_motion, check_numbers, check_sizes, radial, windows_inside
+from cmg_mj.replay.logs.checks import (
+    accelerometer_geometry,
+    check_assumed,
+    check_motion,
+    check_numbers,
+    check_sizes,
+    windows_inside,
+)
 from cmg_mj.replay.logs.columns import ACCELEROMETERS, Column, columns_of
 from cmg_mj.replay.logs.from_run import of_trajectory
 from cmg_mj.replay.logs.log import REFERENCE, Log
@@ -72,7 +79,7 @@ def read_log(
                 raise InputError(f"{option}: {path} is a run's own recording; read it with --columns for that")
         return log if not windows_s else replace(log, windows=windows_inside(path, windows_s, log["time_s"]))
     found = columns_of(columns, units, scale, offset)
-    tilt = radial(found, radii_m)
+    tilt = accelerometer_geometry(found, radii_m)
     if not math.isfinite(delay_s):
         raise InputError(f"--delay {delay_s:g}: must be a finite number of seconds")
     if delay_s and "rate" not in found:

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmg_mj.replay.logs.tilt_acceleration import beside
+from cmg_mj.replay.logs.tilt_acceleration import second_derivative_pairs
 from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY
 from cmg_mj.sensors.tilt import RadialTilt
 
@@ -48,7 +48,7 @@ def interchanged(
 
 def _agreement(tilt: np.ndarray, acceleration: np.ndarray, parts: Sequence[slice], dt: float) -> float | None:
     """2 sum(a b) / sum(a^2 + b^2) of the acceleration a and the tilt's second derivative b, weighted over stretches."""
-    found = beside(tilt, acceleration, parts, dt)
+    found = second_derivative_pairs(tilt, acceleration, parts, dt)
     if found is None:
         return None
     a, b = found

@@ -16,7 +16,7 @@ FEWEST = 20
 """So many stretches there must be."""
 
 
-def beside(
+def second_derivative_pairs(
     tilt: np.ndarray, acceleration: np.ndarray, parts: Sequence[slice], dt: float
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Both over the stretches of a log.

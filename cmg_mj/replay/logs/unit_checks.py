@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from cmg_mj.replay.logs.columns import Column
-from cmg_mj.replay.logs.tilt_acceleration import beside
+from cmg_mj.replay.logs.tilt_acceleration import second_derivative_pairs
 from cmg_mj.replay.logs.units import in_si, unit_of_factor
 from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY
 from cmg_mj.sensors.tilt import RadialTilt
@@ -83,7 +83,7 @@ def beside_the_tilt(
     Returns:
         None if it agrees, or if that cannot be told.
     """
-    compared = beside(tilt, acceleration, parts, dt)
+    compared = second_derivative_pairs(tilt, acceleration, parts, dt)
     if compared is None:
         return None
     a, b = (values - values.mean() for values in compared)

@@ -18,7 +18,7 @@ Writers = Mapping[str, Callable[[Path], None]]
 """Name of a file -> what writes it to the path given."""
 
 
-class Taken(InputError):
+class FolderInUse(InputError):
     """A folder that is there, but not for this run: another writes to it, or a user's file would be written over."""
 
 
@@ -40,7 +40,7 @@ class RunFolder:
             names: What will be written, as far as it is known.
 
         Raises:
-            Taken: Another run writes to it, or one of the names is that of a file that cmg_mj has not written.
+            FolderInUse: Another run writes to it, or one of the names is that of a file that cmg_mj has not written.
             InputError: It cannot be made or written.
         """
         self.path = path
@@ -55,7 +55,7 @@ class RunFolder:
             self._refuse(names)
         except Busy:
             self.release()
-            raise Taken(f"--out {path}: another run is writing to it") from None
+            raise FolderInUse(f"--out {path}: another run is writing to it") from None
         except OSError as error:
             self.release()
             raise InputError(f"--out {path}: cannot be written: {error.strerror}") from error
@@ -68,7 +68,7 @@ class RunFolder:
         theirs = sorted(set(users_files(self._folder)) & set(names))
         if theirs:
             are = "is" if len(theirs) == 1 else "are"
-            raise Taken(
+            raise FolderInUse(
                 f"--out {self.path}: {', '.join(theirs)} there {are} not as cmg-mj wrote it, and would be lost: move "
                 "it, or name another folder"
             )
@@ -139,7 +139,7 @@ class RunFolder:
         """Put what may not take the folder's place into a folder in it."""
         for number in itertools.count(1):
             name = ASIDE if number == 1 else f"{ASIDE}-{number}"
-            with suppress(Taken), RunFolder(self.path / name) as aside:
+            with suppress(FolderInUse), RunFolder(self.path / name) as aside:
                 if aside._has_room_for(manifest):
                     assert aside._lock is not None
                     swap_in(new, aside._folder, aside._lock)
@@ -206,7 +206,7 @@ def unused_folder(
     for number in itertools.count(1):
         folder = parent / (name if number == 1 else f"{name}-{number}")
         if not os.path.lexists(folder) or _is_unused(folder) or _is_of(folder / asked, asked_toml):
-            with suppress(Taken):
+            with suppress(FolderInUse):
                 return RunFolder(folder, names)
     raise AssertionError("count() does not end")
 

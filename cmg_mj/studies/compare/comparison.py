@@ -13,22 +13,22 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import NESTED, finite
 from cmg_mj.scenario.schema import CompareSettings, Scenario
-from cmg_mj.simulation.experiment import Experiment, load_rig, prepare
+from cmg_mj.simulation.experiment import Experiment, load_scenario_plant, prepare
 
 
 @dataclasses.dataclass(frozen=True)
-class Compared:
+class ComparedObserver:
     """One observer's part in a comparison.
 
     Attributes:
         experiment: The scenario with this observer in the loop.
         result: All worlds, without trajectories.
-        example: World 0 once more, with its trajectory.
+        world_0: World 0 once more, with its trajectory.
     """
 
     experiment: Experiment
     result: Result
-    example: Result
+    world_0: Result
 
     @property
     def kind(self) -> str:
@@ -80,7 +80,7 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
     Raises:
         InputError: An observer does not exist, or something does not fit.
     """
-    plant = load_rig(scenario)
+    plant = load_scenario_plant(scenario)
     experiments = [prepare(_untrimmed(scenario.with_observer(kind), plant), plant) for kind in observers]
     for experiment in experiments:
         experiment.rehearse(worlds=2)
@@ -90,7 +90,7 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
 def _untrimmed(scenario: Scenario, plant: Plant) -> Scenario:
     """The same without trimming the integrator, if the observer does not estimate the bias that takes."""
     controller, sensors = scenario.controller, scenario.sensors
-    given = 1.0 / controller.rate_hz, plant.reduced, plant.facts.noise(sensors)
+    given = 1.0 / controller.rate_hz, plant.reduced, plant.parameters.noise(sensors)
     if not controller.bias_trim_s or BIAS in extra_signals(scenario.observer.make(*given)):
         return scenario
     return scenario.model_copy(update={"controller": controller.model_copy(update={"bias_trim_s": 0.0})})
@@ -98,7 +98,7 @@ def _untrimmed(scenario: Scenario, plant: Plant) -> Scenario:
 
 def compare(
     experiments: Sequence[Experiment], worlds: int, on_progress: Callable[[float], None] | None = None
-) -> list[Compared]:
+) -> list[ComparedObserver]:
     """Run every experiment in many worlds, and the first world once more with its trajectory.
 
     Args:
@@ -123,7 +123,7 @@ def compare(
         example = experiment.run(on_progress=lambda time, report=report, end=duration: report(end))
         if example.outcomes[0].kind == "interrupted":
             break
-        compared.append(Compared(experiment, result, example))
+        compared.append(ComparedObserver(experiment, result, example))
     return compared
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import KEYS
 from cmg_mj.results.trajectory import whole_file
-from cmg_mj.studies.compare.comparison import Compared
-from cmg_mj.studies.compare.statistics import Row, rows_of
+from cmg_mj.studies.compare.comparison import ComparedObserver
+from cmg_mj.studies.compare.statistics import ComparisonRow, comparison_rows
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
-from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import pyplot
 
 COLUMNS = 3
@@ -26,7 +26,7 @@ FAR_OUT = 3.0
 """On other axes, what lies so many quartile ranges of the observers' means outside them is drawn at the edge."""
 
 
-def plot_worlds(path: Path, compared: Sequence[Compared], title: str) -> None:
+def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) -> None:
     """Draw a panel a figure, with the observers on one axis: every world, the mean and its 95 % interval.
 
     Worlds that did not stand to the end are crosses, at what the figure was until then; the mean is without them.
@@ -37,7 +37,7 @@ def plot_worlds(path: Path, compared: Sequence[Compared], title: str) -> None:
         title: Of the scenario.
     """
     plt = pyplot()
-    rows = rows_of(compared)
+    rows = comparison_rows(compared)
     drawn = {key: panel for key in KEYS if KEYS[key].compared and (panel := _Panel(key, rows)).any}
     down = -(-len(drawn) // COLUMNS)
     size = (12.0, 1.2 + down * (0.9 + 0.22 * len(rows)))
@@ -47,7 +47,7 @@ def plot_worlds(path: Path, compared: Sequence[Compared], title: str) -> None:
     for axes, panel in zip(grid.flat, drawn.values(), strict=False):
         panel.draw(axes)
     first = grid.flat[0]
-    names = shortened([row.name for row in rows])
+    names = short_names([row.name for row in rows])
     first.set_yticks(range(len(rows)), [_label(row, names[row.name]) for row in rows])
     first.invert_yaxis()  # shared: the table's order in every panel
     worlds = len(rows[0].entry.result.outcomes)
@@ -61,7 +61,7 @@ def plot_worlds(path: Path, compared: Sequence[Compared], title: str) -> None:
     plt.close(figure)
 
 
-def _label(row: Row, name: str) -> str:
+def _label(row: ComparisonRow, name: str) -> str:
     """A row's name, and how many worlds did not stand."""
     lost = int((~row.entry.result.stood).sum())
     return f"{name} ({lost} lost)" if lost and not row.reference else name
@@ -74,7 +74,7 @@ class _Panel:
         any: Whether any world has it.
     """
 
-    def __init__(self, key: str, rows: Sequence[Row]) -> None:
+    def __init__(self, key: str, rows: Sequence[ComparisonRow]) -> None:
         self.key = key
         self.stood = [row.values(key) for row in rows]
         self.lost = [_until_the_end(row, key) for row in rows]
@@ -139,7 +139,7 @@ def _ticks(low: float, high: float) -> list[float]:
     return [tick for decade in decades for first in few if low <= (tick := float(f"{first}e{decade}")) <= high]
 
 
-def _until_the_end(row: Row, key: str) -> np.ndarray:
+def _until_the_end(row: ComparisonRow, key: str) -> np.ndarray:
     """A figure of the worlds that did not stand to the end, (n_worlds,); NaN for the others."""
     figures = [world.get(key) for world in row.entry.result.rows(row.reference)]
     values = np.array([np.nan if figure is None else figure for figure in figures], dtype=float)

@@ -12,7 +12,7 @@ from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.per_world_table import as_table
 from cmg_mj.results.summary_keys import KEYS, finite
-from cmg_mj.studies.compare.comparison import Compared, spread_of
+from cmg_mj.studies.compare.comparison import ComparedObserver, spread_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -21,7 +21,7 @@ PUSH_ERROR, ERROR = "velocity_rms_error_push_rad_s", "velocity_rms_error_rad_s"
 
 
 @dataclass(frozen=True)
-class Row:
+class ComparisonRow:
     """One row of a comparison.
 
     Attributes:
@@ -29,7 +29,7 @@ class Row:
         reference: What rode along there, if the row is not the observer's own.
     """
 
-    entry: Compared
+    entry: ComparedObserver
     reference: str | None = None
 
     @property
@@ -45,7 +45,10 @@ class Row:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The means, as of `Compared.summary`; None for what a reference does not have, since it closes no loop."""
+        """The means, as of `ComparedObserver.summary`.
+
+        None for what a reference does not have, since it closes no loop.
+        """
         own = self.entry.summary
         if self.reference is None:
             return own
@@ -64,25 +67,25 @@ class Row:
         )
 
 
-def best(compared: Sequence[Compared], key: str) -> Compared | None:
+def best_observer(compared: Sequence[ComparedObserver], key: str) -> ComparedObserver | None:
     """The observer with the best mean of a figure, among those that stood in the most worlds; None if none has one."""
     most = max(entry.result.stood.sum() for entry in compared)
     sign = -1.0 if KEYS[key].better == "more" else 1.0
-    means = [(_mean(Row(entry).values(key)), entry) for entry in compared if entry.result.stood.sum() == most]
+    means = [(_mean(ComparisonRow(entry).values(key)), entry) for entry in compared if entry.result.stood.sum() == most]
     known = [(sign * mean, entry) for mean, entry in means if mean is not None]
     return min(known, key=lambda pair: pair[0])[1] if known else None
 
 
-def rows_of(compared: Sequence[Compared]) -> list[Row]:
+def comparison_rows(compared: Sequence[ComparedObserver]) -> list[ComparisonRow]:
     """The rows of a comparison: every observer, then the references on the motion of the best of them.
 
     The best is the one with the least error in the push window, or over the whole run if there is no push.
     """
-    leader = best(compared, PUSH_ERROR) or best(compared, ERROR)
-    return [*map(Row, compared), *(Row(leader, name) for name in REFERENCES if leader)]
+    leader = best_observer(compared, PUSH_ERROR) or best_observer(compared, ERROR)
+    return [*map(ComparisonRow, compared), *(ComparisonRow(leader, name) for name in REFERENCES if leader)]
 
 
-def standings(compared: Sequence[Compared]) -> list[dict[str, Any]]:
+def standings(compared: Sequence[ComparedObserver]) -> list[dict[str, Any]]:
     """What `cmg-mj compare --json` prints.
 
     Args:
@@ -92,25 +95,29 @@ def standings(compared: Sequence[Compared]) -> list[dict[str, Any]]:
         For each row its means; `intervals`: key -> ends of the mean's 95 % interval; `minus_best`: key -> how much more
         it is than that of the best observer in this figure, over the worlds in which both have it, with its interval.
     """
-    rows = rows_of(compared)
+    rows = comparison_rows(compared)
     keys = [key for entry in compared for key in entry.summary if key in KEYS and key in entry.result.summaries[0]]
     keys = list(dict.fromkeys(keys))
-    leaders = {key: Row(leader) for key in keys if KEYS[key].better and (leader := best(compared, key))}
+    leaders = {
+        key: ComparisonRow(leader) for key in keys if KEYS[key].better and (leader := best_observer(compared, key))
+    }
     return [
         finite(
             row.summary
             | {
                 "intervals": {key: _ends(row.values(key)) for key in keys},
-                "minus_best": {key: _less(row, leader, key) for key, leader in leaders.items() if row != leader},
+                "minus_best": {
+                    key: _paired_difference(row, leader, key) for key, leader in leaders.items() if row != leader
+                },
             }
         )
         for row in rows
     ]
 
 
-def worlds_table(compared: Sequence[Compared]) -> pa.Table:
+def worlds_table(compared: Sequence[ComparedObserver]) -> pa.Table:
     """Every world of every row of a comparison, as `Result.table` has them."""
-    return as_table(world for row in rows_of(compared) for world in row.entry.result.rows(row.reference))
+    return as_table(world for row in comparison_rows(compared) for world in row.entry.result.rows(row.reference))
 
 
 def _mean(values: np.ndarray) -> float | None:
@@ -123,7 +130,7 @@ def _ends(values: np.ndarray) -> list[float] | None:
     return None if interval is None else [interval.low, interval.high]
 
 
-def _less(row: Row, leader: Row, key: str) -> dict[str, Any]:
+def _paired_difference(row: ComparisonRow, leader: ComparisonRow, key: str) -> dict[str, Any]:
     """A figure less the best observer's, world by world."""
     differences = row.values(key) - leader.values(key)
     return {

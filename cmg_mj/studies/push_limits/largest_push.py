@@ -12,7 +12,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import common_period
-from cmg_mj.sensors.ideal import Ideal
+from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
@@ -26,17 +26,17 @@ AFTER_TIME_CONSTANTS = 10.0
 """Of the rig's unstable pole: until then it has recovered or fallen."""
 
 
-class Bearable(NamedTuple):
+class PushMargin(NamedTuple):
     """What a controller bears."""
 
-    impulse: float
+    median_impulse: float
     """E: the largest impulse about the line, as a push of 0.1 s, that it recovers from, the median of ten worlds
     [N m s]. 0 if it falls without one."""
-    least: float
+    worst_impulse: float
     """That of the worst of the worlds [N m s]."""
 
 
-def bearable(scenario: Scenario, made: Design) -> Bearable:
+def bearable(scenario: Scenario, made: Design) -> PushMargin:
     """Find what the law, the observer and the sensors of a scenario bear together.
 
     The rig is the reduced model (4), upright, its gimbals turning as they are told.
@@ -48,26 +48,28 @@ def bearable(scenario: Scenario, made: Design) -> Bearable:
     Returns:
         What they bear.
     """
-    low, high = 0.0, 1.5 * ceiling(made.rig.reduced, made.law.rate_limit).push(PUSH_S)
-    borne = _borne(scenario, made, np.linspace(low, high, LEVELS))
+    low, high = 0.0, 1.5 * ceiling(made.rig.reduced, made.law.rate_limit).push_impulse(PUSH_S)
+    borne = _largest_push(scenario, made, np.linspace(low, high, LEVELS))
     if borne is None:
-        return Bearable(0.0, 0.0)
+        return PushMargin(0.0, 0.0)
     step = high / (LEVELS - 1)
-    finer = _borne(scenario, made, np.linspace(max(borne.least - step, 0.0), borne.impulse + step, LEVELS))
+    finer = _largest_push(
+        scenario, made, np.linspace(max(borne.worst_impulse - step, 0.0), borne.median_impulse + step, LEVELS)
+    )
     return finer or borne
 
 
-def _borne(scenario: Scenario, made: Design, impulses: np.ndarray) -> Bearable | None:
+def _largest_push(scenario: Scenario, made: Design, impulses: np.ndarray) -> PushMargin | None:
     """Of each world the largest of some pushes up to which it stood; None if most fell with the first."""
-    stood = _stood(scenario, made, impulses)
+    stood = _stands(scenario, made, impulses)
     upto = np.where(stood.all(axis=1), len(impulses), np.argmin(stood, axis=1)) - 1  # per world
     if np.median(upto) < 0:
         return None
     largest = np.where(upto < 0, 0.0, impulses[np.maximum(upto, 0)])
-    return Bearable(float(np.median(largest)), float(largest.min()))
+    return PushMargin(float(np.median(largest)), float(largest.min()))
 
 
-def _stood(scenario: Scenario, made: Design, impulses: np.ndarray) -> np.ndarray:
+def _stands(scenario: Scenario, made: Design, impulses: np.ndarray) -> np.ndarray:
     """Which worlds stood which pushes, (WORLDS, n_impulses)."""
     model, tilt = made.rig.reduced, made.rig.tilt
     numbers = np.repeat(np.arange(WORLDS), len(impulses)).tolist()
@@ -94,15 +96,15 @@ def _stood(scenario: Scenario, made: Design, impulses: np.ndarray) -> np.ndarray
     x = np.zeros((3, len(numbers)))
     fallen = np.zeros(len(numbers), dtype=bool)
     fall = math.radians(scenario.metrics.fall_angle_deg)
-    beat = controller.beat
+    beat = controller.steps_per_sample
     with np.errstate(all="ignore"):
         for step in range(0, steps, beat):
             push = torque if step in pushed else np.zeros_like(torque)
-            held = np.zeros_like(torque) if controller.turning is None else np.asarray(controller.turning)
+            held = np.zeros_like(torque) if controller.gimbal_rate is None else np.asarray(controller.gimbal_rate)
             ideal = _ideal(model, tilt, made.rig.gravity, x, held, push)
             if controller.update(step, ideal):
-                held = np.asarray(controller.turning)
-            x = _advanced(model, x, held, push, beat * h)
+                held = np.asarray(controller.gimbal_rate)
+            x = _rk4_step(model, x, held, push, beat * h)
             fallen |= ~(np.abs(x[0]) < fall)
             x[:, fallen] = 0.0
     return ~fallen.reshape(WORLDS, len(impulses))
@@ -114,7 +116,7 @@ def _slope(model: ReducedModel, x: np.ndarray, u: np.ndarray, push: np.ndarray) 
     return np.stack([x2, acceleration, u])
 
 
-def _advanced(model: ReducedModel, x: np.ndarray, u: np.ndarray, push: np.ndarray, h: float) -> np.ndarray:
+def _rk4_step(model: ReducedModel, x: np.ndarray, u: np.ndarray, push: np.ndarray, h: float) -> np.ndarray:
     """A step of RK4 with the command and the push held."""
     k1 = _slope(model, x, u, push)
     k2 = _slope(model, x + 0.5 * h * k1, u, push)
@@ -125,7 +127,7 @@ def _advanced(model: ReducedModel, x: np.ndarray, u: np.ndarray, push: np.ndarra
 
 def _ideal(
     model: ReducedModel, tilt: RadialTilt, gravity: float, x: np.ndarray, u: np.ndarray, push: np.ndarray
-) -> Ideal:
+) -> IdealReading:
     """What perfect sensors show on a rigid body that tilts about a fixed line."""
     x1, x2, x3 = x
     alpha = _slope(model, x, u, push)[1]
@@ -136,4 +138,4 @@ def _ideal(
             for part in (r * alpha - gravity * np.sin(x1), gravity * np.cos(x1) - r * x2 * x2)
         ]
     )
-    return Ideal(forces, [x3.copy()] * model.gimbals, x2.copy(), x2.copy())
+    return IdealReading(forces, [x3.copy()] * model.gimbals, x2.copy(), x2.copy())

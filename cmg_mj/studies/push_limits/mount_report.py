@@ -9,7 +9,7 @@ from typing import Any
 
 import tomli_w
 
-from cmg_mj.plant.mounting.mounted import Mounted
+from cmg_mj.plant.mounting.mounted import MountedRobot
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.results.trajectory import whole_file
@@ -59,14 +59,14 @@ def scenario_text(model: str, robot: Path, observer: str, can: Prospects | None,
     if axis:
         fields["plant"]["initial_tilt_deg"] = 0.0
         fields["axes"] = {axis: {"plant": start}}
-    if can and can.bears.impulse:
-        torque = float(f"{SHARE_OF_BORNE * can.bears.impulse / PUSH_S:.3g}")
+    if can and can.push_margin.median_impulse:
+        torque = float(f"{SHARE_OF_BORNE * can.push_margin.median_impulse / PUSH_S:.3g}")
         of_axis = {"axis": axis} if axis else {}
         fields["push"] = [{**of_axis, "start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}]
     return tomli_w.dumps(fields)
 
 
-def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -> Iterator[str]:
+def mount_report_lines(mounted: MountedRobot, plant: Plant, can: Prospects, enough: float | None) -> Iterator[str]:
     """What was done, and what the pair can do there, line by line.
 
     Args:
@@ -98,7 +98,7 @@ def told(mounted: Mounted, plant: Plant, can: Prospects, enough: float | None) -
     )
     yield (
         f"  this one: bears a push of {figures['push_margin_torque_n_m']:.3g} N m for {PUSH_S:g} s (E = "
-        f"{figures['push_margin_impulse_n_m_s']:.3g} N m s, {can.share:.0%} of that)"
+        f"{figures['push_margin_impulse_n_m_s']:.3g} N m s, {can.fraction_of_limit:.0%} of that)"
     )
     if enough is not None:
         yield f"  a pair of this size recovers less than {LOW_CEILING_DEG:g} deg: --scale {enough:g} suffices"

@@ -11,10 +11,10 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.mounting.fall_check import falls_with
 from cmg_mj.plant.mounting.request import SCALES
-from cmg_mj.plant.mujoco_state import control_callback, quiet
+from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.studies.push_limits.largest_push import PUSH_S, Bearable, bearable
-from cmg_mj.studies.push_limits.recoverable_states import Ceiling, ceiling
+from cmg_mj.studies.push_limits.largest_push import PUSH_S, PushMargin, bearable
+from cmg_mj.studies.push_limits.recoverable_states import RecoverableLimit, ceiling
 
 LOW_CEILING_DEG = 2.0
 """A pair that recovers less tilt is too small for the robot [deg]."""
@@ -29,24 +29,24 @@ class Prospects:
     Attributes:
         reduced: The reduced model read off.
         ceiling: For any controller.
-        bears: What the law, the observer and the sensors of the scenario bear.
+        push_margin: What the law, the observer and the sensors of the scenario bear.
         pole: The rate at which the simulated robot starts to fall with nothing controlled, its flywheels at rest [1/s].
     """
 
     reduced: ReducedModel
-    ceiling: Ceiling
-    bears: Bearable
+    ceiling: RecoverableLimit
+    push_margin: PushMargin
     pole: float
 
     @property
     def ceiling_push(self) -> float:
         """The impulse of the largest push of 0.1 s that any controller recovers from [N m s]: E cannot exceed it."""
-        return self.ceiling.push(PUSH_S)
+        return self.ceiling.push_impulse(PUSH_S)
 
     @property
-    def share(self) -> float:
+    def fraction_of_limit(self) -> float:
         """E in shares of that."""
-        return self.bears.impulse / self.ceiling_push
+        return self.push_margin.median_impulse / self.ceiling_push
 
     @property
     def hints(self) -> list[str]:
@@ -59,7 +59,7 @@ class Prospects:
                 f"{self.ceiling.pole:.3g}: what it stands on gives way (soft contacts, or joints held softly), or "
                 "the hinge that it tilts about has a spring or damping"
             )
-        if self.bears.impulse == 0.0:
+        if self.push_margin.median_impulse == 0.0:
             hints.append("with this controller it falls without a push")
         return hints
 
@@ -76,10 +76,10 @@ class Prospects:
             "ceiling_tilt_deg": math.degrees(self.ceiling.tilt),
             "ceiling_impulse_n_m_s": self.ceiling_push,
             "ceiling_push_n_m": self.ceiling_push / PUSH_S,
-            "limit_impulse_n_m_s": self.ceiling.blow,
-            "push_margin_impulse_n_m_s": self.bears.impulse,
-            "borne_impulse_least_n_m_s": self.bears.least,
-            "push_margin_torque_n_m": self.bears.impulse / PUSH_S,
+            "limit_impulse_n_m_s": self.ceiling.impulse,
+            "push_margin_impulse_n_m_s": self.push_margin.median_impulse,
+            "borne_impulse_least_n_m_s": self.push_margin.worst_impulse,
+            "push_margin_torque_n_m": self.push_margin.median_impulse / PUSH_S,
         }
 
 
@@ -97,12 +97,12 @@ def prospects(experiment: Experiment, axis: str = "") -> Prospects:
     experiment = of_axis[0] if of_axis else experiment
     plant = experiment.plant
     top = ceiling(plant.reduced, experiment.law.rate_limit)
-    with control_callback(None), quiet():
+    with set_control_callback(None), quiet():
         pole = falls_with(plant.model, plant.key, plant.axis.line, plant.axis.bias)
     return Prospects(plant.reduced, top, bearable(experiment.scenario, experiment.design), pole)
 
 
-def scale_that_suffices(ceiling_at: Callable[[float], float], scale: float) -> float | None:
+def smallest_sufficient_scale(ceiling_at: Callable[[float], float], scale: float) -> float | None:
     """A scale of the modules, a tenth larger each time, with which a robot recovers two degrees.
 
     Args:

@@ -11,7 +11,7 @@ TRAVEL = math.pi / 2.0
 """Beyond a quarter turn from upright a gimbal pushes the other way [rad]."""
 
 
-class Ceiling(NamedTuple):
+class RecoverableLimit(NamedTuple):
     """What no controller can exceed, on the linearised reduced model (6) with the gimbals' geometry kept.
 
     With lambda^2 = m g h/J, the part z = x1 + x2/lambda of a state grows as z' = lambda z - (H/J) cos(x3) u/lambda.
@@ -29,13 +29,13 @@ class Ceiling(NamedTuple):
 
     tilt: float
     """The largest tilt from which a rig at rest recovers, (H/J) S [rad]."""
-    blow: float
+    impulse: float
     """The largest impulse about the line that an upright rig recovers from if it comes all at once, J lambda times the
-    tilt [N m s]. Of a push that is held gimbals take off a part while it lasts: see `push`."""
+    tilt [N m s]. Of a push that is held gimbals take off a part while it lasts: see `push_impulse`."""
     pole: float
     """lambda [1/s]."""
 
-    def push(self, duration_s: float) -> float:
+    def push_impulse(self, duration_s: float) -> float:
         """The largest impulse about the line that an upright rig recovers from if a constant torque brings it.
 
         With x = lambda D, a torque tau for D adds tau/(J lambda^2) (1 - e^-x) to what is to be recovered from, so that
@@ -48,10 +48,10 @@ class Ceiling(NamedTuple):
             The impulse [N m s].
         """
         x = self.pole * duration_s
-        return self.blow * (x / -math.expm1(-x) if x > 0.0 else 1.0)
+        return self.impulse * (x / -math.expm1(-x) if x > 0.0 else 1.0)
 
 
-def ceiling(model: ReducedModel, rate_limit: float, travel: float = TRAVEL) -> Ceiling:
+def ceiling(model: ReducedModel, rate_limit: float, travel: float = TRAVEL) -> RecoverableLimit:
     """The ceiling for a rig.
 
     Args:
@@ -68,4 +68,4 @@ def ceiling(model: ReducedModel, rate_limit: float, travel: float = TRAVEL) -> C
     left = math.exp(-pole * theta / u)
     S = u / (pole**2 + u**2) * (1.0 + left * (u / pole * math.sin(theta) - math.cos(theta)))
     tilt = momentum / model.J1 * S
-    return Ceiling(tilt, model.gimbals * model.J1 * pole * tilt, pole)
+    return RecoverableLimit(tilt, model.gimbals * model.J1 * pole * tilt, pole)

@@ -15,7 +15,7 @@ from cmg_mj.studies.sweeps.checks import listed_names
 from cmg_mj.studies.sweeps.chunk import compute
 from cmg_mj.studies.sweeps.order import order_rows, order_table
 from cmg_mj.studies.sweeps.sobol import index_rows, index_table
-from cmg_mj.studies.sweeps.study import Design, Study, check_values
+from cmg_mj.studies.sweeps.study import SamplingDesign, SweepStudy, check_values
 from cmg_mj.studies.sweeps.trials import table_of
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ WORLDS = 20
 
 
 @dataclass(frozen=True)
-class Swept:
+class SweepResult:
     """What a sweep has found.
 
     Attributes:
@@ -38,7 +38,7 @@ class Swept:
         indices: A row a figure, observer and field, of a design for Sobol indices; None of another.
     """
 
-    study: Study
+    study: SweepStudy
     trials: pa.Table
     cells: pa.Table
     order: pa.Table | None = None
@@ -53,7 +53,7 @@ def sweep(
     sample: int | None = None,
     sobol: int | None = None,
     order: Sequence[str] = (),
-) -> Swept:
+) -> SweepResult:
     """Run a scenario in every cell: every point of what is varied with every observer.
 
     Args:
@@ -73,18 +73,18 @@ def sweep(
     """
     if sample is not None and sobol is not None:
         raise InputError("sample and sobol: one of them")
-    design: Design = "sample" if sample is not None else "sobol" if sobol is not None else "grid"
+    design: SamplingDesign = "sample" if sample is not None else "sobol" if sobol is not None else "grid"
     of = load_scenario(scenario) if isinstance(scenario, str) else scenario
     axes = tuple(parse_axis(field, said, f"vary: {field!r}") for field, said in vary.items())
     n: Any = 0 if design == "grid" else sample if design == "sample" else sobol
     names = (of.observer.kind,) if observers is None else listed_names(observers, "observers")
-    study = Study(of, axes, names, worlds, design, n, listed_names(order, "order"))
+    study = SweepStudy(of, axes, names, worlds, design, n, listed_names(order, "order"))
     import pyarrow as pa
 
     check_values(study)
     table = all_trials(study)
     trials = Trials(study, [table])
-    return Swept(
+    return SweepResult(
         study,
         table,
         pa.concat_tables(cells_in_blocks(trials)),
@@ -93,7 +93,7 @@ def sweep(
     )
 
 
-def all_trials(study: Study) -> pa.Table:
+def all_trials(study: SweepStudy) -> pa.Table:
     """Run a study in this process, keeping nothing on disk."""
     import pyarrow as pa
 

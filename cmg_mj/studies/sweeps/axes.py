@@ -22,7 +22,7 @@ DIGITS = 12
 
 
 @dataclass(frozen=True)
-class Axis:
+class VariedField:
     """One varied field, or several that take the same values together.
 
     Attributes:
@@ -71,7 +71,7 @@ class Axis:
         return list(self.values) if self.values else f"{LOG if self.log else ''}{self.low!r}:{self.high!r}"
 
 
-def parse_axis(field: str, said: Any, where: str) -> Axis:
+def parse_axis(field: str, said: Any, where: str) -> VariedField:
     """Read what a field is to take.
 
     Args:
@@ -99,10 +99,10 @@ def parse_axis(field: str, said: Any, where: str) -> Axis:
     twice = next((value for i, value in enumerate(values) if value in values[:i]), None)
     if twice is not None:
         raise InputError(f"{where}: {twice} is there twice")
-    return Axis(field, tuple(values), also=tuple(also))
+    return VariedField(field, tuple(values), also=tuple(also))
 
 
-def _range(field: str, said: str, where: str) -> Axis:
+def _range(field: str, said: str, where: str) -> VariedField:
     log = said.strip().startswith(LOG)
     parts = said.strip().removeprefix(LOG).split(":")
     how = "write first:last:count, or low:high for --sample and --sobol, with log: before it for a logarithmic one"
@@ -120,11 +120,11 @@ def _range(field: str, said: str, where: str) -> Axis:
     if count is None:
         if low > high:
             raise InputError(f"{where}: an empty range: {low:g} is above {high:g}")
-        return Axis(field, (), low, high, log)
+        return VariedField(field, (), low, high, log)
     if not 2 <= count <= MOST_VALUES:
         raise InputError(f"{where}: {count} values; a range has at least 2, at most {MOST_VALUES}")
     shares = np.linspace(0.0, 1.0, count)
-    return Axis(field, tuple(Axis(field, (), low, high, log).at(shares)))
+    return VariedField(field, tuple(VariedField(field, (), low, high, log).at(shares)))
 
 
 def _given(said: Any, where: str) -> list[Any]:

@@ -13,7 +13,7 @@ import numpy as np
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.summary_keys import KEYS
 from cmg_mj.studies.sweeps.failure_reasons import Reasons
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.studies.sweeps.trials import as_table, point_columns
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Trials:
         reasons: Why some were refused or stopped, counted.
     """
 
-    def __init__(self, study: Study, tables: Iterable[pa.Table]) -> None:
+    def __init__(self, study: SweepStudy, tables: Iterable[pa.Table]) -> None:
         import pyarrow as pa
 
         self.study = study
@@ -135,7 +135,7 @@ def _with_ends(key: str, values: np.ndarray) -> dict[str, float | None]:
     return {key: float(alone[0]) if len(alone) else None, f"{key}_low": None, f"{key}_high": None}
 
 
-def cells_schema(study: Study) -> pa.Schema:
+def cells_schema(study: SweepStudy) -> pa.Schema:
     """The columns of `cells_of`."""
     import pyarrow as pa
 

@@ -11,7 +11,7 @@ import numpy as np
 from cmg_mj.errors import InputError, nearest, shown
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.simulation.pool import UNUSED
-from cmg_mj.studies.sweeps.axes import Axis
+from cmg_mj.studies.sweeps.axes import VariedField
 
 TOLD_OTHERWISE = {
     "seed": "worlds differ in it already: --worlds says how many, --seed which",
@@ -34,7 +34,7 @@ def listed_names(said: Any, what: str) -> tuple[Any, ...]:
     return tuple(said)
 
 
-def check_axes(axes: Sequence[Axis], design: str) -> None:
+def check_axes(axes: Sequence[VariedField], design: str) -> None:
     """Something is varied, each field once, and so that it makes a difference; a range to be sampled is sampled."""
     if not axes:
         raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")

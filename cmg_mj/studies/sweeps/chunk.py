@@ -7,11 +7,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from cmg_mj.errors import InputError, raised
-from cmg_mj.results.per_world_table import FIRST
-from cmg_mj.simulation.experiment import Experiment, prepare, run_together
-from cmg_mj.simulation.pool import structure
+from cmg_mj.results.per_world_table import ID_COLUMNS
+from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
+from cmg_mj.simulation.pool import batch_key
 from cmg_mj.studies.sweeps.points import Point, Points
-from cmg_mj.studies.sweeps.study import Chunk, Study
+from cmg_mj.studies.sweeps.study import Chunk, SweepStudy
 
 if TYPE_CHECKING:
     from cmg_mj.results.result import Result
@@ -21,7 +21,7 @@ REFUSED = "refused"
 
 
 def compute(
-    study: Study,
+    study: SweepStudy,
     chunk: Chunk,
     on_progress: Callable[[float], None] | None = None,
     *,
@@ -55,7 +55,7 @@ def compute(
             continue
         if number not in experiments:
             try:
-                experiments[number] = base.with_values(at[number])
+                experiments[number] = base.with_settings(at[number])
                 pool_of[number] = _pool_of(experiments[number])
             except InputError as error:
                 refused[number] = str(error)
@@ -63,7 +63,7 @@ def compute(
         pools.setdefault(pool_of[number], []).append(trial)
     for trials in pools.values():
         done, share = len(found) / len(chunk.trials), len(trials) / len(chunk.trials) / study.scenario.duration_s
-        tick = partial(_inside, on_progress, done, share) if on_progress else None
+        tick = partial(_chunk_progress, on_progress, done, share) if on_progress else None
         rows = _run([experiments[number] for number, _ in trials], trials, tick, threads)
         found |= zip(trials, rows, strict=True)
     for trial in chunk.trials:
@@ -75,7 +75,7 @@ def compute(
     ]
 
 
-def given_up(study: Study, chunk: Chunk, reason: str) -> list[dict[str, Any]]:
+def rows_of_failed_chunk(study: SweepStudy, chunk: Chunk, reason: str) -> list[dict[str, Any]]:
     """Rows of a chunk that could not be computed: the reason in each."""
     return [
         {
@@ -88,7 +88,7 @@ def given_up(study: Study, chunk: Chunk, reason: str) -> list[dict[str, Any]]:
     ]
 
 
-def _inside(on_progress: Callable[[float], None], done: float, share: float, time: float) -> None:
+def _chunk_progress(on_progress: Callable[[float], None], done: float, share: float, time: float) -> None:
     on_progress(done + share * time)
 
 
@@ -103,7 +103,7 @@ def _run(
     They are halved until each of them is through or has raised by itself, so that no row depends on another's.
     """
     rows: dict[int, dict[str, Any]] = {}
-    onward = _onward(tick) if tick else None
+    onward = _monotonic_progress(tick) if tick else None
     parts = [list(range(len(trials)))]
     while parts:
         part = parts.pop()
@@ -123,7 +123,7 @@ def _run_once(
 ) -> list[dict[str, Any] | None]:
     """Rows of one batch; None for a trial that may have been stopped by another one."""
     try:
-        result: Result = run_together(experiments, worlds, keep_trajectory=False, on_progress=tick, threads=threads)
+        result: Result = run_batch(experiments, worlds, keep_trajectory=False, on_progress=tick, threads=threads)
     except Exception as error:  # a user's observer may fail in any way
         alone = len(worlds) == 1
         return [_unfinished("stopped", raised(error)) if alone else None for _ in worlds]
@@ -136,7 +136,7 @@ def _run_once(
     ]
 
 
-def _onward(tick: Callable[[float], None]) -> Callable[[float], None]:
+def _monotonic_progress(tick: Callable[[float], None]) -> Callable[[float], None]:
     """The same, told of no time before the latest: what runs again is no step back."""
     latest = 0.0
 
@@ -151,10 +151,10 @@ def _onward(tick: Callable[[float], None]) -> Callable[[float], None]:
 def _pool_of(experiment: Experiment) -> str:
     """Worlds with the same can run in one batch."""
     physics = experiment.plant.model.opt
-    return repr((structure(experiment.scenario, experiment.design), physics.timestep, int(physics.integrator)))
+    return repr((batch_key(experiment.scenario, experiment.design), physics.timestep, int(physics.integrator)))
 
 
-def _identity(study: Study, chunk: Chunk, world: int) -> dict[str, Any]:
+def _identity(study: SweepStudy, chunk: Chunk, world: int) -> dict[str, Any]:
     return {"observer": chunk.observer, "world": world, "seed": study.scenario.seed}
 
 
@@ -169,5 +169,5 @@ def _plain(point: Point) -> Point:
     }
 
 
-COLUMNS = [name for name in FIRST if name != "in_loop_of"]
+COLUMNS = [name for name in ID_COLUMNS if name != "in_loop_of"]
 """Of a trial, beside what is varied, before its figures."""

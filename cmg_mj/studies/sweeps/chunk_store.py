@@ -19,7 +19,7 @@ from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.chunk import compute
 from cmg_mj.studies.sweeps.file import SECTIONS
 from cmg_mj.studies.sweeps.fingerprint import (
-    Mark,
+    ChunkFingerprint,
     as_read,
     difference,
     hash_of_models,
@@ -30,8 +30,8 @@ from cmg_mj.studies.sweeps.fingerprint import (
     resolved,
     without_asides,
 )
-from cmg_mj.studies.sweeps.release_memory import give_back
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.release_memory import release_free_memory
+from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.studies.sweeps.trials import lasting, schema_of, table_of, write_table, write_tables
 
 STUDY, CHUNKS = "study.toml", "chunks"
@@ -53,7 +53,7 @@ class Store:
     """
 
     folder: Path
-    study: Study
+    study: SweepStudy
 
     def open(self) -> int:
         """Begin, or go on with what is there.
@@ -95,14 +95,14 @@ class Store:
         return resolved(self.study)
 
     @cached_property
-    def _ours(self) -> Mark:
+    def _ours(self) -> ChunkFingerprint:
         """The mark of a chunk, but for its number; of the models as they are when the sweep is opened."""
-        return Mark(hash_of_study(self._resolved), hash_of_models(self.study), "", versions())
+        return ChunkFingerprint(hash_of_study(self._resolved), hash_of_models(self.study), "", versions())
 
-    def _mark(self, number: int) -> Mark:
+    def _mark(self, number: int) -> ChunkFingerprint:
         return replace(self._ours, chunk=f"{number + 1} of {len(self.study.chunks)}")
 
-    def _marks(self) -> dict[int, Mark]:
+    def _marks(self) -> dict[int, ChunkFingerprint]:
         """Those of the finished chunks, all of which are the study's own."""
         left = set(self.left())
         marks = {}
@@ -113,7 +113,7 @@ class Store:
         return marks
 
     @contextmanager
-    def _opened(self, number: int) -> Iterator[tuple[pq.ParquetFile, Mark]]:
+    def _opened(self, number: int) -> Iterator[tuple[pq.ParquetFile, ChunkFingerprint]]:
         """A finished chunk's file and mark.
 
         Raises:
@@ -180,7 +180,7 @@ def run(store: Store, on_progress: Callable[[float], None] | None = None) -> Non
         size = chunks.size(number)
         tick = None if on_progress is None else partial(_inside, on_progress, done, size)
         store.keep(number, table_of(study, compute(study, chunks[number], tick)))
-        give_back()
+        release_free_memory()
         done += size
         if on_progress:
             on_progress(done)

@@ -15,7 +15,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.chunk import compute
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 
 SCENARIO, DURATION_S = "push_recovery", 15.0
 WORLDS_A_RIG = 4
@@ -92,15 +92,15 @@ def _scenario() -> Scenario:
     return load_scenario(SCENARIO, [f"duration_s={DURATION_S}"])
 
 
-def _of_worlds(observer: str, worlds: int) -> Study:
+def _of_worlds(observer: str, worlds: int) -> SweepStudy:
     scenario = _scenario()
-    return Study(scenario, (parse_axis("plant.equilibrium_bias_deg", "0.5", "rig"),), (observer,), worlds)
+    return SweepStudy(scenario, (parse_axis("plant.equilibrium_bias_deg", "0.5", "rig"),), (observer,), worlds)
 
 
-def _of_rigs(observer: str, worlds: int) -> Study:
+def _of_rigs(observer: str, worlds: int) -> SweepStudy:
     axes = tuple(parse_axis(field, said, field) for field, said in RIGS.items())
     rigs = max(1, worlds // WORLDS_A_RIG)
-    return Study(_scenario(), axes, (observer,), WORLDS_A_RIG, "sample", rigs)
+    return SweepStudy(_scenario(), axes, (observer,), WORLDS_A_RIG, "sample", rigs)
 
 
 @contextmanager

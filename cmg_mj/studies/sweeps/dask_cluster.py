@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmg_mj.errors import InputError, RunStopped, raised
 from cmg_mj.studies.sweeps import dask_worker as on_worker
-from cmg_mj.studies.sweeps.chunk import given_up
+from cmg_mj.studies.sweeps.chunk import rows_of_failed_chunk
 from cmg_mj.studies.sweeps.chunk_store import GOES_ON, Store
 from cmg_mj.studies.sweeps.dask_worker import Part, computed, part_of
 from cmg_mj.studies.sweeps.trials import from_bytes, table_of
@@ -170,7 +170,9 @@ class Cluster:
                         done += chunks.size(number)
                     elif number == alone and self.killed[number] >= KILLS:
                         reason = f"its chunk has killed {self.killed[number]} workers"
-                        store.keep(number, table_of(store.study, given_up(store.study, chunks[number], reason)))
+                        store.keep(
+                            number, table_of(store.study, rows_of_failed_chunk(store.study, chunks[number], reason))
+                        )
                         done += chunks.size(number)
                     else:
                         (left if self.killed[number] < KILLS - 1 else suspects).append(number)

@@ -17,8 +17,8 @@ from cmg_mj.inputs.bundled import folder
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.chunk import compute
 from cmg_mj.studies.sweeps.points import Point
-from cmg_mj.studies.sweeps.release_memory import give_back
-from cmg_mj.studies.sweeps.study import Chunk, Study
+from cmg_mj.studies.sweeps.release_memory import release_free_memory
+from cmg_mj.studies.sweeps.study import Chunk, SweepStudy
 from cmg_mj.studies.sweeps.trials import as_bytes, table_of
 
 _one_at_a_time = threading.Lock()
@@ -37,7 +37,7 @@ class Part:
         versions: What the figures depend on, name -> version.
     """
 
-    study: Study
+    study: SweepStudy
     chunk: Chunk
     points: Mapping[int, Point]
     bundled: str | None
@@ -49,7 +49,7 @@ def dask_setup(worker: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def part_of(study: Study, chunk: Chunk) -> Part:
+def part_of(study: SweepStudy, chunk: Chunk) -> Part:
     """What to send for a chunk."""
     model = Path(study.scenario.plant.model).resolve()
     return Part(
@@ -85,10 +85,10 @@ def computed(part: Part, threads: int, where: str) -> bytes:
             rows = compute(study, part.chunk, points=part.points, threads=threads)
         except InputError as error:
             raise InputError(f"worker {where}: {error}") from None
-        give_back()
+        release_free_memory()
         return as_bytes(table_of(study, rows))
 
 
-def _with_model(study: Study, model: Path) -> Study:
+def _with_model(study: SweepStudy, model: Path) -> SweepStudy:
     plant = dataclasses.replace(study.scenario.plant, model=str(model))
     return dataclasses.replace(study, scenario=study.scenario.model_copy(update={"plant": plant}))

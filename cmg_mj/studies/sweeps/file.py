@@ -12,8 +12,8 @@ from cmg_mj.inputs.bundled import bundled, find
 from cmg_mj.inputs.overrides import override
 from cmg_mj.scenario.loading import find_model, load_scenario, parse_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.studies.sweeps.axes import Axis, parse_axis
-from cmg_mj.studies.sweeps.study import Design
+from cmg_mj.studies.sweeps.axes import VariedField, parse_axis
+from cmg_mj.studies.sweeps.study import SamplingDesign
 
 SECTIONS = ("sweep", "vary", "scenario")
 ASKED = {"observers": list, "worlds": int, "design": str, "n": int, "order": list}
@@ -65,12 +65,12 @@ def scenario_of(name: str, fields: Mapping[str, Any], settings: Sequence[str] = 
     return find_model(scenario, find("scenarios", name, ".toml", "scenario").parent)
 
 
-def axes_of(name: str, fields: Mapping[str, Any]) -> list[Axis]:
+def axes_of(name: str, fields: Mapping[str, Any]) -> list[VariedField]:
     """A study file's [vary]."""
     return [parse_axis(field, said, f"{name}: vary.{field}") for field, said in fields.get("vary", {}).items()]
 
 
-def design_of(name: str, asked: Mapping[str, Any]) -> tuple[Design, int]:
+def design_of(name: str, asked: Mapping[str, Any]) -> tuple[SamplingDesign, int]:
     """A study file's design, and how many points it has."""
     design: Any = asked.get("design", "grid")
     known: Sequence[str] = ("grid", "sample", "sobol")

@@ -16,7 +16,7 @@ from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.includes import check_files
 from cmg_mj.scenario.loading import as_fields
 from cmg_mj.simulation.experiment import prepare
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 
 KEY = b"cmg_mj.chunk"
 FREE = "order"
@@ -24,7 +24,7 @@ FREE = "order"
 
 
 @dataclass(frozen=True)
-class Mark:
+class ChunkFingerprint:
     """What a chunk's figures depend on.
 
     Attributes:
@@ -44,15 +44,15 @@ class Mark:
         return {KEY: json.dumps(asdict(self)).encode()}
 
 
-def mark_in(metadata: Mapping[bytes, bytes] | None) -> Mark | None:
+def mark_in(metadata: Mapping[bytes, bytes] | None) -> ChunkFingerprint | None:
     """The mark of a file; None if it has none."""
     try:
-        return Mark(**json.loads((metadata or {})[KEY]))
+        return ChunkFingerprint(**json.loads((metadata or {})[KEY]))
     except (LookupError, ValueError, TypeError):
         return None
 
 
-def not_ours(there: Mark | None, ours: Mark) -> str | None:
+def not_ours(there: ChunkFingerprint | None, ours: ChunkFingerprint) -> str | None:
     """Why a chunk is not the one that it should be, in words; None if it is, with whatever versions."""
     if there is None or there.study != ours.study:
         return "holds no trials of this study"
@@ -74,7 +74,7 @@ def hash_of_study(fields: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(without_asides(as_read(fields)), sort_keys=True).encode()).hexdigest()
 
 
-def hash_of_models(study: Study) -> str:
+def hash_of_models(study: SweepStudy) -> str:
     """Hash of the files of the study's model, or of those that it varies, with all that they include.
 
     Raises:
@@ -127,7 +127,7 @@ def _said(value: Any) -> str:
     return "nothing" if value is None else shown(value)
 
 
-def resolved(study: Study) -> dict[str, Any]:
+def resolved(study: SweepStudy) -> dict[str, Any]:
     """The study with every default of its scenario written out: it reruns from that."""
     fields = prepare(study.scenario).resolved()
     varied = [field for axis in study.axes for field in axis.fields]

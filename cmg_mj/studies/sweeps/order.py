@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.results.intervals import Interval
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.studies.sweeps.trials import as_table, point_columns
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ JUDGED = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "tilt_rms
 """Figures that an order is counted by, where a trial has them; each is better when it is less."""
 
 
-class Held(NamedTuple):
+class OrderCount(NamedTuple):
     """How often an order held.
 
     Attributes:
@@ -42,7 +42,7 @@ def figures_of(trials: Trials) -> list[str]:
     return [key for key in JUDGED if np.isfinite(trials.figure(key)).any()] or [JUDGED[0]]
 
 
-def order_at(trials: Trials, key: str) -> list[Held]:
+def order_at(trials: Trials, key: str) -> list[OrderCount]:
     """In how many of each point's worlds the study's order holds.
 
     Args:
@@ -56,7 +56,7 @@ def order_at(trials: Trials, key: str) -> list[Held]:
     return [_held(values) for values in _errors(trials, key, trials.study.order)]
 
 
-def order_of_points(trials: Trials, key: str, order: Sequence[str]) -> Held:
+def order_of_points(trials: Trials, key: str, order: Sequence[str]) -> OrderCount:
     """At how many points it holds for the means over the worlds.
 
     One that fell in some world is worse than any mean; a point with a trial that was refused or stopped cannot tell.
@@ -83,16 +83,16 @@ def _errors(trials: Trials, key: str, order: Sequence[str]) -> np.ndarray:
     return np.where(trials.fell[:, places], np.inf, trials.figure(key)[:, places])
 
 
-def _held(errors: np.ndarray) -> Held:
+def _held(errors: np.ndarray) -> OrderCount:
     """Of errors (n_order, n); those with a NaN cannot tell."""
     errors = errors[:, ~np.isnan(errors).any(axis=0)]
     better, worse = errors[:-1], errors[1:]
     holds = (better < worse).all(axis=0)
     broken = ((better >= worse) & np.isfinite(worse)).any(axis=0)
-    return Held(int(holds.sum()), int((holds | broken).sum()))
+    return OrderCount(int(holds.sum()), int((holds | broken).sum()))
 
 
-def order_table(study: Study, rows: Sequence[dict[str, Any]]) -> pa.Table:
+def order_table(study: SweepStudy, rows: Sequence[dict[str, Any]]) -> pa.Table:
     """The rows of `order_rows` as a table."""
     import pyarrow as pa
 
@@ -121,7 +121,7 @@ def order_rows(trials: Trials) -> list[dict[str, Any]]:
     return rows
 
 
-def by_quarters(trials: Trials, key: str) -> list[tuple[str, float, float, Held]]:
+def by_quarters(trials: Trials, key: str) -> list[tuple[str, float, float, OrderCount]]:
     """How often the order holds where a field is low, and where it is high.
 
     Args:

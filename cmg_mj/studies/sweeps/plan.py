@@ -6,9 +6,9 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from cmg_mj.simulation.pool import pools
+from cmg_mj.simulation.pool import can_vary_in_batch
 from cmg_mj.studies.sweeps.chunk import compute
-from cmg_mj.studies.sweeps.study import CHUNK, MOST_TRIALS, Chunk, Study
+from cmg_mj.studies.sweeps.study import CHUNK, MOST_TRIALS, Chunk, SweepStudy
 
 TRIALS, SECONDS, STRETCHES = 256, 1.5, 8
 """So many trials stand for a chunk and are run for so long once they have begun, in so many places."""
@@ -22,7 +22,7 @@ By the peaks (VmHWM) of four sweeps on Linux: of 0.05 s, 2 points x 50 worlds, 1
 """
 
 
-def expected(study: Study) -> dict[str, Any]:
+def estimate_cost(study: SweepStudy) -> dict[str, Any]:
     """Points, trials, chunks; minutes on this machine and memory, as far as a piece of every observer can say."""
     looked_at = _thinned(study)
     seconds = sum(_seconds_a_trial(looked_at, observer) for observer in study.observers)
@@ -43,17 +43,19 @@ def expected(study: Study) -> dict[str, Any]:
     }
 
 
-def _thinned(study: Study) -> Study:
+def _thinned(study: SweepStudy) -> SweepStudy:
     """The study, or of a very large one, whose points would take long to draw and much memory, some that lie alike."""
     if study.trials <= MOST_TRIALS or study.n_points <= POINTS:
         return study
     return replace(study, design="sample", n=POINTS)
 
 
-def _seconds_a_trial(study: Study, observer: str) -> float:
+def _seconds_a_trial(study: SweepStudy, observer: str) -> float:
     """Of an observer, by some of its trials; by several stretches of them if not all can run in one batch."""
     trials = study.n_points * study.worlds
-    pooled = all(pools(field, study.scenario.controller.kind) for axis in study.axes for field in axis.fields)
+    pooled = all(
+        can_vary_in_batch(field, study.scenario.controller.kind) for axis in study.axes for field in axis.fields
+    )
     stretches = 1 if pooled else min(STRETCHES, trials)
     count = min(TRIALS, trials // stretches)
     starts = [trials * i // stretches for i in range(stretches)]
@@ -61,7 +63,7 @@ def _seconds_a_trial(study: Study, observer: str) -> float:
     return sum(taken) / len(taken) / count
 
 
-def _seconds(study: Study, piece: Chunk) -> float:
+def _seconds(study: SweepStudy, piece: Chunk) -> float:
     """What a piece takes, by what makes it ready and by its pace once it has begun."""
     begun: list[tuple[float, float]] = []
     enough = False

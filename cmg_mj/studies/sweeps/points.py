@@ -9,7 +9,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from cmg_mj.studies.sweeps.axes import Axis
+from cmg_mj.studies.sweeps.axes import VariedField
 
 Point = dict[str, Any]
 """Field -> its value."""
@@ -24,7 +24,7 @@ class Points:
             combination of values, of which the last field's change first.
     """
 
-    def __init__(self, axes: Sequence[Axis], shares: np.ndarray | None = None) -> None:
+    def __init__(self, axes: Sequence[VariedField], shares: np.ndarray | None = None) -> None:
         self._fields = [axis.fields for axis in axes]
         self._columns: list[Sequence[Any]] | None = None
         if shares is None:

@@ -6,7 +6,7 @@ import ctypes
 import sys
 
 
-def give_back() -> None:
+def release_free_memory() -> None:
     """Return what is free to the system.
 
     A chunk takes and frees some thousand pieces of MuJoCo's, between which glibc's allocator keeps what is free:

@@ -28,7 +28,7 @@ FILES = (TRIALS, CELLS, ORDER, INDICES, REPORT, *NAMES)
 """Those that may be written."""
 
 
-class Found(NamedTuple):
+class SweepTables(NamedTuple):
     """What a finished sweep has found.
 
     Attributes:
@@ -42,17 +42,17 @@ class Found(NamedTuple):
     indices: list[dict[str, Any]]
 
 
-def found_of(trials: Trials) -> Found:
+def found_of(trials: Trials) -> SweepTables:
     """What the trials say."""
     study = trials.study
-    return Found(
+    return SweepTables(
         trials,
         order_rows(trials) if study.order else [],
         index_rows(trials) if study.design == "sobol" else [],
     )
 
 
-def save(folder: RunFolder, store: Store, found: Found) -> Path:
+def save(folder: RunFolder, store: Store, found: SweepTables) -> Path:
     """Write the tables, the pictures and the report of a finished sweep.
 
     Raises:
@@ -76,7 +76,7 @@ def save(folder: RunFolder, store: Store, found: Found) -> Path:
         raise InputError(f"{error}; {GOES_ON}") from None
 
 
-def report(found: Found, pictures: Sequence[Picture]) -> str:
+def report(found: SweepTables, pictures: Sequence[Picture]) -> str:
     """The report as Markdown."""
     study = found.trials.study
     counts = ", ".join(
@@ -94,7 +94,7 @@ def report(found: Found, pictures: Sequence[Picture]) -> str:
     return "\n\n".join([*parts, *report_cells.cells(found.trials)])
 
 
-def summary(found: Found) -> str:
+def summary(found: SweepTables) -> str:
     """For the terminal: the cells, why some trials have no figures, how often the order holds, the total indices."""
     study = found.trials.study
     parts = [report_cells.in_short(found.trials)]

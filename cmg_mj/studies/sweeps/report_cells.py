@@ -10,10 +10,10 @@ import numpy as np
 
 from cmg_mj.results import markdown
 from cmg_mj.results.summary_keys import heading, written
-from cmg_mj.studies.sweeps.axes import Axis
+from cmg_mj.studies.sweeps.axes import VariedField
 from cmg_mj.studies.sweeps.cells import Trials, cells_of
 from cmg_mj.studies.sweeps.plot_scales import ERRORS, fall_counts
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 
 CELLS = "cells.parquet"
 MOST_ROWS = 60
@@ -31,7 +31,7 @@ def cells(trials: Trials) -> list[str]:
     return ["## Observers over all points", in_short(trials)]
 
 
-def varied(study: Study) -> list[str]:
+def varied(study: SweepStudy) -> list[str]:
     """What a table of the cells does not say: of a design every field's values, of a grid those that go alike."""
     if study.design == "grid":
         return [f"With {axis.field} go, alike: {', '.join(axis.also)}." for axis in study.axes if axis.also]
@@ -90,7 +90,7 @@ def _cell(row: dict[str, Any]) -> str:
     return written(ERROR, row[ERROR]) + fell + stopped
 
 
-def _values(axis: Axis) -> str:
+def _values(axis: VariedField) -> str:
     if axis.is_range:
         return f"{said(axis.low)} to {said(axis.high)}{', evenly in the logarithm' if axis.log else ''}"
     values = [said(value) for value in axis.values]

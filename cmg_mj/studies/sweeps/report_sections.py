@@ -9,11 +9,11 @@ from cmg_mj.results import markdown
 from cmg_mj.results.intervals import Interval
 from cmg_mj.results.summary_keys import KEYS, heading
 from cmg_mj.studies.sweeps.cells import Trials
-from cmg_mj.studies.sweeps.order import JUDGED, Held, by_quarters, figures_of, order_of_points, pairs_of
+from cmg_mj.studies.sweeps.order import JUDGED, OrderCount, by_quarters, figures_of, order_of_points, pairs_of
 from cmg_mj.studies.sweeps.plot_scales import ERRORS
 from cmg_mj.studies.sweeps.report_cells import said
 from cmg_mj.studies.sweeps.sobol import FEWEST, LOG_RATIO, LOST
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.visualization.plots.figure_spec import Picture
 
 ABOUT_MAPS = (
@@ -94,7 +94,7 @@ def _quarters(trials: Trials) -> list[str]:
     return [sentence, markdown.table(["field", "values", "points", *HEADINGS_OF_A_SHARE], table, text_columns=2)]
 
 
-def _points(held: Held, study: Study) -> list[str]:
+def _points(held: OrderCount, study: SweepStudy) -> list[str]:
     """At how many points an order holds; of a sample with the share and its interval."""
     times = [f"{held.times} of {held.of}"]
     return [*times, *_interval(held.share)] if study.design == "sample" else times
@@ -114,7 +114,7 @@ def order_in_short(trials: Trials) -> str:
     return f"{sentence}; {unknown} points cannot tell." if unknown else f"{sentence}."
 
 
-def indices(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
+def indices(study: SweepStudy, rows: Sequence[dict[str, Any]]) -> list[str]:
     """First-order and total indices of the figures that matter most."""
     about = (
         "Shares of the variance of a point's mean over its worlds: first order, what a field explains by itself; "

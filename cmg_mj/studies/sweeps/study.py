@@ -15,13 +15,13 @@ from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.scenario.loading import as_fields, parse_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
-from cmg_mj.simulation.experiment import load_rig, prepare
-from cmg_mj.simulation.pool import pools
-from cmg_mj.studies.sweeps.axes import Axis
+from cmg_mj.simulation.experiment import load_scenario_plant, prepare
+from cmg_mj.simulation.pool import can_vary_in_batch
+from cmg_mj.studies.sweeps.axes import VariedField
 from cmg_mj.studies.sweeps.checks import check_axes, check_observers, check_order, check_points, check_worlds
 from cmg_mj.studies.sweeps.points import Points, sampled
 
-Design = Literal["grid", "sample", "sobol"]
+SamplingDesign = Literal["grid", "sample", "sobol"]
 MOST_TRIALS = 1_000_000
 """Beyond it a sweep must be asked for twice (`--yes`)."""
 CHUNK = 1024
@@ -49,7 +49,7 @@ class Chunk:
 class Chunks:
     """The chunks of a study by their numbers: a chunk's trials are made when it is asked for."""
 
-    study: Study
+    study: SweepStudy
 
     @property
     def _trials(self) -> int:
@@ -90,7 +90,7 @@ class Chunks:
 
 
 @dataclass(frozen=True)
-class Study:
+class SweepStudy:
     """A sweep.
 
     Attributes:
@@ -106,10 +106,10 @@ class Study:
     """
 
     scenario: Scenario
-    axes: tuple[Axis, ...]
+    axes: tuple[VariedField, ...]
     observers: tuple[str, ...]
     worlds: int
-    design: Design = "grid"
+    design: SamplingDesign = "grid"
     n: int = 0
     order: tuple[str, ...] = ()
 
@@ -155,7 +155,7 @@ class Study:
     def _order(self) -> np.ndarray:
         """Numbers of the points, those that can run in one batch together, (n_points,)."""
         law = self.scenario.controller.kind
-        apart = [field for axis in self.axes for field in axis.fields if not pools(field, law)]
+        apart = [field for axis in self.axes for field in axis.fields if not can_vary_in_batch(field, law)]
         if not apart:
             return np.arange(len(self.points))
 
@@ -180,7 +180,7 @@ class Study:
         return {"sweep": how, "vary": {axis.written: axis.said() for axis in self.axes}, "scenario": dict(scenario)}
 
 
-def check_values(study: Study) -> None:
+def check_values(study: SweepStudy) -> None:
     """See that every observer can run, that every field exists and takes each of its values by itself.
 
     An observer's own is tried with every observer. Where nothing else is varied, a value must fit the scenario, too;
@@ -189,7 +189,7 @@ def check_values(study: Study) -> None:
     Raises:
         InputError: One does not.
     """
-    plant = load_rig(study.scenario)
+    plant = load_scenario_plant(study.scenario)
     base = study.scenario.model_copy(update={"open_loop_observers": []})
     for observer in study.observers:
         prepare(base.with_observer(observer), plant)
@@ -205,7 +205,7 @@ def check_values(study: Study) -> None:
             if "plant.model" in axis.fields:
                 find("models", str(value), ".xml", f"--vary {axis.written}: plant.model =")
             alone = len(study.axes) == 1 and (i < MOST_ALONE or i == len(values) - 1)
-            rig = load_rig(scenario, plant) if alone else plant
+            rig = load_scenario_plant(scenario, plant) if alone else plant
             for observer in study.observers if own else study.observers[: int(alone)]:
                 given = dict.fromkeys(own, value)
                 its = scenario.observer if observer == base.observer.kind else ObserverSettings(kind=observer, **given)

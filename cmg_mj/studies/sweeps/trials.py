@@ -8,11 +8,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from cmg_mj.results.per_world_table import FIRST
+from cmg_mj.results.per_world_table import ID_COLUMNS
 from cmg_mj.results.summary_keys import KEYS
 from cmg_mj.results.trajectory import whole_file
 from cmg_mj.studies.sweeps.chunk import COLUMNS
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -22,15 +22,15 @@ FIGURES = [*(key for key in KEYS if key not in ("fell_fraction", "stopped_fracti
 """Of one trial."""
 
 
-def schema_of(study: Study) -> pa.Schema:
+def schema_of(study: SweepStudy) -> pa.Schema:
     """The columns: the point's number, what is varied, who ran and how it ended, the figures."""
     import pyarrow as pa
 
-    known = [(name, FIRST[name]) for name in COLUMNS]
+    known = [(name, ID_COLUMNS[name]) for name in COLUMNS]
     return pa.schema([*point_columns(study), *known, *((name, "float64") for name in FIGURES)])
 
 
-def point_columns(study: Study) -> list[tuple[str, str]]:
+def point_columns(study: SweepStudy) -> list[tuple[str, str]]:
     """What every table of a sweep begins with: the point's number, what is varied."""
     types = [_type_of([axis.low] if axis.is_range else axis.values) for axis in study.axes]
     return [
@@ -49,7 +49,7 @@ def _type_of(values: Sequence[Any]) -> str:
     return "string"
 
 
-def table_of(study: Study, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
+def table_of(study: SweepStudy, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
     """Rows of trials as a table; a figure that a trial does not have is null."""
     return as_table(rows, schema_of(study))
 

@@ -8,14 +8,14 @@ from cmg_mj.studies.tuning.on_logs import LogStudy, tune_on_logs
 from cmg_mj.studies.tuning.on_simulations import Recorded, halves, record, recorder
 from cmg_mj.studies.tuning.save import figures_of, files_of_study, save_study, tuning_table
 from cmg_mj.studies.tuning.save_on_logs import figures_of_logs, logs_table, save_log_study
-from cmg_mj.studies.tuning.study import BestNoise, Level, Study, best_noise, tune, tuned_scenario
+from cmg_mj.studies.tuning.study import BestNoise, NoiseLevelResult, TuningResult, best_noise, tune, tuned_scenario
 
 __all__ = [
     "BestNoise",
-    "Level",
     "LogStudy",
+    "NoiseLevelResult",
     "Recorded",
-    "Study",
+    "TuningResult",
     "best_noise",
     "figures_of",
     "figures_of_logs",

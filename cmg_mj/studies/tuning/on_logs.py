@@ -18,12 +18,12 @@ from cmg_mj.replay.alignment import Alignment
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
-from cmg_mj.replay.observer_inputs import Told, told
+from cmg_mj.replay.observer_inputs import ObserverInputs, observer_inputs
 from cmg_mj.replay.reference import alignment_of, remarks_on
 from cmg_mj.sensors.tilt import TiltNoise
-from cmg_mj.studies.tuning.parameters import Number, narrowed, numbers_of, parameters_of
+from cmg_mj.studies.tuning.parameters import TunedScalar, narrowed, numbers_of, parameters_of
 from cmg_mj.studies.tuning.search import evaluations
-from cmg_mj.studies.tuning.study import Fitter, Level, OnShare, level_of, names_of
+from cmg_mj.studies.tuning.study import NoiseLevelResult, OnShare, ParameterFit, level_of, names_of
 
 BLOCKS = 10
 """So many stretches of each log's part are scored on their own, for an interval."""
@@ -32,7 +32,7 @@ SHORTEST_S = 0.5
 
 
 @dataclass(frozen=True)
-class Logged:
+class LogSegments:
     """The parts of some logs that are fitted, or those that are scored, in stretches of equal length.
 
     Attributes:
@@ -93,7 +93,7 @@ class LogStudy:
         kind: The observer.
         given: Its parameters before.
         numbers: What was tuned.
-        idle: Names of the numbers that were not, because the estimated rate does not depend on them.
+        insensitive_parameters: Names of the numbers that were not, because the estimated rate does not depend on them.
         names: The logs.
         split: The share of each log that was fitted; the rest is scored.
         level: What came out.
@@ -105,11 +105,11 @@ class LogStudy:
 
     kind: str
     given: Mapping[str, Any]
-    numbers: Sequence[Number]
-    idle: Sequence[str]
+    numbers: Sequence[TunedScalar]
+    insensitive_parameters: Sequence[str]
     names: Sequence[str]
     split: float
-    level: Level
+    level: NoiseLevelResult
     noises: Sequence[TiltNoise]
     alignments: Sequence[Alignment | None]
     remarks: Sequence[Sequence[str]]
@@ -141,7 +141,7 @@ def tune_on_logs(
         logs: With a reference; all with the same sample period.
         kind: The observer.
         model: The pendulum, for an observer that needs it; a run's recording brings its own.
-        noises: What `noise_numbers` gives; by default each log's own, as `replay_ready` has them.
+        noises: What `noise_numbers` gives; by default each log's own, as `replay_prepared` has them.
         given: Parameters to start from and to compare with, where not the defaults, or those of a run's loop.
         split: The share of each log, from its start, that is fitted; the rest is scored.
         skip_s: So long from every start of an observer is not judged [s].
@@ -164,10 +164,10 @@ def tune_on_logs(
             raise InputError(f"{log.name}: no reference to tune to: name it, --columns rate=...")
         if abs(log.dt / dt - 1.0) > 1e-3:
             raise InputError(f"{log.name}: {1.0 / log.dt:g} Hz, {logs[0].name} {1.0 / dt:g} Hz: give --rate HZ")
-    each = [told(log, model=model, noises=noises, parameters={kind: given or {}}) for log in logs]
+    each = [observer_inputs(log, model=model, noises=noises, parameters={kind: given or {}}) for log in logs]
     given = _common(kind, logs, each)
     fit, held_out = (
-        Logged([log.cut(_share(log, split, first=first)) for log in logs], skip_s) for first in (True, False)
+        LogSegments([log.cut(_share(log, split, first=first)) for log in logs], skip_s) for first in (True, False)
     )
     for part, what in zip((*fit.logs, *held_out.logs), (*each, *each), strict=True):
         # An observer that cannot take part is refused, with the reason.
@@ -181,8 +181,8 @@ def tune_on_logs(
     def one_a_log(**tried: Any) -> list[Observer]:
         return [make(**tried) for make in makers]
 
-    fitter = Fitter(kind, one_a_log, values, fit, on_share or (lambda share: None))
-    still = fitter.idle(numbers)
+    fitter = ParameterFit(kind, one_a_log, values, fit, on_share or (lambda share: None))
+    still = fitter.insensitive_parameters(numbers)
     if len(still) == len(numbers):
         raise InputError(f"the rate that {kind} estimates does not depend on {names_of(numbers)}")
     numbers = [number for number in numbers if number not in still]
@@ -205,7 +205,7 @@ def tune_on_logs(
     )
 
 
-def _common(kind: str, logs: Sequence[Log], each: Sequence[Told]) -> dict[str, Any]:
+def _common(kind: str, logs: Sequence[Log], each: Sequence[ObserverInputs]) -> dict[str, Any]:
     """The parameters that the observer is given, the same in all logs."""
     given = dict(each[0].parameters[kind])
     for log, what in zip(logs, each, strict=True):

@@ -19,7 +19,7 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Window, inside, push_windows
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.scenario.time_grid import common_period
-from cmg_mj.simulation.batched_observers import Run, run_side_by_side
+from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 from cmg_mj.simulation.experiment import Experiment, prepare
 
 WARM_UP_S = 2.0
@@ -144,7 +144,7 @@ def record_all(
         KeyboardInterrupt: The user interrupted.
     """
     experiments = [prepare(tuning_scenario(scenario, noise)) for scenario, _, noise in wanted]
-    runs = [Run([each] * len(worlds), worlds) for each, (_, worlds, _) in zip(experiments, wanted, strict=True)]
+    runs = [BatchJob([each] * len(worlds), worlds) for each, (_, worlds, _) in zip(experiments, wanted, strict=True)]
     duration = max(each.scenario.duration_s for each in experiments)
     results = run_side_by_side(runs, on_progress=on_share and (lambda time: on_share(min(time / duration, 1.0))))
     return [_kept(*each, warm_up_s) for each in zip(wanted, experiments, results, strict=True)]

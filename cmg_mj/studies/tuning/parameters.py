@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.observers import GIVEN, Observer, observer_class
+from cmg_mj.observers import BENCH_PARAMETERS, Observer, observer_class
 
 SPAN = 1000.0
 """A parameter is searched up to so many times its given value, and down to as small a part of it."""
@@ -21,7 +21,7 @@ Make = Callable[..., Observer]
 
 
 @dataclass(frozen=True)
-class Number:
+class TunedScalar:
     """One number that can be tuned.
 
     Attributes:
@@ -56,7 +56,7 @@ def parameters_of(kind: str, observer: Observer, given: Mapping[str, Any]) -> di
         Values by name; without those that cannot be read off the observer.
     """
     signature = inspect.signature(observer_class(kind)).parameters.values()
-    defaults = {p.name: p.default for p in signature if p.name not in GIVEN}
+    defaults = {p.name: p.default for p in signature if p.name not in BENCH_PARAMETERS}
     values = {name: getattr(observer, name, default) for name, default in {**defaults, **given}.items()}
     return {name: _plain(value) for name, value in values.items() if value is not inspect.Parameter.empty}
 
@@ -68,7 +68,7 @@ def _plain(value: Any) -> Any:
     return tuple(_plain(item) for item in value) if isinstance(value, (list, tuple)) else value
 
 
-def replaced(values: Mapping[str, Any], numbers: Sequence[Number], sizes: Sequence[float]) -> dict[str, Any]:
+def replaced(values: Mapping[str, Any], numbers: Sequence[TunedScalar], sizes: Sequence[float]) -> dict[str, Any]:
     """The parameters with other sizes for some numbers."""
     changed = dict(values)
     for number, size in zip(numbers, sizes, strict=True):
@@ -84,7 +84,7 @@ def _put(value: Any, place: tuple[int, ...], new: float) -> Any:
     return tuple(_put(item, place[1:], new) if i == place[0] else item for i, item in enumerate(value))
 
 
-def numbers_of(kind: str, values: Mapping[str, Any], make: Make, chosen: Sequence[str] = ()) -> list[Number]:
+def numbers_of(kind: str, values: Mapping[str, Any], make: Make, chosen: Sequence[str] = ()) -> list[TunedScalar]:
     """The numbers to tune: every real number that is not zero, also inside tuples.
 
     Args:
@@ -133,9 +133,9 @@ def _leaves(value: Any, place: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...
         yield place, float(value)
 
 
-def _bounded(name: str, place: tuple[int, ...], given: float, values: Mapping[str, Any], make: Make) -> Number:
+def _bounded(name: str, place: tuple[int, ...], given: float, values: Mapping[str, Any], make: Make) -> TunedScalar:
     """Find by bisection how far the observer lets a number go while the others stay."""
-    unbounded = Number(name, place, given, 0.0, math.inf)
+    unbounded = TunedScalar(name, place, given, 0.0, math.inf)
     size = abs(given)
 
     def accepted(candidate: float) -> bool:
@@ -154,10 +154,12 @@ def _bounded(name: str, place: tuple[int, ...], given: float, values: Mapping[st
             inside, outside = (middle, outside) if accepted(middle) else (inside, middle)
         return inside
 
-    return Number(name, place, given, farthest(size / SPAN), farthest(size * SPAN))
+    return TunedScalar(name, place, given, farthest(size / SPAN), farthest(size * SPAN))
 
 
-def narrowed(numbers: Sequence[Number], ranges: Mapping[str, tuple[float, float]], option: str) -> list[Number]:
+def narrowed(
+    numbers: Sequence[TunedScalar], ranges: Mapping[str, tuple[float, float]], option: str
+) -> list[TunedScalar]:
     """The same numbers within ranges that the user gave.
 
     Args:

@@ -15,10 +15,10 @@ from cmg_mj.results.intervals import Interval
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.tuning.on_simulations import windows_of
-from cmg_mj.studies.tuning.study import Level, Study, best_noise, tuned_scenario
+from cmg_mj.studies.tuning.study import NoiseLevelResult, TuningResult, best_noise, tuned_scenario
 
 
-def figures_of(study: Study) -> dict[str, Any]:
+def figures_of(study: TuningResult) -> dict[str, Any]:
     """What `cmg-mj tune --json` prints."""
     best = best_noise(study)
     return {
@@ -30,14 +30,14 @@ def figures_of(study: Study) -> dict[str, Any]:
         "scored_s": [list(window) for window in windows_of(study.scenario)],
         "given_parameters": plain(study.given),
         "tuned": [number.name for number in study.numbers],
-        "idle": list(study.idle),
+        "idle": list(study.insensitive_parameters),
         "levels": [level_figures(level) for level in study.levels],
         "given_best_at_noise_density_ug_rthz": best.noise_ug_rthz,
         **({"given_best_noise_is": best.where} if len(study.levels) > 1 else {}),
     }
 
 
-def level_figures(level: Level) -> dict[str, Any]:
+def level_figures(level: NoiseLevelResult) -> dict[str, Any]:
     """One level's figures."""
     return {
         "noise_density_ug_rthz": level.noise_ug_rthz,
@@ -78,7 +78,7 @@ def _interval(interval: Interval) -> list[float | None]:
     return [_number(value) for value in interval]
 
 
-def tuning_table(study: Study) -> Table:
+def tuning_table(study: TuningResult) -> Table:
     """The table that `cmg-mj tune` prints."""
     scenario = study.scenario
     title = f"{scenario.title or 'Tuning'}: {study.kind}, seed {scenario.seed}"
@@ -117,7 +117,7 @@ def spread(ratio: Interval) -> str:
     return f"{mean} ({low} to {high})"
 
 
-def _caption(study: Study) -> str:
+def _caption(study: TuningResult) -> str:
     """What the table does not say by itself."""
     spans = ", ".join(f"{start:g} s to {end:g} s" for start, end in windows_of(study.scenario))
     lines = [f"RMS of the estimated rate less the gyro's, {spans}, on worlds that were not fitted."]
@@ -130,8 +130,8 @@ def _caption(study: Study) -> str:
         at = f"At {level.noise_ug_rthz:g} ug/rtHz the" if len(study.levels) > 1 else "The"
         fits = f"fit there is {level.fit:.2f} tuned, {level.given_fit:.2f} given"
         lines.append(f"{at} {fits}" + (f": worse than an estimate of zero, {' and '.join(worse)}." if worse else "."))
-    if study.idle:
-        lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.idle)}.")
+    if study.insensitive_parameters:
+        lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.insensitive_parameters)}.")
     if any(level.edges for level in study.levels):
         lines.append("* at a limit of its range.")
     fell = sum(level.fell for level in study.levels)
@@ -142,7 +142,7 @@ def _caption(study: Study) -> str:
     return "\n".join(lines)
 
 
-def _best(study: Study) -> str:
+def _best(study: TuningResult) -> str:
     """At which noise the given parameters are the best ones, in words."""
     best = best_noise(study)
     if best.noise_ug_rthz is None:
@@ -160,7 +160,7 @@ def files_of_study(noises_ug_rthz: Sequence[float]) -> list[str]:
     return ["tuned.json", *several]
 
 
-def save_study(folder: RunFolder | Path, study: Study, *, complete: bool = True) -> list[Path]:
+def save_study(folder: RunFolder | Path, study: TuningResult, *, complete: bool = True) -> list[Path]:
     """Write tuned.json and a scenario a sensor noise, which runs with the tuned observer.
 
     Args:

@@ -29,7 +29,7 @@ def figures_of_logs(study: LogStudy) -> dict[str, Any]:
         "split": study.split,
         "given_parameters": plain(study.given),
         "tuned": [number.name for number in study.numbers],
-        "idle": list(study.idle),
+        "idle": list(study.insensitive_parameters),
         "noise": [
             {"tilt_rad": noise.tilt, "acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}
             for noise in study.noises
@@ -55,8 +55,8 @@ def logs_table(study: LogStudy) -> Group:
         f"in {len(level.rms)} stretches. An estimate of zero: {level.zero_rms:.4f} rad/s. Fit {level.fit:.3f} tuned, "
         f"{level.given_fit:.3f} given.",
     ]
-    if study.idle:
-        lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.idle)}.")
+    if study.insensitive_parameters:
+        lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.insensitive_parameters)}.")
     if not study.tells:
         short = f"the scored stretches are {study.stretch_s:.2g} s short"
         lines.append(f"No interval: {short}; there is one from {SHORTEST_S:g} s on.")

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 from scipy.stats import qmc
 
-from cmg_mj.studies.tuning.parameters import Number
+from cmg_mj.studies.tuning.parameters import TunedScalar
 
 GRID = 13
 """Points over the range of a single number before the search narrows."""
@@ -27,7 +27,7 @@ Loss = Callable[[Sequence[float]], float]
 """Sizes -> a positive loss; infinite where there is none."""
 
 
-def idle(loss: Loss, numbers: Sequence[Number], given: float, factor: float = 10.0) -> list[Number]:
+def idle(loss: Loss, numbers: Sequence[TunedScalar], given: float, factor: float = 10.0) -> list[TunedScalar]:
     """The numbers that do not matter: ten times as large or as small, the loss is the same to six digits.
 
     Args:
@@ -56,7 +56,7 @@ def evaluations(dimension: int) -> int:
     return GRID + 15 if dimension == 1 else dimension * (SCATTER + 2 * 45)
 
 
-def search(loss: Loss, numbers: Sequence[Number], *, starts: int = 2) -> tuple[list[float], float]:
+def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tuple[list[float], float]:
     """Minimise a loss over the sizes of some numbers, each inside its range.
 
     One number: a grid over the whole range, then Brent's bounded search between the best point's neighbours.

@@ -16,7 +16,7 @@ from cmg_mj.results.intervals import Interval, PairedVerdict, paired_verdict, ra
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.tuning.on_simulations import WARM_UP_S, Recorded, Window, halves, recorder
-from cmg_mj.studies.tuning.parameters import Number, narrowed, numbers_of, parameters_of, replaced
+from cmg_mj.studies.tuning.parameters import TunedScalar, narrowed, numbers_of, parameters_of, replaced
 from cmg_mj.studies.tuning.search import crossing, evaluations, idle, search
 
 DIGITS = 4
@@ -27,7 +27,7 @@ AT_A_LIMIT = 1.02
 OnShare = Callable[[float], None]
 
 
-class Scored(Protocol):
+class ScoringData(Protocol):
     """What parameters are scored on: recorded worlds, or stretches of logs."""
 
     @property
@@ -51,12 +51,15 @@ class Scored(Protocol):
         ...
 
     def errors(self, made: Any, /) -> np.ndarray:
-        """An observer's RMS error in each, (n,) [rad/s]; NaN where it is lost. `made` is what `Fitter.make` gives."""
+        """An observer's RMS error in each, (n,) [rad/s]; NaN where it is lost.
+
+        `made` is what `ParameterFit.make` gives.
+        """
         ...
 
 
 @dataclass(frozen=True)
-class Level:
+class NoiseLevelResult:
     """What came out at one sensor noise.
 
     Attributes:
@@ -115,7 +118,7 @@ class Level:
 
 
 @dataclass(frozen=True)
-class Study:
+class TuningResult:
     """An observer tuned at one sensor noise or several.
 
     Attributes:
@@ -123,7 +126,7 @@ class Study:
         kind: The observer.
         given: Its parameters before.
         numbers: What was tuned.
-        idle: Names of the numbers that were not, because the estimated rate does not depend on them.
+        insensitive_parameters: Names of the numbers that were not, because the estimated rate does not depend on them.
         worlds: How many were to be fitted, and as many to be scored.
         window: What was scored [s].
         levels: One a sensor noise, in ascending order.
@@ -132,11 +135,11 @@ class Study:
     scenario: Scenario
     kind: str
     given: Mapping[str, Any]
-    numbers: Sequence[Number]
-    idle: Sequence[str]
+    numbers: Sequence[TunedScalar]
+    insensitive_parameters: Sequence[str]
     worlds: int
     window: Window
-    levels: Sequence[Level]
+    levels: Sequence[NoiseLevelResult]
 
 
 def tune(
@@ -150,7 +153,7 @@ def tune(
     starts: int = 2,
     recorded: Callable[..., Recorded] | None = None,
     on_share: OnShare | None = None,
-) -> Study:
+) -> TuningResult:
     """Fit the parameters of the scenario's observer to the gyro.
 
     Worlds 0 to n - 1 are fitted, worlds n to 2n - 1 scored.
@@ -179,14 +182,14 @@ def tune(
     densities = sorted(dict.fromkeys(noise_ug_rthz or [own]))
     kind, settings = scenario.observer.kind, scenario.observer
     experiment = prepare(scenario)
-    experiment.only_axis("tuning")
+    experiment.require_single_axis("tuning")
     experiment.rehearse(worlds=2)
     given = parameters_of(kind, experiment.design.observer(), settings.parameters)
     numbers = numbers_of(kind, given, _maker(experiment), parameters)
     numbers = narrowed(numbers, ranges or {}, "--range")
 
-    levels: list[Level] = []
-    still: list[Number] = []
+    levels: list[NoiseLevelResult] = []
+    still: list[TunedScalar] = []
     window: Window = (0.0, 0.0)
     recorded = recorded or recorder(halves(scenario, worlds, densities), warm_up_s=warm_up_s)
     for i, density in enumerate(densities):
@@ -199,9 +202,9 @@ def tune(
             recorded(scenario, span, noise_ug_rthz=density, warm_up_s=warm_up_s)
             for span in (range(worlds), range(worlds, 2 * worlds))
         )
-        fitter = Fitter(kind, _maker(experiment, density), given, fit, share)
+        fitter = ParameterFit(kind, _maker(experiment, density), given, fit, share)
         if not levels:
-            still, window = fitter.idle(numbers), fit.window
+            still, window = fitter.insensitive_parameters(numbers), fit.window
             if len(still) == len(numbers):
                 raise InputError(f"the rate that {kind} estimates does not depend on {names_of(numbers)}")
             numbers = [number for number in numbers if number not in still]
@@ -217,10 +220,10 @@ def tune(
             if not levels:
                 raise
             break
-    return Study(scenario, kind, given, numbers, [number.name for number in still], worlds, window, levels)
+    return TuningResult(scenario, kind, given, numbers, [number.name for number in still], worlds, window, levels)
 
 
-def names_of(numbers: Sequence[Number]) -> str:
+def names_of(numbers: Sequence[TunedScalar]) -> str:
     """Numbers in a message."""
     return ", ".join(number.name for number in numbers)
 
@@ -231,15 +234,15 @@ def _maker(experiment: Experiment, noise_ug_rthz: float | None = None) -> Callab
     if noise_ug_rthz is not None:
         sensors = experiment.scenario.sensors
         accelerometer = replace(sensors.accelerometer, noise_density_ug_rthz=noise_ug_rthz)
-        noise = experiment.plant.facts.noise(replace(sensors, accelerometer=accelerometer))
+        noise = experiment.plant.parameters.noise(replace(sensors, accelerometer=accelerometer))
     return partial(make_observer, experiment.scenario.observer.kind, dt, model, noise)
 
 
-class Fitter:
+class ParameterFit:
     """Scores parameters on the fitted worlds, and counts how often."""
 
     def __init__(
-        self, kind: str, make: Callable[..., Any], given: Mapping[str, Any], recorded: Scored, on_share: OnShare
+        self, kind: str, make: Callable[..., Any], given: Mapping[str, Any], recorded: ScoringData, on_share: OnShare
     ) -> None:
         self.kind, self.make, self.given, self.recorded = kind, make, given, recorded
         self.on_share = on_share
@@ -247,7 +250,7 @@ class Fitter:
         self.count = 0
         self.given_loss = self._mean(given)
 
-    def errors(self, parameters: Mapping[str, Any], recorded: Scored) -> np.ndarray:
+    def errors(self, parameters: Mapping[str, Any], recorded: ScoringData) -> np.ndarray:
         """Velocity RMS errors, (n_worlds,) [rad/s]; not a number where the observer refuses or fails."""
         try:
             return recorded.errors(self.make(**parameters))
@@ -260,18 +263,20 @@ class Fitter:
         errors = self.errors(parameters, self.recorded)
         return float(errors.mean()) if np.isfinite(errors).all() else math.inf
 
-    def loss(self, numbers: Sequence[Number], sizes: Sequence[float]) -> float:
+    def loss(self, numbers: Sequence[TunedScalar], sizes: Sequence[float]) -> float:
         """Mean over the worlds of the velocity RMS error [rad/s]; infinite for one that is lost."""
         self.count += 1
         self.on_share(self.count / self.expected)
         return self._mean(replaced(self.given, numbers, sizes))
 
-    def idle(self, numbers: Sequence[Number]) -> list[Number]:
+    def insensitive_parameters(self, numbers: Sequence[TunedScalar]) -> list[TunedScalar]:
         """Those that do not matter."""
         return idle(lambda sizes: self.loss(numbers, sizes), numbers, self.given_loss)
 
 
-def level_of(noise: float, fitter: Fitter, numbers: Sequence[Number], held_out: Scored, starts: int) -> Level:
+def level_of(
+    noise: float, fitter: ParameterFit, numbers: Sequence[TunedScalar], held_out: ScoringData, starts: int
+) -> NoiseLevelResult:
     """Search, and score what was found.
 
     Args:
@@ -300,7 +305,7 @@ def level_of(noise: float, fitter: Fitter, numbers: Sequence[Number], held_out: 
         if math.isfinite(fitter.loss(numbers, rounded)):  # not beyond an open limit
             sizes = rounded
     tuned = replaced(fitter.given, numbers, sizes)
-    return Level(
+    return NoiseLevelResult(
         noise_ug_rthz=noise,
         parameters=tuned,
         sizes={n.name: size for n, size in zip(numbers, sizes, strict=True)},
@@ -315,7 +320,7 @@ def level_of(noise: float, fitter: Fitter, numbers: Sequence[Number], held_out: 
     )
 
 
-def _at_a_limit(number: Number, size: float) -> bool:
+def _at_a_limit(number: TunedScalar, size: float) -> bool:
     return not number.low * AT_A_LIMIT < size < number.high / AT_A_LIMIT
 
 
@@ -334,7 +339,7 @@ class BestNoise(NamedTuple):
     """If it was found [ug/sqrt(Hz)]."""
 
 
-def best_noise(study: Study) -> BestNoise:
+def best_noise(study: TuningResult) -> BestNoise:
     """At which sensor noise the given parameters are the best ones.
 
     With one tuned number, where its best value crosses the given one, on straight lines between the levels, both in the
@@ -369,7 +374,7 @@ def best_noise(study: Study) -> BestNoise:
     return BestNoise("found", levels[least].noise_ug_rthz) if found else BestNoise("not bracketed", None)
 
 
-def tuned_scenario(study: Study, level: Level) -> Scenario:
+def tuned_scenario(study: TuningResult, level: NoiseLevelResult) -> Scenario:
     """The scenario with the tuned observer in the loop, at the level's sensor noise."""
     sensors = study.scenario.sensors
     accelerometer = replace(sensors.accelerometer, noise_density_ug_rthz=level.noise_ug_rthz)

@@ -29,7 +29,7 @@ COLOURS: dict[str, Colour] = {
 }
 """The bundled observers. Those that are often among the best are no shades of one colour."""
 
-YARDSTICKS: dict[str, Colour] = {
+BASELINE_COLOURS: dict[str, Colour] = {
     "true": (165, 165, 165),
     "gyro": (95, 130, 190),
     "zero": (120, 120, 120),
@@ -39,7 +39,7 @@ YARDSTICKS: dict[str, Colour] = {
 }
 """What observers are compared with."""
 
-OWN: tuple[Colour, ...] = ((96, 84, 120), (51, 213, 119), (219, 6, 76), (216, 77, 151))
+USER_COLOURS: tuple[Colour, ...] = ((96, 84, 120), (51, 213, 119), (219, 6, 76), (216, 77, 151))
 """Observers that are not bundled: the name decides which."""
 
 
@@ -47,7 +47,7 @@ def colour(name: str) -> Colour:
     """The colour of one observer.
 
     Args:
-        name: A bundled observer, a user's own by its dotted path, or one of `YARDSTICKS`.
+        name: A bundled observer, a user's own by its dotted path, or one of `BASELINE_COLOURS`.
 
     Returns:
         Red, green, blue, 0 to 255; for the same name always the same.
@@ -64,11 +64,11 @@ def colours(names: Iterable[str]) -> dict[str, Colour]:
     Returns:
         Name -> colour, in the order given: `colour(name)`, unless a user's own that comes before has that one.
     """
-    known = COLOURS | YARDSTICKS
+    known = COLOURS | BASELINE_COLOURS
     found: dict[str, Colour] = {}
     for name in names:
-        first = zlib.crc32(name.encode()) % len(OWN)
-        own = [*OWN[first:], *OWN[:first]]
+        first = zlib.crc32(name.encode()) % len(USER_COLOURS)
+        own = [*USER_COLOURS[first:], *USER_COLOURS[:first]]
         found.setdefault(name, known.get(name) or next((c for c in own if c not in found.values()), own[0]))
     return found
 

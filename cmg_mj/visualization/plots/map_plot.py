@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.figure_spec import Map
-from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.plots.readability import short_names
 
 EMPTY = (232, 232, 232)
 """A cell without a best."""
@@ -28,7 +28,7 @@ def draw_map(axes: Any, drawn: Map) -> None:
     """
     palette = colours(drawn.names)
     observers = list(drawn.names)
-    names = shortened(observers)
+    names = short_names(observers)
     filled = np.array([*palette.values(), EMPTY], dtype=np.uint8)[drawn.best]  # -1 is the last
     x = edges(drawn.x, log=axes.get_xscale() == "log")
     y = edges(drawn.y, log=axes.get_yscale() == "log")

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cmg_mj.visualization.plots.colours import YARDSTICKS
+from cmg_mj.visualization.plots.colours import BASELINE_COLOURS
 
 FEW = 3
 """This many observers can be followed over each other."""
@@ -29,7 +29,7 @@ LEGEND = (0.35, 0.6)
 """Shares of a plot's width and height that a legend takes."""
 
 
-def shortened(names: Sequence[str]) -> dict[str, str]:
+def short_names(names: Sequence[str]) -> dict[str, str]:
     """Observers' names as legends and tables have room for them.
 
     Args:
@@ -42,7 +42,7 @@ def shortened(names: Sequence[str]) -> dict[str, str]:
     return {name: part if short.count(part) == 1 else name for name, part in zip(names, short, strict=True)}
 
 
-def by_observer(observers: Sequence[str], summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+def figures_by_observer(observers: Sequence[str], summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """A run's numbers observer by observer.
 
     Args:
@@ -57,7 +57,7 @@ def by_observer(observers: Sequence[str], summary: Mapping[str, Any]) -> dict[st
     return {in_loop: summary, **{name: riding.get(name, {}) for name in others}}
 
 
-def best(summaries: Mapping[str, Mapping[str, Any]], always: Iterable[str] = ()) -> list[str]:
+def observers_to_draw(summaries: Mapping[str, Mapping[str, Any]], always: Iterable[str] = ()) -> list[str]:
     """Those worth being shown when there are too many.
 
     Args:
@@ -76,7 +76,7 @@ def best(summaries: Mapping[str, Mapping[str, Any]], always: Iterable[str] = ())
 
 def _rank(name: str, summary: Mapping[str, Any]) -> tuple[bool, bool, float]:
     error = next((summary[key] for key in JUDGED_BY if summary.get(key) is not None), math.inf)
-    return name in YARDSTICKS, bool(summary.get("fell")), error if math.isfinite(error) else math.inf
+    return name in BASELINE_COLOURS, bool(summary.get("fell")), error if math.isfinite(error) else math.inf
 
 
 def axis_range(sure: Sequence[np.ndarray], rather: Sequence[np.ndarray] = ()) -> tuple[float, float] | None:

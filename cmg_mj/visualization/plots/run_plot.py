@@ -13,7 +13,13 @@ from cmg_mj.results.trajectory import Trajectory, whole_file
 from cmg_mj.visualization.plots.colours import colour, colours, hexadecimal
 from cmg_mj.visualization.plots.figure_spec import Panel, Picture
 from cmg_mj.visualization.plots.map_plot import draw_map
-from cmg_mj.visualization.plots.readability import JUDGED_BY, axis_range, best, by_observer, shortened
+from cmg_mj.visualization.plots.readability import (
+    JUDGED_BY,
+    axis_range,
+    figures_by_observer,
+    observers_to_draw,
+    short_names,
+)
 
 
 def pyplot() -> Any:
@@ -128,8 +134,8 @@ def plot_run(
         rate_limit_rad_s: Largest command [rad/s].
     """
     plt = pyplot()
-    summaries = by_observer(trajectory.observers, summary)
-    few = best(summaries, always=trajectory.observers[:1])
+    summaries = figures_by_observer(trajectory.observers, summary)
+    few = observers_to_draw(summaries, always=trajectory.observers[:1])
     others = [name for name in trajectory.observers if name not in few]
     columns = max(SMALL_COLUMNS, -(-len(others) // SMALL_ROWS))
     small = [others[i : i + columns] for i in range(0, len(others), columns)]
@@ -140,7 +146,7 @@ def plot_run(
     panels += [figure.add_subplot(grid[i, :], sharex=panels[0]) for i in range(1, 5)]
     _draw_tilt(panels[0], trajectory, settle_band_deg)
     palette = {name: hexadecimal(rgb) for name, rgb in colours(trajectory.observers).items()}
-    labels = shortened(trajectory.observers)
+    labels = short_names(trajectory.observers)
     rates = _draw_estimates(panels[1], panels[2], trajectory, {name: palette[name] for name in few}, summaries)
     _draw_actuators(panels[3], panels[4], trajectory, rate_limit_rad_s)
     for i, row in enumerate(small, 5):
@@ -194,7 +200,7 @@ def _draw_estimates(
     estimates = {name: trajectory[f"estimate/{name}/x2_rad_s"] for name in palette}
     rates.plot(t, trajectory["fog_rad_s"], color=MEASURED, linewidth=0.6, label="gyro")
     rates.plot(t, true, color=INK, linewidth=1.8, label="true $x_2$")
-    labels = shortened(trajectory.observers)
+    labels = short_names(trajectory.observers)
     judged_by = next((key for key in JUDGED_BY if any(summaries[name].get(key) is not None for name in palette)), "")
     if judged_by:
         errors.plot([], [], " ", label="RMS in push windows:" if "push" in judged_by else "RMS:")

@@ -8,7 +8,7 @@ from pathlib import Path
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.recording.blueprint import default_blueprint
 from cmg_mj.visualization.recording.camera import Ball, ball
 from cmg_mj.visualization.recording.pages import log_results, log_scenario
@@ -60,8 +60,8 @@ def write_recording(
     if not names or len(set(names)) < len(names):
         raise ValueError(f"a recording needs runs of different names, not {names}")
     settings = settings or MetricsSettings()
-    labels = shortened(names).values()
-    rigs = [plant if run.axis is None else plant.along(run.axis) for run in runs]
+    labels = short_names(names).values()
+    rigs = [plant if run.axis is None else plant.single_axis(run.axis) for run in runs]
     branches = [
         Branch(
             path=f"/{part}",
@@ -76,7 +76,7 @@ def write_recording(
     with recorded(path, title_line, application_of(names, branches), default_blueprint(plant, branches)) as rec:
         end = max(run.outcome.time_s for run in runs)
         for branch, rig in zip(branches, rigs, strict=True):
-            felt = branch.run.felt(pushes)
+            felt = branch.run.pushes_on_axis(pushes)
             log_rig(rec, branch.path, rig, branch.run, felt)
             log_series(rec, branch)
             log_lane(rec, branch.path)

@@ -14,7 +14,7 @@ import rerun.blueprint as rrb
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.recording.run import Run
 from cmg_mj.visualization.recording.stream import application_of, require_enabled, set_up, strict
-from cmg_mj.visualization.recording.streaming import Growing, Shown
+from cmg_mj.visualization.recording.streaming import StreamedRun, StreamHeader
 from cmg_mj.visualization.recording.viewer import parts_of, url_of
 from cmg_mj.visualization.recording.viewer_relay import Relay
 
@@ -25,7 +25,7 @@ PATIENCE_S = 5.0
 GONE, STUCK = "it has gone", "it takes no more"
 
 
-class Live:
+class ViewerStream:
     """A run streamed to a viewer while it goes on.
 
     Use it as a context manager around the run and the writing of its files; `begin`, before the first step, `add` and
@@ -42,7 +42,7 @@ class Live:
         InputError: The environment turns rerun off.
     """
 
-    def __init__(self, url: str, shown: Shown) -> None:
+    def __init__(self, url: str, shown: StreamHeader) -> None:
         self.lost = ""
         self._url = url
         self._shown = shown
@@ -53,7 +53,7 @@ class Live:
         self._thread = threading.Thread(target=self._feed, name="live view", daemon=True)
         require_enabled(rr.RecordingStream("cmg-mj"))
 
-    def __enter__(self) -> Live:
+    def __enter__(self) -> ViewerStream:
         self._strict.__enter__()
         self._relay = Relay(*parts_of(self._url))
         self._thread.start()
@@ -74,7 +74,7 @@ class Live:
             empty: The trajectory before the first tick.
         """
         # Not in the thread: it sets MuJoCo's control callback, the whole process's, aside for a while.
-        self._growing = Growing(self._shown, empty)
+        self._growing = StreamedRun(self._shown, empty)
         self._jobs.put(self._begin)
 
     def add(self, piece: Trajectory) -> None:

@@ -13,7 +13,7 @@ from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import best, by_observer
+from cmg_mj.visualization.plots.readability import figures_by_observer, observers_to_draw
 
 BALANCING, PUSH, RECOVERING, SETTLED = "balancing", "push", "recovering", "settled"
 ENDINGS = {"fell": "fallen", "stopped": "stopped", "interrupted": "interrupted"}
@@ -38,14 +38,14 @@ class Run:
     outcome: Outcome
     axis: str | None = None
 
-    def felt(self, pushes: Sequence[Push]) -> list[Push]:
+    def pushes_on_axis(self, pushes: Sequence[Push]) -> list[Push]:
         """Those of the pushes that are about this axis."""
         return [push for push in pushes if self.axis is None or push.axis == self.axis]
 
     @property
     def observers(self) -> dict[str, Mapping[str, Any]]:
         """The observer in the loop, then those riding along, each with its numbers."""
-        return by_observer(self.trajectory.observers, self.summary)
+        return figures_by_observer(self.trajectory.observers, self.summary)
 
     @property
     def open_loop_observers(self) -> tuple[str, ...]:
@@ -56,12 +56,12 @@ class Run:
 def best_observers(run: Run, among: Collection[str] | None = None) -> list[str]:
     """The one in the loop, and the best of those riding along; only those in `among`, if it is given."""
     there = {name: of for name, of in run.observers.items() if among is None or name in among}
-    return best(there, always=[name for name in run.trajectory.observers[:1] if name in there])
+    return observers_to_draw(there, always=[name for name in run.trajectory.observers[:1] if name in there])
 
 
 def best_runs(runs: Sequence[Run]) -> list[str]:
     """Names of the runs in which the estimate was best, of those that stood to the end if there are enough."""
-    return best({run.name: {**run.summary, "fell": run.outcome.kind in ENDINGS} for run in runs})
+    return observers_to_draw({run.name: {**run.summary, "fell": run.outcome.kind in ENDINGS} for run in runs})
 
 
 def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, float]]:

@@ -12,8 +12,8 @@ from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.colours import YARDSTICKS, Colour, colours
-from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour, colours
+from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.recording.camera import Ball
 from cmg_mj.visualization.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
 from cmg_mj.visualization.recording.timeline import TIMELINE, column, instant
@@ -113,7 +113,7 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
     """
     t = run.trajectory
     time = t["time_s"]
-    true, gyro = YARDSTICKS["true"], YARDSTICKS["gyro"]
+    true, gyro = BASELINE_COLOURS["true"], BASELINE_COLOURS["gyro"]
     rows = [
         Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), gyro, 1.0, whole=False),
         Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), true, 2.5),
@@ -121,7 +121,7 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
         Series("rate/true", "true", time, t["x2_rad_s"], true, 3.0),
         Series("rate/gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False),
     ]
-    labels = shortened(t.observers)
+    labels = short_names(t.observers)
     for part, (name, color) in zip(numbered(t.observers), colours(t.observers).items(), strict=True):
         rows += _estimates(run, part, name, labels[name], color)
     rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
@@ -156,7 +156,7 @@ def _estimates(run: Run, part: str, name: str, label: str, color: Colour) -> lis
     ]
     if "bias" in said and (bias := run.observers[name].get("bias_deg")) is not None:
         ends = time[[0, -1]] if len(time) > 1 else time
-        rows.append(Series("bias/true", "true", ends, np.full(len(ends), bias), YARDSTICKS["true"], 2.5))
+        rows.append(Series("bias/true", "true", ends, np.full(len(ends), bias), BASELINE_COLOURS["true"], 2.5))
     return rows
 
 
@@ -167,11 +167,11 @@ def log_series(rec: rr.RecordingStream, branch: Lines) -> None:
         rec: The recording.
         branch: What they are of.
     """
-    log_looks(rec, branch)
+    log_styles(rec, branch)
     log_values(rec, branch)
 
 
-def log_looks(rec: rr.RecordingStream, branch: Lines) -> None:
+def log_styles(rec: rr.RecordingStream, branch: Lines) -> None:
     """How the series are drawn."""
     for row in branch.series.values():
         n = 1 if row.values.ndim == 1 else row.values.shape[1]

@@ -15,7 +15,7 @@ from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import shortened
+from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.recording.blueprint import default_blueprint
 from cmg_mj.visualization.recording.camera import ball
 from cmg_mj.visualization.recording.pages import log_results, log_scenario
@@ -33,8 +33,8 @@ from cmg_mj.visualization.recording.signals import (
     Branch,
     Lines,
     log_lane,
-    log_looks,
     log_phases,
+    log_styles,
     log_values,
     numbered,
     phase_steps,
@@ -47,7 +47,7 @@ NOW = 1e-6
 
 
 @dataclass(frozen=True)
-class Named:
+class BranchSpec:
     """What is known of one branch before the first tick.
 
     Attributes:
@@ -62,7 +62,7 @@ class Named:
 
 
 @dataclass(frozen=True)
-class Shown:
+class StreamHeader:
     """What is known of a run before its first tick.
 
     Attributes:
@@ -76,7 +76,7 @@ class Shown:
         scenario_toml: The resolved scenario.
     """
 
-    branches: Sequence[Named]
+    branches: Sequence[BranchSpec]
     plant: Plant
     dt: float
     title: str
@@ -86,7 +86,7 @@ class Shown:
     scenario_toml: str
 
 
-class Growing:
+class StreamedRun:
     """One run in a recording, ticks after ticks.
 
     Args:
@@ -94,13 +94,13 @@ class Growing:
         empty: Its trajectory before the first tick: all columns, no row.
     """
 
-    def __init__(self, shown: Shown, empty: Trajectory) -> None:
+    def __init__(self, shown: StreamHeader, empty: Trajectory) -> None:
         self.shown = shown
         self._ticks = 0
         names = [named.name for named in shown.branches]
-        places = zip(shown.branches, numbered(names), shortened(names).values(), strict=True)
+        places = zip(shown.branches, numbered(names), short_names(names).values(), strict=True)
         self._branches = [
-            _GrowingBranch(shown, named, f"/{part}", label, _along(empty, named.axis)) for named, part, label in places
+            _StreamedBranch(shown, named, f"/{part}", label, _along(empty, named.axis)) for named, part, label in places
         ]
 
     @property
@@ -144,7 +144,7 @@ class Growing:
         return default_blueprint(shown.plant, [growing.of(run) for growing, run in pairs], live=True)
 
 
-class _GrowingBranch:
+class _StreamedBranch:
     """One branch of it: the run, or an axis'.
 
     Args:
@@ -155,13 +155,13 @@ class _GrowingBranch:
         empty: Its trajectory before the first tick.
     """
 
-    def __init__(self, shown: Shown, named: Named, path: str, label: str, empty: Trajectory) -> None:
+    def __init__(self, shown: StreamHeader, named: BranchSpec, path: str, label: str, empty: Trajectory) -> None:
         self.named, self.path, self._label = named, path, label
         self._shown = shown
-        self._plant = shown.plant if named.axis is None else shown.plant.along(named.axis)
+        self._plant = shown.plant if named.axis is None else shown.plant.single_axis(named.axis)
         self._radius = size(self._plant)
         self._stride = pose_stride(shown.dt)
-        self._pushes = self._so_far(empty, 0.0).felt(shown.pushes)
+        self._pushes = self._so_far(empty, 0.0).pushes_on_axis(shown.pushes)
         self._torques = torque_steps(self._pushes, math.inf)
         self._largest = strongest(self._pushes)
         self._ticks = self._pushed = self._phased = 0
@@ -170,7 +170,7 @@ class _GrowingBranch:
 
     def begin(self, rec: rr.RecordingStream) -> None:
         log_shapes(rec, self.path, self._plant, self._radius)
-        log_looks(rec, self.branch)
+        log_styles(rec, self.branch)
         log_lane(rec, self.path)
 
     def add(self, rec: rr.RecordingStream, piece: Trajectory) -> None:

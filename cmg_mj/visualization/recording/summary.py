@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmg_mj.results import markdown
-from cmg_mj.results.summary_keys import KEYS, RIDING, heading, written
+from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, heading, written
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import FEW, shortened
+from cmg_mj.visualization.plots.readability import FEW, short_names
 from cmg_mj.visualization.recording.run import Run, best_observers, best_runs
 
 ROW_TABLES = (
@@ -21,7 +21,7 @@ ROW_TABLES = (
 
 BOLD = "In bold: those that are switched on in the plots; the legends of the other tab switch on any."
 
-RIDING_TABLES = (RIDING[:2], RIDING[2:])
+RIDING_TABLES = (OPEN_LOOP_COLUMNS[:2], OPEN_LOOP_COLUMNS[2:])
 """What there is of an observer that rides along, table by table."""
 
 
@@ -76,7 +76,7 @@ def _by_column(runs: Sequence[Run]) -> str:
         for key in KEYS
         if any(key in run.summary for run in runs)
     ]
-    return markdown.table(("", *shortened([run.name for run in runs]).values()), rows)
+    return markdown.table(("", *short_names([run.name for run in runs]).values()), rows)
 
 
 def _by_row(runs: Sequence[Run]) -> list[str]:
@@ -93,7 +93,7 @@ def _by_row(runs: Sequence[Run]) -> list[str]:
 
 def _marked(names: Sequence[str], best: Sequence[str]) -> list[str]:
     """Names, shortened; in bold those that are switched on."""
-    return [f"**{short}**" if name in best else short for name, short in shortened(names).items()]
+    return [f"**{short}**" if name in best else short for name, short in short_names(names).items()]
 
 
 def _outcome(run: Run) -> str:

@@ -17,7 +17,7 @@ LOOKED_AT_ALONG = (125.0, -20.0)
 """Where the camera looks at first, azimuth and elevation, unless the model file says it [deg]."""
 
 
-def seen(plant: Plant) -> Plant:
+def drawn_plant(plant: Plant) -> Plant:
     """The same rig on a model of its own, which has what is only seen as well.
 
     Args:
@@ -32,11 +32,11 @@ def seen(plant: Plant) -> Plant:
     view = other.model.vis.global_
     if (view.azimuth, view.elevation) == MUJOCO_LOOKS_ALONG:
         view.azimuth, view.elevation = LOOKED_AT_ALONG
-    take_numbers(other.model, plant.model)
+    copy_physics_numbers(other.model, plant.model)
     return other
 
 
-def take_numbers(model: mujoco.MjModel, of: mujoco.MjModel) -> None:
+def copy_physics_numbers(model: mujoco.MjModel, of: mujoco.MjModel) -> None:
     """Have a model with more geoms step as another of the same rig does: every physical number is the other's.
 
     Args:

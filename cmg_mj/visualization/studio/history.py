@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.multi_axis import AxesController
+from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.studio.settings import law_settings
 
@@ -22,7 +22,7 @@ MOST_SAMPLES = 200_000
 
 
 @dataclass(frozen=True)
-class Told:
+class HistoryEntry:
     """What a controller was told before one of its samples: to be an experiment's.
 
     Attributes:
@@ -36,7 +36,7 @@ class Told:
     afresh: bool
 
 
-class Memory:
+class ControllerHistory:
     """Of a session's controller.
 
     Args:
@@ -52,7 +52,7 @@ class Memory:
         self.whole = True
         self._steps = array("q")
         self._numbers = array("d")
-        self._told = [Told(0, experiment, True)]
+        self._told = [HistoryEntry(0, experiment, True)]
 
     def show(self, step: int, data: mujoco.MjData) -> None:
         """Keep what the controller has been shown at a physics step: sensordata and joint rates."""
@@ -68,7 +68,7 @@ class Memory:
 
     def tell(self, experiment: Experiment, *, afresh: bool) -> None:
         """Keep that from the next sample on the controller is this experiment's."""
-        self._told.append(Told(len(self._steps), experiment, afresh))
+        self._told.append(HistoryEntry(len(self._steps), experiment, afresh))
 
     def has(self, step: int) -> bool:
         """Whether the controller can be had as it was before a physics step; nothing was left out on the way there."""
@@ -83,7 +83,7 @@ class Memory:
         """How many samples it was shown before a physics step."""
         return int(np.searchsorted(np.asarray(self._steps), step))
 
-    def back_to(self, step: int) -> tuple[Controller | AxesController, Experiment]:
+    def back_to(self, step: int) -> tuple[Controller | MultiAxisController, Experiment]:
         """The controller as it was before its update at a physics step. What was later is forgotten.
 
         Args:
@@ -105,16 +105,16 @@ class Memory:
         controller = experiment.controller()
         plant = experiment.plant
         sensors = plant.model.nsensordata
-        for told, after in zip(since, [*since[1:], Told(count, experiment, False)], strict=True):
+        for told, after in zip(since, [*since[1:], HistoryEntry(count, experiment, False)], strict=True):
             adopt(controller, experiment, told.experiment)
             experiment = told.experiment
             for i in range(told.count, after.count):
                 numbers = self._numbers[i * width : (i + 1) * width].tolist()
-                controller.update(self._steps[i], plant.ideal(numbers[:sensors], numbers[sensors:]))
+                controller.update(self._steps[i], plant.ideal_readings(numbers[:sensors], numbers[sensors:]))
         return controller, experiment
 
 
-def adopt(controller: Controller | AxesController, was: Experiment, now: Experiment) -> None:
+def adopt(controller: Controller | MultiAxisController, was: Experiment, now: Experiment) -> None:
     """Have a controller of one experiment be that of another, which differs from it in what may change while it runs.
 
     Of a rig of several axes each axis' controller changes in what differs about that axis.
@@ -129,7 +129,7 @@ def adopt(controller: Controller | AxesController, was: Experiment, now: Experim
     """
     for part, of, own in zip(controller.parts, was.parts, now.parts, strict=True):
         before, after = of.scenario, own.scenario
-        part.exchange(
+        part.swap_components(
             observer=own.design.observer() if after.observer != before.observer else None,
             law=own.design.fresh_law() if law_settings(after) != law_settings(before) else None,
             sensors=after.sensors if after.sensors != before.sensors else None,

@@ -11,13 +11,13 @@ import mujoco
 import numpy as np
 
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.multi_axis import AxesController
+from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.plant.mujoco_state import control_callback
+from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.studio.drawn_plant import seen, take_numbers
-from cmg_mj.visualization.studio.history import Memory, adopt
+from cmg_mj.visualization.studio.drawn_plant import copy_physics_numbers, drawn_plant
+from cmg_mj.visualization.studio.history import ControllerHistory, adopt
 from cmg_mj.visualization.studio.settings import fields_of
 from cmg_mj.visualization.studio.user_push import Pushes
 
@@ -25,7 +25,7 @@ KEPT_TICKS = 2400
 """Of what is plotted: 12 s at 200 Hz."""
 
 
-class Shown(NamedTuple):
+class PlottedTick(NamedTuple):
     """A control tick as it is plotted, of one axis: x1, its true and its estimated rate, u."""
 
     time_s: float
@@ -36,7 +36,7 @@ class Shown(NamedTuple):
     push_n_m: float
 
 
-class Live:
+class StudioSession:
     """A scenario that is stepped by whoever owns its data. As long as nobody interferes, it is the runner's trajectory.
 
     Args:
@@ -55,12 +55,12 @@ class Live:
 
     def __init__(self, experiment: Experiment) -> None:
         self.base = self.now = experiment
-        self.plant = seen(experiment.plant)
+        self.plant = drawn_plant(experiment.plant)
         self.note = ""
         self.timestep = self.plant.timestep
         scenario = experiment.scenario
         self.pushes = Pushes(scenario.push, scenario.swing, self.plant.axis_names, self.timestep)
-        self.ticks: deque[tuple[Shown, ...]] = deque(maxlen=KEPT_TICKS)
+        self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=KEPT_TICKS)
         self._begin(0)
 
     @property
@@ -81,7 +81,7 @@ class Live:
         initial = self.now.plant.new_data()
         everything = int(mujoco.mjtState.mjSTATE_INTEGRATION)
         mujoco.mj_copyState(self.now.plant.model, initial, data, everything)
-        with control_callback(None):
+        with set_control_callback(None):
             mujoco.mj_forward(self.model, data)
         self.begin(data)
 
@@ -94,8 +94,8 @@ class Live:
         self._begin(step)
 
     def _begin(self, step: int) -> None:
-        self.controller: Controller | AxesController = self.now.controller()
-        self.memory = Memory(self.now, step)
+        self.controller: Controller | MultiAxisController = self.now.controller()
+        self.memory = ControllerHistory(self.now, step)
         self.stopped = ""
         self.diverged = False
         self._stopped_at = 0
@@ -116,8 +116,8 @@ class Live:
         Returns:
             Whether there was a control tick.
         """
-        step = self.attend(data)
-        torques = self.pushes.at(step, self.controller.beat)
+        step = self.sync_to_time(data)
+        torques = self.pushes.at(step, self.controller.steps_per_sample)
         self._push(data, torques)
         ticked = not self.stopped and self._control(data, step, torques)
         mujoco.mj_step(self.model, data)
@@ -137,7 +137,7 @@ class Live:
                 data.qfrc_applied[dof] += share * torque
 
     def _control(self, data: mujoco.MjData, step: int, torques: Sequence[float]) -> bool:
-        lean = self.plant.lean(data.qpos)
+        lean = self.plant.largest_tilt(data.qpos)
         if not abs(lean) <= math.radians(self.now.scenario.metrics.fall_angle_deg):
             self._stop(data, step, f"the rig fell at t = {data.time:g} s; reset, or go back in time")
             return False
@@ -146,26 +146,26 @@ class Live:
         except (InputError, RunStopped) as error:
             self._stop(data, step, str(error))
             return False
-        if step % self.controller.beat == 0:
+        if step % self.controller.steps_per_sample == 0:
             self.memory.show(step, data)
         if ticked:
             axes = range(len(torques))
             self.ticks.append(tuple(self._shown(data, axis, torques[axis]) for axis in axes))
         return ticked
 
-    def _shown(self, data: mujoco.MjData, axis: int, torque: float) -> Shown:
+    def _shown(self, data: mujoco.MjData, axis: int, torque: float) -> PlottedTick:
         """The last tick of an axis."""
         line, tick = self.plant.axes[axis].line, self.controller.parts[axis].tick
         assert tick is not None
         x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
-        return Shown(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u, torque)
+        return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u, torque)
 
     def _stop(self, data: mujoco.MjData, step: int, why: str) -> None:
         self.stopped, self._stopped_at = why, step
         for axis in self.plant.axes:
             data.ctrl[axis.servos] = 0.0
 
-    def attend(self, data: mujoco.MjData) -> int:
+    def sync_to_time(self, data: mujoco.MjData) -> int:
         """Bring the controller to where the state is, should somebody have moved it in time; the step it is at.
 
         History holds states only. The controller, all that was changed, and the pushes by hand become what they were.
@@ -181,7 +181,7 @@ class Live:
         if self.memory.has(step):
             try:
                 self.controller, was = self.memory.back_to(step)
-                self._take(was)
+                self._apply_settings(was)
                 self.stopped, self.note, self.diverged = "", "", False
                 return step
             except (InputError, RunStopped) as error:
@@ -191,7 +191,7 @@ class Live:
         self._begin(step)
         return step
 
-    def as_of(self, data: mujoco.MjData) -> tuple[Experiment, str]:
+    def settings_at(self, data: mujoco.MjData) -> tuple[Experiment, str]:
         """The scenario, and why the controller does not control, as they were where the state is; looked at only."""
         step = self._step_of(data)
         if step == self._next:
@@ -211,43 +211,43 @@ class Live:
             values: By field, named as with `--set`: the observer, the law, `controller.feedback`, the accelerometers'
                 noise, e.
         """
-        step = self.attend(data)
+        step = self.sync_to_time(data)
         try:
             fields = fields_of(self.base, self.now, values)
             if self.now.scenario.plant.timestep_s is None:
                 fields["plant.timestep_s"] = self.timestep  # the one it runs with
-            new = self.now.with_values(fields)
+            new = self.now.with_settings(fields)
             if not self.stopped:
                 adopt(self.controller, self.now, new)
         except InputError as error:
             self.note = str(error)
             return
-        new.scenario._where = self.base.scenario._where  # which would grow with every change
+        new.scenario._source = self.base.scenario._source  # which would grow with every change
         self.note = "; ".join(new.hints)
-        self._take(new)
+        self._apply_settings(new)
         if self.stopped:
-            self.again(data)
+            self.restart_controller(data)
         elif self.memory.whole:
             self.memory.tell(new, afresh=False)
         assert step == self._next
 
-    def _take(self, experiment: Experiment) -> None:
+    def _apply_settings(self, experiment: Experiment) -> None:
         """Go on as this experiment's; the rig changes in place, so that whoever holds its model goes on too."""
         before, after = ([own.scenario.plant for own in each.parts] for each in (self.now, experiment))
         if after != before:
-            take_numbers(self.model, experiment.plant.model)
+            copy_physics_numbers(self.model, experiment.plant.model)
         self.now = experiment
 
-    def again(self, data: mujoco.MjData) -> None:
+    def restart_controller(self, data: mujoco.MjData) -> None:
         """Start the controller afresh at the present state, as after an observer that failed."""
-        step = self.attend(data)
+        step = self.sync_to_time(data)
         self.stopped = self.note = ""
         self.controller = self.now.controller()
         if self.memory.whole:
             self.memory.tell(self.now, afresh=True)
         else:
-            self.memory = Memory(self.now, step)
+            self.memory = ControllerHistory(self.now, step)
 
     def push(self, data: mujoco.MjData, torque: float, duration_s: float, axis: int = 0) -> None:
         """Push from now on: torque [N m] about a tilt axis, given by its place, for so long [s]."""
-        self.pushes.add(self.attend(data), torque, duration_s, axis)
+        self.pushes.add(self.sync_to_time(data), torque, duration_s, axis)

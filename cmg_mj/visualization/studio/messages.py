@@ -10,14 +10,14 @@ from mujoco.studio import messages
 
 
 @dataclass(frozen=True)
-class Choose(messages.Event):
+class ChangeSettings(messages.Event):
     """The user changes settings of the scenario, named as with `--set`."""
 
     values: dict[str, Any]
 
 
 @dataclass(frozen=True)
-class PushNow(messages.Event):
+class PushRequest(messages.Event):
     """The user pushes: a torque about the tilt axis that is shown [N m], for so long [s]."""
 
     torque_n_m: float
@@ -32,12 +32,12 @@ class ShowAxis(messages.Event):
 
 
 @dataclass(frozen=True)
-class StartAgain(messages.Event):
+class RestartController(messages.Event):
     """The user starts a controller that has stopped."""
 
 
 @dataclass(frozen=True, eq=False)
-class Standing(messages.Snapshot):
+class SessionState(messages.Snapshot):
     """Where things stand, for the panel.
 
     Attributes:
@@ -52,7 +52,7 @@ class Standing(messages.Snapshot):
         law: Which of them it is.
         stopped: Why the controller has stopped.
         note: What the last change came to.
-        ticks: What is plotted, (n_ticks, 6), columns as in `live.Shown`.
+        ticks: What is plotted, (n_ticks, 6), columns as in `live.PlottedTick`.
     """
 
     title: str = ""

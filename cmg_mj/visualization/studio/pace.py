@@ -10,7 +10,7 @@ MEASURED_OVER_S = 0.5
 """[s]"""
 
 
-class Pace:
+class StepScheduler:
     """Simulated time against a clock.
 
     Args:

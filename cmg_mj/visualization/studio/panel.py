@@ -10,7 +10,7 @@ from mujoco.studio import messages, plugin
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
-from cmg_mj.visualization.studio.messages import Choose, PushNow, ShowAxis, Standing, StartAgain
+from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER
 
 TITLE = "Gyroscopic balance"
@@ -29,7 +29,7 @@ class Panel(plugin.ViewerPlugin):
     """
 
     def __init__(self) -> None:
-        self.standing = Standing()
+        self.standing = SessionState()
         self._curves: dict[str, list[float]] = {}
         self._torque, self._duration = 1.0, 0.1
         self._typed: dict[str, float] = {}
@@ -37,7 +37,7 @@ class Panel(plugin.ViewerPlugin):
         self._broken = False
 
     @messages.handler
-    def on_standing(self, event: Standing) -> None:
+    def on_standing(self, event: SessionState) -> None:
         """Prepare what is drawn until the next one."""
         self.standing = event
         recent = event.ticks[event.ticks[:, 0] > event.time_s - PLOTTED_S]
@@ -81,7 +81,7 @@ class Panel(plugin.ViewerPlugin):
         if now.stopped:
             imgui.TextWrapped(f"The controller has stopped: {now.stopped}")
             if imgui.Button("Start it again"):
-                self._send(StartAgain())
+                self._send(RestartController())
         if now.note:
             imgui.TextWrapped(now.note)
         if now.settings:
@@ -97,7 +97,7 @@ class Panel(plugin.ViewerPlugin):
             imgui.SeparatorText(f"The last {PLOTTED_S:g} s")
             self._build_plots(now)
 
-    def _build_choices(self, now: Standing) -> None:
+    def _build_choices(self, now: SessionState) -> None:
         observer = _chosen("observer", now.settings[OBSERVER], {name: name for name in now.observers})
         if observer is not None:
             self._choose({OBSERVER: observer})
@@ -110,12 +110,12 @@ class Panel(plugin.ViewerPlugin):
         if feedback is not None:
             self._choose({FEEDBACK: feedback})
 
-    def _build_disturbances(self, now: Standing) -> None:
+    def _build_disturbances(self, now: SessionState) -> None:
         _, self._torque = imgui.InputDouble("torque [N m]", self._torque, 0.1, 1.0, "%.2f")
         _, self._duration = imgui.InputDouble("duration [s]", self._duration, 0.05, 0.5, "%.3f")
         for label, sign in (("Push +", 1.0), ("Push -", -1.0)):
             if imgui.Button(label) and self._duration > 0.0:
-                self._send(PushNow(sign * self._torque, self._duration))
+                self._send(PushRequest(sign * self._torque, self._duration))
             imgui.SameLine()
         imgui.NewLine()
         on_all = ", all axes" if len(now.axes) > 1 else ""
@@ -132,7 +132,7 @@ class Panel(plugin.ViewerPlugin):
         if not imgui.IsItemActive():
             self._typed.pop(field, None)
 
-    def _build_plots(self, now: Standing) -> None:
+    def _build_plots(self, now: SessionState) -> None:
         for title, unit, curves in (
             ("Tilt", "deg", {"tilt": "tilt"}),
             ("Tilt rate", "rad/s", {"rate": "true", "estimate": "estimate"}),
@@ -150,7 +150,7 @@ class Panel(plugin.ViewerPlugin):
                 implot.EndPlot()
 
     def _choose(self, values: dict[str, Any]) -> None:
-        self._send(Choose(values))
+        self._send(ChangeSettings(values))
 
     def _send(self, message: messages.Message) -> None:
         self.viewer.send_to_sim(message)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.scenario.loading import as_fields_of
+from cmg_mj.scenario.loading import axis_fields
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment
 
@@ -16,7 +16,7 @@ LAW = "controller"
 """All of the law but what is no law's."""
 NO_LAWS = ("feedback", "compensate_turning")
 """Fields of [controller] that stay whatever the law."""
-ANY_LAWS = ("rate_limit_rad_s", "angle_source", "bias_trim_s")
+STUDIO_LAW_FIELDS = ("rate_limit_rad_s", "angle_source", "bias_trim_s")
 """Fields of [controller] that every law has as the scenario has them."""
 
 WEIGHTS = {"state_cost": [1.0, 1.0, 1.0, 1.0], "input_cost": 1.0}
@@ -47,14 +47,14 @@ def laws_of(base: Experiment) -> dict[str, dict[str, Any]]:
     """The laws that can be chosen: name -> the settings that make them, on every axis."""
     scenario = base.scenario
     own = law_settings(scenario)
-    common = {name: own[name] for name in ("rate_hz", *ANY_LAWS)}
+    common = {name: own[name] for name in ("rate_hz", *STUDIO_LAW_FIELDS)}
     made: dict[str, dict[str, Any]] = {
         "Table 2": {**common, "kind": "state_feedback"},
         "LQR": {**common, "kind": "state_feedback", "lqr": own.get("lqr", WEIGHTS)},
         "LQG": {**common, "kind": "lqg"},
     }
     of_axes = _laws_of_axes(scenario)
-    kept = {axis: {name: law[name] for name in ANY_LAWS if name in law} for axis, law in of_axes.items()}
+    kept = {axis: {name: law[name] for name in STUDIO_LAW_FIELDS if name in law} for axis, law in of_axes.items()}
     laws = {name: {LAW: settings, **kept} for name, settings in made.items()}
     scenarios = {LAW: own, **of_axes}
     if scenarios not in laws.values():
@@ -72,12 +72,12 @@ def _laws_of_axes(scenario: Scenario) -> dict[str, dict[str, Any]]:
     """What axes have of a law of their own, by field."""
     return {
         f"axes.{axis}.{LAW}": {name: value for name, value in section.items() if name not in NO_LAWS}
-        for axis, section in ((axis, as_fields_of(own).get(LAW, {})) for axis, own in scenario.axes.items())
+        for axis, section in ((axis, axis_fields(own).get(LAW, {})) for axis, own in scenario.axes.items())
     }
 
 
 def fields_of(base: Experiment, now: Experiment, values: Mapping[str, Any]) -> dict[str, Any]:
-    """A choice for all axes as `Experiment.with_values` takes it.
+    """A choice for all axes as `Experiment.with_settings` takes it.
 
     Args:
         base: The scenario as it was opened: an observer that it has, on an axis too, has its parameters from there.
@@ -98,7 +98,7 @@ def fields_of(base: Experiment, now: Experiment, values: Mapping[str, Any]) -> d
         fields[LAW] = {**fields[LAW], **stays}
         for axis in now.scenario.axes:
             fields.pop(f"axes.{axis}.{LAW}", None)
-    before = {axis: as_fields_of(own) for axis, own in now.scenario.axes.items()}
+    before = {axis: axis_fields(own) for axis, own in now.scenario.axes.items()}
     axes = {axis: _of_axis(base, axis, own, values) for axis, own in before.items()}
     return {"axes": axes, **fields} if axes != before else fields
 
@@ -110,7 +110,7 @@ def _of_axis(base: Experiment, axis: str, own: Mapping[str, Any], values: Mappin
         left = _without(left, name.split("."))
     if OBSERVER in values:
         (of_base,) = (part.scenario.observer for part in base.parts if part.plant.axis.name == axis)
-        section = as_fields_of(base.scenario.axes[axis]).get("observer", {})
+        section = axis_fields(base.scenario.axes[axis]).get("observer", {})
         left["observer"] = section if of_base.kind == values[OBSERVER] else {}
     if LAW in values:
         stays = {name: value for name, value in own.get(LAW, {}).items() if name in NO_LAWS}

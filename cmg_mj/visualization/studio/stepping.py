@@ -15,9 +15,9 @@ from mujoco.studio import (
 
 from cmg_mj.errors import InputError
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.studio.live import Live
-from cmg_mj.visualization.studio.messages import Choose, PushNow, ShowAxis, Standing, StartAgain
-from cmg_mj.visualization.studio.pace import Pace
+from cmg_mj.visualization.studio.live import StudioSession
+from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
+from cmg_mj.visualization.studio.pace import StepScheduler
 from cmg_mj.visualization.studio.settings import law_of, laws_of, observers_of, settings_of
 
 AFTER_STUDIO = 0
@@ -50,13 +50,13 @@ class Stepping(plugin.SimPlugin):
         self._opened = opened
         self._clock = clock
         self._sleep = sleep
-        self._pace = Pace(clock)
+        self._pace = StepScheduler(clock)
         self._pause = sim.PauseState.UNPAUSED
         self._single_steps = 0
         self._said = -1.0
         self._complaint = ""
         self._axis = ""
-        self.live: Live | None = None
+        self.live: StudioSession | None = None
 
     # --- model and time ------------------------------------------------------------------------------------
 
@@ -64,7 +64,7 @@ class Stepping(plugin.SimPlugin):
     def on_load_model(self, event: messages.LoadModelEvent) -> bool:
         """Load the scenario's rig, or load it again; a model file dropped on the viewer takes the rig's place."""
         try:
-            live = Live(self._opened(event.path))
+            live = StudioSession(self._opened(event.path))
         except InputError as error:
             self._complain(str(error))
             return True
@@ -151,14 +151,14 @@ class Stepping(plugin.SimPlugin):
     # --- the panel -----------------------------------------------------------------------------------------
 
     @messages.handler
-    def on_choose(self, event: Choose) -> None:
+    def on_choose(self, event: ChangeSettings) -> None:
         """Change settings of the scenario."""
         if self.live is not None and self.handle.data is not None:
             self._complaint = ""
             self.live.choose(self.handle.data, event.values)
 
     @messages.handler
-    def on_push(self, event: PushNow) -> None:
+    def on_push(self, event: PushRequest) -> None:
         """Push."""
         if self.live is not None and self.handle.data is not None:
             self.live.push(self.handle.data, event.torque_n_m, event.duration_s, self._shown(self.live))
@@ -168,31 +168,31 @@ class Stepping(plugin.SimPlugin):
         """Show another axis, and push about it from now on."""
         self._axis = event.axis
 
-    def _shown(self, live: Live) -> int:
+    def _shown(self, live: StudioSession) -> int:
         """The place of the axis that is shown: of the one that was chosen, if the rig has it, or else the first."""
         names = live.plant.axis_names
         return names.index(self._axis) if self._axis in names else 0
 
     @messages.handler
-    def on_start_again(self, _: StartAgain) -> None:
+    def on_start_again(self, _: RestartController) -> None:
         """Start a controller that has stopped."""
         if self.live is not None and self.handle.data is not None:
-            self.live.again(self.handle.data)
+            self.live.restart_controller(self.handle.data)
 
     def _complain(self, what: str) -> None:
         self._complaint = what
         logger.warning("%s", what)
 
-    def standing(self) -> Standing:
+    def standing(self) -> SessionState:
         """Where things stand, for the panel."""
         live, data = self.live, self.handle.data
         if live is None or data is None:
-            return Standing(note=self._complaint)
-        now, stopped = live.as_of(data)
+            return SessionState(note=self._complaint)
+        now, stopped = live.settings_at(data)
         axis = self._shown(live)
         own = now.parts[axis]
         ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 6)
-        return Standing(
+        return SessionState(
             title=now.scenario.title,
             time_s=data.time,
             axes=tuple(live.plant.axis_names),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from cmg_mj.scenario.disturbances import Push, Swing, swung
+from cmg_mj.scenario.disturbances import Push, Swing, add_swing_torques
 from cmg_mj.sensors.timing import whole_steps
 
 Held = tuple[int, int, float, int]
@@ -84,4 +84,4 @@ class Pushes:
         start = step // beat * beat
         end = start + beat
         start, end = max([start, *self._edges[:place][-1:]]), min([end, *self._edges[place : place + 1]])
-        return swung(held, self._swings, self._axes, (start + 0.5 * (end - start)) * self._timestep)
+        return add_swing_torques(held, self._swings, self._axes, (start + 0.5 * (end - start)) * self._timestep)

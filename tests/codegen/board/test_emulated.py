@@ -53,7 +53,7 @@ def test_it_counts_instructions_and_stack(tmp_path: Path) -> None:
     costs = []
     for more in ("", '__asm volatile(".rept 250\\n\\tnop\\n\\t.endr");'):
         with Board(toy(tmp_path, step=more), counting=True) as board:
-            assert board.nops() == [0, 100, 1000]
+            assert board.calibration_counts() == [0, 100, 1000]
             board.init(0.0, 0.0, 0.0)
             seen = {board.step(0.1, 0.2, 0.3, 0.4)[1] for _ in range(20)}
             assert len(seen) == 1

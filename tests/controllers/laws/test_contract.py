@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, load_scenario, prepare, sweep
-from cmg_mj.controllers.laws import LAWS, Fed, Law, law_class, make_law
-from cmg_mj.controllers.laws.protocol import fed, needs
-from cmg_mj.controllers.laws.registry import GIVEN
+from cmg_mj.controllers.laws import LAWS, FeedbackState, Law, law_class, make_law
+from cmg_mj.controllers.laws.protocol import feedback_state, needs
+from cmg_mj.controllers.laws.registry import BENCH_PARAMETERS
 from cmg_mj.observers import Measurement
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.studies.tuning.on_simulations import tuning_scenario
@@ -28,17 +28,20 @@ def law(kind: str, rate_limit: float = 4.7) -> Law:
     return make_law(kind, DT, rate_limit, PAPER, NOISE)
 
 
-def samples(n: int, shape: tuple[int, ...] = (), seed: int = 0) -> list[tuple[Measurement, Fed]]:
+def samples(n: int, shape: tuple[int, ...] = (), seed: int = 0) -> list[tuple[Measurement, FeedbackState]]:
     rng = np.random.default_rng(seed)
     tilt, rate, gimbal = 0.03 * rng.normal(size=(n, *shape)), rng.normal(size=(n, *shape)), rng.normal(size=(n, *shape))
-    return [(Measurement(*parts[::2]), fed(*parts)) for parts in zip(*map(_listed, (tilt, rate, gimbal)), strict=True)]
+    return [
+        (Measurement(*parts[::2]), feedback_state(*parts))
+        for parts in zip(*map(_listed, (tilt, rate, gimbal)), strict=True)
+    ]
 
 
 def _listed(signal: np.ndarray) -> list:
     return signal.tolist() if signal.ndim == 1 else list(signal)
 
 
-def commands(of: Law, given: list[tuple[Measurement, Fed]]) -> np.ndarray:
+def commands(of: Law, given: list[tuple[Measurement, FeedbackState]]) -> np.ndarray:
     state, u, found = of.init(given[0][0]), 0.0 * given[0][0].y1, []
     for y, x in given:
         state, u = of.step(state, y, x, u)
@@ -64,7 +67,7 @@ def test_is_a_frozen_value(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_says_nothing_at_the_equilibrium(kind: str) -> None:
-    nothing = (Measurement(0.0, 0.0), fed(0.0, 0.0, 0.0))
+    nothing = (Measurement(0.0, 0.0), feedback_state(0.0, 0.0, 0.0))
     np.testing.assert_array_equal(commands(law(kind), [nothing] * 5), 0.0)
 
 
@@ -86,14 +89,14 @@ def test_many_worlds_are_single_ones(kind: str, rate_limit: float) -> None:
     assert np.abs(together).max() == rate_limit
     assert np.abs(together).min() < rate_limit
     for i in range(worlds):
-        one = [(Measurement(*(float(p[i]) for p in y)), Fed(*(float(p[i]) for p in x))) for y, x in many]
+        one = [(Measurement(*(float(p[i]) for p in y)), FeedbackState(*(float(p[i]) for p in x))) for y, x in many]
         np.testing.assert_array_equal(commands(of, one), together[:, i])
 
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_a_law_that_needs_no_estimate_takes_none(kind: str) -> None:
     of, given = law(kind), samples(40)
-    other = [(y, fed(7.0, 7.0, 7.0, (7.0,))) for y, _ in given]
+    other = [(y, feedback_state(7.0, 7.0, 7.0, (7.0,))) for y, _ in given]
     assert (commands(of, given) == commands(of, other)).all() == (needs(of) == ())
 
 
@@ -129,7 +132,7 @@ def test_worlds_of_other_limits_share_a_batch(kind: str) -> None:
 
 def test_what_the_bench_gives_is_no_parameter() -> None:
     for kind in EVERY:
-        given: dict[str, Any] = dict.fromkeys(GIVEN)
+        given: dict[str, Any] = dict.fromkeys(BENCH_PARAMETERS)
         assert {"dt", "rate_limit"} <= given.keys() & inspect.signature(law_class(kind)).parameters.keys()
 
 
@@ -163,7 +166,7 @@ class RaisesLate:
     def init(self, y: Measurement) -> int:
         return 0
 
-    def step(self, state: int, y: Measurement, x: Fed, u: Any) -> tuple[int, Any]:
+    def step(self, state: int, y: Measurement, x: FeedbackState, u: Any) -> tuple[int, Any]:
         if state == 40:
             raise KeyError("late")
         return state + 1, -35.0 * x.x1 - 4.0 * x.x2
@@ -198,5 +201,5 @@ def test_a_law_without_an_integrator_is_recorded_and_plotted(elsewhere: None) ->
 
 
 class NoMemory(RaisesLate):
-    def step(self, state: int, y: Measurement, x: Fed, u: Any) -> tuple[int, Any]:
+    def step(self, state: int, y: Measurement, x: FeedbackState, u: Any) -> tuple[int, Any]:
         return 0, -35.0 * x.x1 - 4.0 * x.x2 + x.x3

@@ -14,7 +14,7 @@ from scipy.linalg import expm, solve_discrete_are
 from cmg_mj import load_scenario, prepare
 from cmg_mj.controllers.laws import make_law
 from cmg_mj.controllers.laws.lqg import Lqg
-from cmg_mj.controllers.laws.protocol import fed
+from cmg_mj.controllers.laws.protocol import feedback_state
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.sensors.tilt import TiltNoise
@@ -114,7 +114,7 @@ def joint(of: Lqg) -> np.ndarray:
     columns = []
     for unit in np.eye(9).tolist():
         x, state = np.array(unit[:4]), type(of.init(Measurement(0.0, 0.0)))(*unit[4:])
-        state, u = of.step(state, Measurement(float(x[0]), float(x[2])), fed(0.0, 0.0, 0.0), 0.0)
+        state, u = of.step(state, Measurement(float(x[0]), float(x[2])), feedback_state(0.0, 0.0, 0.0), 0.0)
         columns.append([*(F @ x + G[:, 0] * u), *state])
     return np.array(columns).T
 
@@ -146,7 +146,7 @@ def errors(worlds: int = 3000, seconds: float = 16.0) -> tuple[Lqg, np.ndarray]:
         if k * of.dt >= 12.0 and k % 100 == 0:  # the filter's slowest pole is at -0.37 1/s
             found.append((x - np.array(state[:4])).T)
         y = Measurement(x[0] + NOISE.tilt * rng.normal(size=worlds), x[2] + NOISE.gimbal * rng.normal(size=worlds))
-        state, u = of.step(state, y, fed(0.0, 0.0, 0.0), u)
+        state, u = of.step(state, y, feedback_state(0.0, 0.0, 0.0), u)
         x = F @ x + G * u + root @ rng.normal(size=(4, worlds))
     return of, np.concatenate(found)
 
@@ -172,7 +172,7 @@ def test_it_rests_where_gravity_bears_the_torque() -> None:
     of, torque = law(), 0.1
     x1 = -torque / (2.0 * paper.gravity_torque)
     state = of.init(Measurement(x1, 0.0))._replace(torque=torque)
-    state, u = of.step(state, Measurement(x1, 0.0), fed(0.0, 0.0, 0.0), 0.0)
+    state, u = of.step(state, Measurement(x1, 0.0), feedback_state(0.0, 0.0, 0.0), 0.0)
     assert u == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(state, (x1, 0.0, 0.0, torque, 0.0), atol=1e-12)
 
@@ -181,7 +181,9 @@ def test_it_rests_where_gravity_bears_the_torque() -> None:
 @pytest.mark.parametrize("gimbal", [-0.2, 0.2])
 def test_at_the_limit_it_expects_what_was_commanded_and_does_not_wind_up(tilt: float, gimbal: float) -> None:
     of = law(rate_limit=0.5)
-    state, u = of.step(of.init(Measurement(tilt, gimbal)), Measurement(tilt, gimbal), fed(0.0, 0.0, 0.0), 0.0)
+    state, u = of.step(
+        of.init(Measurement(tilt, gimbal)), Measurement(tilt, gimbal), feedback_state(0.0, 0.0, 0.0), 0.0
+    )
     assert u == -math.copysign(0.5, tilt)
     F, G = held(*rig(), of.dt)
     np.testing.assert_allclose(state[:4], F @ [tilt, 0.0, gimbal, 0.0] + G[:, 0] * u, rtol=1e-9)

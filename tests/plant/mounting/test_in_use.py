@@ -11,7 +11,7 @@ import pytest
 from cmg_mj.plant.mounting import mount
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.simulation.gymnasium_env import ScissoredPair
+from cmg_mj.simulation.gymnasium_env import ScissoredPairEnv
 from cmg_mj.studies.push_limits.mount_report import write_scenario
 from cmg_mj.studies.sweeps.api import sweep
 from tests.command import cmg_mj
@@ -70,7 +70,7 @@ def test_studio_gives_it_too(scenario: str) -> None:
 
 
 def test_the_environment_gives_it_too(scenario: str) -> None:
-    env = ScissoredPair(scenario, PUSHED, in_rad_s=True)
+    env = ScissoredPairEnv(scenario, PUSHED, in_rad_s=True)
     ticks, infos, _ = acting(env, 0)
     trajectory = opened(scenario).run().trajectory
     assert trajectory is not None

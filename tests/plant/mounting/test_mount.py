@@ -166,7 +166,7 @@ def test_a_second_axis(tmp_path: Path) -> None:
     can = prospects(write_scenario(model, model, "homogeneous", axis="pitch"), "pitch")
     experiment = write_scenario(model, model, "homogeneous", can, "pitch")
     assert experiment.plant.axis_names == ["roll", "pitch"]
-    assert can.reduced == experiment.plant.along("pitch").reduced != experiment.plant.along("roll").reduced
+    assert can.reduced == experiment.plant.single_axis("pitch").reduced != experiment.plant.single_axis("roll").reduced
     assert prepare(experiment.scenario).run_many(3, keep_trajectory=False).stood.all()
     with pytest.raises(InputError, match="no room: the modules overlap 'roll/cube1', which is there already"):
         mount(once.spec, "trunk", axis="pitch", name="pitch", at=(0.0, 0.0, 0.15))

@@ -16,7 +16,7 @@ from cmg_mj.plant.tilt_line import HingeLine, SupportLine
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S
 from cmg_mj.studies.push_limits.mount_report import PUSHED_AT_S, write_scenario
-from cmg_mj.studies.push_limits.prospects import Prospects, prospects, scale_that_suffices
+from cmg_mj.studies.push_limits.prospects import Prospects, prospects, smallest_sufficient_scale
 from tests.plant.mounting.robots import ROBOTS
 
 WORLDS = 10
@@ -58,14 +58,14 @@ def test_it_stands_thirty_seconds_with_a_push(mounted: tuple[Experiment, Prospec
     """The same with 0.6 E, once the gimbals have come back from the start: E is borne by gimbals that are upright."""
     experiment, can, _ = mounted
     tilt = min(1.0, 0.25 * math.degrees(can.ceiling.tilt))
-    assert pushed(experiment, 0.6 * can.bears.impulse / PUSH_S, 30.0, tilt, PUSHED_AT_S).all()
+    assert pushed(experiment, 0.6 * can.push_margin.median_impulse / PUSH_S, 30.0, tilt, PUSHED_AT_S).all()
 
 
 def test_it_bears_what_the_reduced_model_says(mounted: tuple[Experiment, Prospects, str]) -> None:
     """E is within 35 % of the simulation's: most stand 0.65 E and fall with E/0.65; all fall with 1.8 E."""
     experiment, can, _ = mounted
-    torque = can.bears.impulse / PUSH_S
-    assert 0.0 < can.bears.impulse < can.ceiling_push
+    torque = can.push_margin.median_impulse / PUSH_S
+    assert 0.0 < can.push_margin.median_impulse < can.ceiling_push
     assert pushed(experiment, 0.65 * torque, 8.0).sum() > WORLDS / 2
     assert pushed(experiment, torque / 0.65, 8.0).sum() < WORLDS / 2
     assert not pushed(experiment, 1.8 * torque, 8.0).any()
@@ -106,4 +106,4 @@ def test_where_the_pair_is_too_small_it_says_which_is_not(tmp_path: Path) -> Non
         return prospects(write_scenario(model, model, "homogeneous")).ceiling.tilt
 
     assert math.degrees(ceiling_at(1.0)) < 2.0
-    assert scale_that_suffices(ceiling_at, 1.0) == robot.options["scale"]
+    assert smallest_sufficient_scale(ceiling_at, 1.0) == robot.options["scale"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.plant.mounting import Mounted, mount
+from cmg_mj.plant.mounting import MountedRobot, mount
 from cmg_mj.plant.mounting.fall_check import falls_with
 from cmg_mj.plant.plant import Plant, load_plant
 
@@ -55,7 +55,7 @@ def trunk(**changes: str) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(TRUNK.format(**fields))
 
 
-def mounted(**options: Any) -> Mounted:
+def mounted(**options: Any) -> MountedRobot:
     changes = {name: options.pop(name) for name in list(options) if name in TRUNK and isinstance(options[name], str)}
     return mount(trunk(**changes), **{"body": "trunk", "axis": "hip", "at": (0.0, 0.0, 0.5), **options})
 

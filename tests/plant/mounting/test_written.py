@@ -11,7 +11,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mounting import mount
-from cmg_mj.studies.push_limits.prospects import scale_that_suffices
+from cmg_mj.studies.push_limits.prospects import smallest_sufficient_scale
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import EXAMPLES, ROBOTS
 
@@ -116,4 +116,4 @@ def test_a_larger_pair_that_has_no_room_is_none_that_suffices() -> None:
             raise InputError("no room")
         return 0.01
 
-    assert scale_that_suffices(ceiling_at, 1.0) is None
+    assert smallest_sufficient_scale(ceiling_at, 1.0) is None

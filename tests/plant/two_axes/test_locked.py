@@ -13,7 +13,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import folder
-from cmg_mj.plant.locking import take_out
+from cmg_mj.plant.locking import remove_hinge
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.scenario.plant_settings import PlantSettings
 
@@ -118,7 +118,7 @@ def test_what_drives_reads_or_holds_a_hinge_goes_with_it() -> None:
         <key name="short" qpos="0 0 0 1 0 0 0 1 2 3"/>
       </keyframe>
     </mujoco>""")
-    take_out(spec, "b")
+    remove_hinge(spec, "b")
     model = spec.compile()
     assert (model.nu, model.nsensor, model.neq) == (2, 1, 1)
     np.testing.assert_array_equal(model.key_qpos[:, 7:], [[1, 3], [1, 3]])

@@ -63,7 +63,7 @@ def test_a_push_about_either_axis_is_felt_there(model: Path) -> None:
             np.testing.assert_array_equal(many.world(0)[name], values, err_msg=name)
         after = round(0.6 / 0.005)
         rate = {name: one[f"{name}/x2_rad_s"][after] - quiet[f"{name}/x2_rad_s"][after] for name in (axis, other)}
-        inertia = plant.along(axis).reduced.gimbals * plant.along(axis).reduced.J1
+        inertia = plant.single_axis(axis).reduced.gimbals * plant.single_axis(axis).reduced.J1
         assert rate[axis] == pytest.approx(12.0 * 0.1 / inertia, rel=0.3)  # the controller is at it meanwhile
         assert abs(rate[other]) < 0.05 * rate[axis]
 

@@ -67,7 +67,7 @@ def test_noise_alone_says_nothing(tmp_path: Path) -> None:
 def test_the_runs_of_all_scenarios(scenario: str, said: bool) -> None:
     """As recorded, and as they were with the columns interchanged: y + c a, -a."""
     experiment = prepare(load_scenario(scenario, ["duration_s=5"] if scenario != "bias_estimation" else []))
-    trajectory, places = experiment.run().trajectory, experiment.plant.facts.tilt
+    trajectory, places = experiment.run().trajectory, experiment.plant.parameters.tilt
     assert trajectory is not None
     y, a = trajectory["y1_rad"], trajectory["acceleration_rad_s2"]
     whole = [slice(0, len(y))]

@@ -18,16 +18,16 @@ from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.terminal_tables import comparison_markdown
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.studies.compare.comparison import Compared, compare, prepare_comparison
+from cmg_mj.studies.compare.comparison import ComparedObserver, compare, prepare_comparison
 from cmg_mj.studies.compare.plot import _Panel
-from cmg_mj.studies.compare.statistics import best, rows_of, standings, worlds_table
+from cmg_mj.studies.compare.statistics import best_observer, comparison_rows, standings, worlds_table
 
 ERROR, PUSH_ERROR, FIT = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "velocity_fit"
 
 
 def entry(
     kind: str, errors: list[float | None], lost: tuple[int, ...] = (), more: dict[str, Any] | None = None
-) -> Compared:
+) -> ComparedObserver:
     """An observer with these errors in its worlds, some of which fell."""
     one = {"settle_time_s": 1.0, "tilt_rms_deg": 0.5, PUSH_ERROR: None, FIT: None} | (more or {})
     rate = {ERROR: 0.2, PUSH_ERROR: None, FIT: 0.0}
@@ -35,10 +35,12 @@ def entry(
     summaries = [{**one, ERROR: error, "references": copy.deepcopy(references)} for error in errors]
     outcomes = [Outcome("fell" if i in lost else "done", 3.0 if i in lost else 9.0) for i in range(len(errors))]
     (experiment,) = prepare_comparison(load_scenario("push_recovery", ["seed=7"]), [kind])
-    return Compared(experiment, Result(outcomes, summaries, observers=[kind], seed=7), Result(outcomes, summaries))
+    return ComparedObserver(
+        experiment, Result(outcomes, summaries, observers=[kind], seed=7), Result(outcomes, summaries)
+    )
 
 
-def by_name(compared: list[Compared]) -> dict[str, dict[str, Any]]:
+def by_name(compared: list[ComparedObserver]) -> dict[str, dict[str, Any]]:
     return {row["observer"]: row for row in standings(compared)}
 
 
@@ -76,15 +78,15 @@ def test_fallen_worlds_are_in_no_mean_and_no_difference() -> None:
 
 def test_the_best_is_sought_among_those_that_stood_most_often() -> None:
     steady, reckless = entry("ltv", [0.3, 0.3]), entry("linear", [0.1, 0.1], lost=(0,))
-    assert best([reckless, steady], ERROR) is steady
+    assert best_observer([reckless, steady], ERROR) is steady
     nobody = entry("linear", [0.1, 0.1], lost=(0, 1))
-    assert best([nobody], ERROR) is None
-    assert [row.name for row in rows_of([nobody])] == ["linear"]
+    assert best_observer([nobody], ERROR) is None
+    assert [row.name for row in comparison_rows([nobody])] == ["linear"]
 
 
 def test_more_of_a_fit_is_better() -> None:
     good, bad = entry("ltv", [0.1, 0.1], more={FIT: 0.7}), entry("linear", [0.1, 0.1], more={FIT: -0.3})
-    assert best([bad, good], FIT) is good
+    assert best_observer([bad, good], FIT) is good
     assert by_name([bad, good])["linear"]["minus_best"][FIT]["mean"] == pytest.approx(-1.0)
 
 
@@ -95,7 +97,7 @@ def test_a_plot_of_fits_shows_the_best() -> None:
     for of in compared:
         for summary in of.result.summaries:
             summary["references"]["mems_gyro"][FIT] = 0.96
-    low, high = _Panel(FIT, rows_of(compared)).limits
+    low, high = _Panel(FIT, comparison_rows(compared)).limits
     assert -5.0 < low < -0.1
     assert 0.96 < high < 1.1
 
@@ -125,7 +127,7 @@ def test_one_world_has_no_intervals() -> None:
     row = by_name([entry("ltv", [0.1]), entry("linear", [0.3])])["linear"]
     assert row["intervals"][ERROR] is None
     assert row["minus_best"][ERROR]["interval"] is None
-    example = [dataclasses.replace(compared()[0], result=compared()[0].example)]
+    example = [dataclasses.replace(compared()[0], result=compared()[0].world_0)]
     assert "Less the best" not in comparison_markdown(standings(example))
     assert "±" not in comparison_markdown(standings(example)).split("\n\n")[0]
 
@@ -144,7 +146,7 @@ def test_a_figure_that_is_missing_in_a_world() -> None:
 
 
 @cache
-def compared() -> tuple[Compared, ...]:
+def compared() -> tuple[ComparedObserver, ...]:
     """Two observers, of which one falls in all worlds within the time."""
     scenario = load_scenario("push_recovery", ["duration_s=4.0", "push.0.start_s=0.5", "seed=3"])
     return tuple(compare(prepare_comparison(scenario, ["ltv", "luenberger"]), 3))

@@ -8,7 +8,7 @@ from typing import Any
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.cells import Trials
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.studies.sweeps.trials import table_of
 
 VELOCITY, PUSH = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
@@ -21,7 +21,7 @@ Error = Callable[[dict[str, Any], str, int], float | None]
 def made_up(varied: dict[str, str], observers: tuple[str, ...], worlds: int, error: Error, **options: Any) -> Trials:
     """A sweep whose velocity errors are given."""
     axes = tuple(parse_axis(field, said, field) for field, said in varied.items())
-    study = Study(load_scenario("push_recovery"), axes, observers, worlds, **options)
+    study = SweepStudy(load_scenario("push_recovery"), axes, observers, worlds, **options)
     rows = []
     for number, point in enumerate(study.points):
         for observer in observers:

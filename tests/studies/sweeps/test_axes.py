@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.studies.sweeps.axes import Axis, parse_axis
+from cmg_mj.studies.sweeps.axes import VariedField, parse_axis
 
 
 @pytest.mark.parametrize(
@@ -69,4 +69,4 @@ def test_no_field() -> None:
 
 
 def test_an_axis_of_values_says_them() -> None:
-    assert Axis("a", (1.0, 2.0)).said() == [1.0, 2.0]
+    assert VariedField("a", (1.0, 2.0)).said() == [1.0, 2.0]

@@ -20,7 +20,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.dask_worker import computed, part_of
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 from tests.command import COMMAND, ROOT, Said, cmg_mj, cmg_mj_process, environment
 
 distributed = pytest.mark.skipif(
@@ -194,7 +194,7 @@ def test_what_is_no_cluster_is_one_line(tmp_path: Path, address: str, complaint:
 
 
 def test_a_worker_of_another_version_is_refused() -> None:
-    study = Study(load_scenario("push_recovery"), (parse_axis(BIAS, "0", BIAS),), ("linear",), 1)
+    study = SweepStudy(load_scenario("push_recovery"), (parse_axis(BIAS, "0", BIAS),), ("linear",), 1)
     part = part_of(study, study.chunks[0])
     other = dataclasses.replace(part, versions={**part.versions, "mujoco": "2.0"})
     with pytest.raises(InputError, match=r"^worker tcp://there: mujoco \S+ there, 2\.0 here; they must be the same$"):

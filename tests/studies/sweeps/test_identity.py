@@ -16,7 +16,7 @@ from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.chunk_store import Store, run
 from cmg_mj.studies.sweeps.fingerprint import KEY, difference
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 from tests.command import cmg_mj
 
 BIAS = "plant.equilibrium_bias_deg"
@@ -81,7 +81,7 @@ def test_an_edited_model_is_another(tmp_path: Path, mine: Path, name: str) -> No
 
 def test_a_model_that_is_edited_while_a_sweep_runs(tmp_path: Path, mine: Path) -> None:
     scenario = load_scenario("push_recovery", ["duration_s=0.2", "push=[]", f"plant.model={mine}"])
-    store = Store(tmp_path / "out", Study(scenario, (parse_axis(BIAS, "0,1", BIAS),), ("linear",), 2))
+    store = Store(tmp_path / "out", SweepStudy(scenario, (parse_axis(BIAS, "0,1", BIAS),), ("linear",), 2))
     store.folder.mkdir()
     store.open()
     mine.write_text(mine.read_text(encoding="utf-8") + "<!-- edited -->\n", encoding="utf-8")

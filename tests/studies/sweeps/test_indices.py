@@ -9,7 +9,7 @@ import pytest
 
 from cmg_mj.studies.sweeps.points import sampled
 from cmg_mj.studies.sweeps.sobol import LOG_RATIO, LOST, Indices, index_rows, indices
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 from tests.studies.sweeps.made_up import BIAS, NOISE, VELOCITY, made_up
 
 
@@ -65,7 +65,7 @@ def test_an_estimate_above_an_interval_is_not_decisive_if_its_own_reaches_down()
 
 def sobol(error: Any, n: int = 64) -> list[dict[str, Any]]:
     trials = made_up({BIAS: "0:1", NOISE: "100:200"}, ("linear", "ltv"), 2, error, design="sobol", n=n)
-    assert isinstance(trials.study, Study)
+    assert isinstance(trials.study, SweepStudy)
     return [row for row in index_rows(trials) if row["figure"] == VELOCITY]
 
 

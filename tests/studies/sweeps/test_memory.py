@@ -19,7 +19,7 @@ from cmg_mj.studies.sweeps import study as study_module
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.cells import COLUMNS, Trials, cells_in_blocks, cells_schema
 from cmg_mj.studies.sweeps.chunk_store import Store, merged, run
-from cmg_mj.studies.sweeps.study import Chunk, Study
+from cmg_mj.studies.sweeps.study import Chunk, SweepStudy
 from cmg_mj.studies.sweeps.trials import write_tables
 from tests.studies.sweeps.made_up import BIAS, NOISE, VELOCITY
 
@@ -27,9 +27,9 @@ MB = 2**20
 TRIALS = 6_000
 
 
-def study(points: int, worlds: int = 1) -> Study:
+def study(points: int, worlds: int = 1) -> SweepStudy:
     axes = (parse_axis(BIAS, "-1:1", BIAS), parse_axis(NOISE, "log:100:800", NOISE))
-    return Study(load_scenario("push_recovery"), axes, ("linear",), worlds, "sample", points)
+    return SweepStudy(load_scenario("push_recovery"), axes, ("linear",), worlds, "sample", points)
 
 
 @contextmanager
@@ -44,7 +44,7 @@ def peak() -> Iterator[list[float]]:
         tracemalloc.stop()
 
 
-def made_up_rows(of: Study, chunk: Chunk, *_: Any) -> list[dict[str, Any]]:
+def made_up_rows(of: SweepStudy, chunk: Chunk, *_: Any) -> list[dict[str, Any]]:
     return [
         {"point": number, **of.points[number], "observer": "linear", "world": world, "seed": 0, "outcome": "done"}
         | {VELOCITY: 1e-6 * number + world}

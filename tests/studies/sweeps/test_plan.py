@@ -11,7 +11,7 @@ from cmg_mj.cli.sweeps import _plan_text
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps import plan, study
 from cmg_mj.studies.sweeps.axes import parse_axis
-from cmg_mj.studies.sweeps.study import Chunk, Study
+from cmg_mj.studies.sweeps.study import Chunk, SweepStudy
 from tests.command import cmg_mj
 
 BIAS, TORQUE = "plant.equilibrium_bias_deg", "plant.initial_tilt_deg"
@@ -27,7 +27,7 @@ def test_ctrl_c_before_the_first_tick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_ctrl_c_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(study: Study, piece: Chunk, tick: Callable[[float], None]) -> None:
+    def interrupted(study: SweepStudy, piece: Chunk, tick: Callable[[float], None]) -> None:
         tick(0.1)
         tick(0.2)
         raise KeyboardInterrupt
@@ -66,7 +66,7 @@ def test_the_points_of_a_very_large_study_are_not_drawn(
     monkeypatch.setattr(study, "sampled", noted)
     monkeypatch.setattr(plan, "compute", lambda study, piece, tick: [study.points[at] for at, _ in piece.trials])
     axes = tuple(parse_axis(field, said, field) for field in (BIAS, TORQUE))
-    takes = plan.expected(Study(load_scenario("push_recovery"), axes, ("linear",), 2, **options))
+    takes = plan.estimate_cost(SweepStudy(load_scenario("push_recovery"), axes, ("linear",), 2, **options))
     assert drawn == [plan.POINTS]
     assert (takes["points"], takes["trials"]) == (points, 2 * points)
     assert takes["chunks"] == -(-2 * points // study.CHUNK)

@@ -12,7 +12,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps import api as swept
 from cmg_mj.studies.sweeps.axes import parse_axis
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.studies.sweeps.trials import table_of
 from tests.command import cmg_mj
 
@@ -144,7 +144,7 @@ def test_what_fits_only_with_another_value_is_allowed(monkeypatch: pytest.Monkey
 def test_a_whole_number_that_no_column_of_them_holds() -> None:
     """Which scenarios take such a number depends on pydantic's version, so it stands in a table without a run."""
     axis = parse_axis("push.0.torque_n_m", "0,99999999999999999999", "--vary push.0.torque_n_m")
-    study = Study(load_scenario("push_recovery"), (axis,), ("linear",), 1)
+    study = SweepStudy(load_scenario("push_recovery"), (axis,), ("linear",), 1)
     rows = [
         {"point": number, **point, "observer": "linear", "world": 0, "seed": 0, "outcome": "done"}
         for number, point in enumerate(study.points)

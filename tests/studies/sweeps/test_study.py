@@ -11,15 +11,15 @@ from scipy.stats import sobol_indices, uniform
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps.axes import parse_axis
-from cmg_mj.studies.sweeps.study import CHUNK, Study, check_values
+from cmg_mj.studies.sweeps.study import CHUNK, SweepStudy, check_values
 
 BIAS, NOISE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz"
 
 
-def study(*varied: str, worlds: int = 3, **options: Any) -> Study:
+def study(*varied: str, worlds: int = 3, **options: Any) -> SweepStudy:
     parts = [setting.partition("=") for setting in varied]
     axes = [parse_axis(field, said, f"--vary {field}") for field, _, said in parts]
-    return Study(load_scenario("push_recovery"), tuple(axes), ("linear", "ltv"), worlds, **options)
+    return SweepStudy(load_scenario("push_recovery"), tuple(axes), ("linear", "ltv"), worlds, **options)
 
 
 def test_a_grid_is_every_combination() -> None:
@@ -77,7 +77,7 @@ def test_a_design_for_indices_is_saltellis() -> None:
 
 
 def test_the_same_study_has_the_same_points() -> None:
-    def sampled() -> Study:
+    def sampled() -> SweepStudy:
         return study(f"{BIAS}=-1:1", f"{NOISE}=log:100:800", design="sample", n=50)
 
     assert list(sampled().points) == list(sampled().points)

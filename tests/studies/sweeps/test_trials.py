@@ -12,26 +12,26 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Estimate, Measurement
-from cmg_mj.results.per_world_table import FIRST
+from cmg_mj.results.per_world_table import ID_COLUMNS
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare, run_together
+from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.studies.sweeps import chunk as work
 from cmg_mj.studies.sweeps import study as study_module
 from cmg_mj.studies.sweeps.api import all_trials
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.chunk_store import Store, merged, run
-from cmg_mj.studies.sweeps.study import Study
+from cmg_mj.studies.sweeps.study import SweepStudy
 
 SETTINGS = ("duration_s=0.6", "push=[]")
 
 
-def study(varied: dict[str, str], observers: tuple[str, ...] = ("linear", "gyro_free"), worlds: int = 2) -> Study:
+def study(varied: dict[str, str], observers: tuple[str, ...] = ("linear", "gyro_free"), worlds: int = 2) -> SweepStudy:
     axes = [parse_axis(field, said, field) for field, said in varied.items()]
-    return Study(load_scenario("push_recovery", SETTINGS), tuple(axes), observers, worlds)
+    return SweepStudy(load_scenario("push_recovery", SETTINGS), tuple(axes), observers, worlds)
 
 
-def small() -> Study:
+def small() -> SweepStudy:
     return study(
         {
             "plant.equilibrium_bias_deg": "0,1",
@@ -140,7 +140,7 @@ def test_an_observer_that_raises_at_a_rig_that_lies_costs_nothing() -> None:
     """It goes on being told of a world of its batch that has fallen."""
     scenario = load_scenario("push_recovery", [*SETTINGS, "metrics.fall_angle_deg=3"])
     tilt = "plant.initial_tilt_deg"
-    rows = all_trials(Study(scenario, (parse_axis(tilt, "0,5", tilt),), (FAILS,), 1)).to_pylist()
+    rows = all_trials(SweepStudy(scenario, (parse_axis(tilt, "0,5", tilt),), (FAILS,), 1)).to_pylist()
     assert [row["outcome"] for row in rows] == ["done", "fell"]
 
 
@@ -151,9 +151,9 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
         batches.append(len(worlds))
         if any(each.scenario.plant.initial_tilt_deg == 5.0 for each in experiments):
             raise MemoryError("not in there")
-        return run_together(experiments, worlds, **options)
+        return run_batch(experiments, worlds, **options)
 
-    monkeypatch.setattr(work, "run_together", fails)
+    monkeypatch.setattr(work, "run_batch", fails)
     told = []
     of = study({"plant.initial_tilt_deg": "0,5,1,2"}, ("linear",), 1)
     rows = work.compute(of, of.chunks[0], told.append)
@@ -169,4 +169,6 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
 
 
 def test_columns_are_those_of_a_worlds_table() -> None:
-    assert [name for name in trials().schema.names if name in FIRST] == [n for n in FIRST if n != "in_loop_of"]
+    assert [name for name in trials().schema.names if name in ID_COLUMNS] == [
+        n for n in ID_COLUMNS if n != "in_loop_of"
+    ]

@@ -113,7 +113,7 @@ def test_numbers_that_do_not_matter_are_left_alone() -> None:
     recorded = recorder("ltv", lambda *_: {"Q": (1.0, 2.3e5, 1.0)})
     scenario = load_scenario("observer_tuning", observer="ltv")
     study = tune(scenario, worlds=4, recorded=recorded, parameters=["Q[1]", "Q[2]"])
-    assert study.idle == ["Q[2]"]  # the third state decouples
+    assert study.insensitive_parameters == ["Q[2]"]  # the third state decouples
     assert [n.name for n in study.numbers] == ["Q[1]"]
     assert study.levels[0].parameters["Q"][2] == 1.0
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from cmg_mj.observers import make_observer
-from cmg_mj.studies.tuning.parameters import Number, numbers_of, parameters_of, replaced
+from cmg_mj.studies.tuning.parameters import TunedScalar, numbers_of, parameters_of, replaced
 from cmg_mj.studies.tuning.search import crossing, search
 from tests.observers.reference import DT, PAPER
 from tests.studies.tuning.own import OWN
 
 
-def numbers(kind: str, *chosen: str) -> list[Number]:
+def numbers(kind: str, *chosen: str) -> list[TunedScalar]:
     def make(**parameters: Any) -> Any:
         return make_observer(kind, DT, PAPER, **parameters)
 
@@ -47,7 +47,7 @@ def test_the_observer_takes_each_number_at_its_limits(kind: str) -> None:
 
 
 def test_a_sign_stays() -> None:
-    number = Number("L", (0, 1), -3.0, 0.1, 10.0)
+    number = TunedScalar("L", (0, 1), -3.0, 0.1, 10.0)
     assert replaced({"L": ((1.0, -3.0), (0.0, 2.0))}, [number], [5.0]) == {"L": ((1.0, -5.0), (0.0, 2.0))}
 
 
@@ -58,8 +58,8 @@ def test_a_users_own_observer_is_read_as_well() -> None:
     assert gain.high == pytest.approx(10.0)
 
 
-def number(name: str, given: float, low: float = 1e-3, high: float = 1e3) -> Number:
-    return Number(name, (), given, low, high)
+def number(name: str, given: float, low: float = 1e-3, high: float = 1e3) -> TunedScalar:
+    return TunedScalar(name, (), given, low, high)
 
 
 @pytest.mark.parametrize("best", [0.0021, 0.3, 4.0, 700.0])

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.visualization.plots.colours import COLOURS, OWN, YARDSTICKS, Colour, colour, colours, hexadecimal
+from cmg_mj.visualization.plots.colours import (
+    BASELINE_COLOURS,
+    COLOURS,
+    USER_COLOURS,
+    Colour,
+    colour,
+    colours,
+    hexadecimal,
+)
 
 SIGHT = {
     "all three cones": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -50,12 +58,12 @@ def test_the_bundled_observers_can_be_told_apart(sight: str, least: float) -> No
 
 @pytest.mark.parametrize("sight", SIGHT)
 def test_the_others_are_not_taken_for_them(sight: str) -> None:
-    assert least_distance([*COLOURS.values(), *YARDSTICKS.values(), *OWN], sight) > 0.032
+    assert least_distance([*COLOURS.values(), *BASELINE_COLOURS.values(), *USER_COLOURS], sight) > 0.032
 
 
 def test_they_are_seen_on_white_and_on_the_viewers_ground() -> None:
     """Contrast as WCAG counts it; 3 is what it asks of lines, which yellow and pink miss on white."""
-    light = luminance([*COLOURS.values(), *YARDSTICKS.values(), *OWN]) + 0.05
+    light = luminance([*COLOURS.values(), *BASELINE_COLOURS.values(), *USER_COLOURS]) + 0.05
     ground = float(luminance([(13, 16, 17)])[0]) + 0.05
     assert (1.05 / light).min() > 1.85
     assert (light / ground).min() > 2.7
@@ -72,8 +80,8 @@ def test_an_observer_keeps_its_colour_whatever_it_is_shown_with() -> None:
 
 
 def test_users_own_differ_from_each_other() -> None:
-    names = [f"mine:Observer{i}" for i in range(len(OWN))]
-    assert set(colours(names).values()) == set(OWN)
+    names = [f"mine:Observer{i}" for i in range(len(USER_COLOURS))]
+    assert set(colours(names).values()) == set(USER_COLOURS)
     assert set(colours([*names, "mine:OneMore"])) == {*names, "mine:OneMore"}
 
 

@@ -7,7 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.visualization.plots.readability import FEW, MARGIN, REACH, axis_range, best, free_corner, shortened
+from cmg_mj.visualization.plots.readability import (
+    FEW,
+    MARGIN,
+    REACH,
+    axis_range,
+    free_corner,
+    observers_to_draw,
+    short_names,
+)
 
 TRUE = 0.5 * np.sin(np.linspace(0.0, 20.0, 2001))
 """From -0.5 to 0.5."""
@@ -69,29 +77,29 @@ def summary(error: float | None, *, push: float | None = None, fell: bool = Fals
 def test_the_best_in_the_order_given() -> None:
     errors = {"a": 0.4, "b": 0.1, "c": 0.3, "d": 0.2, "e": None, "f": math.nan}
     summaries = {name: summary(error) for name, error in errors.items()}
-    assert best(summaries) == ["b", "c", "d"]
-    assert best(summaries, ["e"]) == ["b", "d", "e"]
-    assert best(summaries, list("acef")) == ["a", "c", "e", "f"]
-    assert best({name: summaries[name] for name in "fa"}) == ["f", "a"]
+    assert observers_to_draw(summaries) == ["b", "c", "d"]
+    assert observers_to_draw(summaries, ["e"]) == ["b", "d", "e"]
+    assert observers_to_draw(summaries, list("acef")) == ["a", "c", "e", "f"]
+    assert observers_to_draw({name: summaries[name] for name in "fa"}) == ["f", "a"]
 
 
 def test_one_that_fell_is_not_among_the_best() -> None:
     summaries = {name: summary(i / 10.0) for i, name in enumerate("abcde")}
     summaries["a"]["fell"] = True
-    assert best(summaries) == ["b", "c", "d"]
+    assert observers_to_draw(summaries) == ["b", "c", "d"]
 
 
 def test_the_push_decides_where_it_is_known() -> None:
     summaries = {
         name: summary(error, push=1.0 - error) for name, error in zip("abcd", (0.1, 0.2, 0.3, 0.4), strict=True)
     }
-    assert best(summaries) == ["b", "c", "d"]
+    assert observers_to_draw(summaries) == ["b", "c", "d"]
 
 
 def test_what_observers_are_compared_with_is_not_among_the_best() -> None:
     summaries = {name: summary(i / 10.0) for i, name in enumerate(("zero", "mems_gyro", "a", "b", "c", "d"))}
-    assert best(summaries) == ["a", "b", "c"]
-    assert len(best(dict.fromkeys(("zero", "mems_gyro", "a"), summary(0.1)))) == FEW
+    assert observers_to_draw(summaries) == ["a", "b", "c"]
+    assert len(observers_to_draw(dict.fromkeys(("zero", "mems_gyro", "a"), summary(0.1)))) == FEW
 
 
 TIME = np.linspace(0.0, 10.0, 1001)
@@ -124,5 +132,5 @@ def test_a_legend_where_there_is_no_line() -> None:
 
 def test_names_are_shortened_where_they_stay_apart() -> None:
     names = ["linear", "mine:Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
-    assert list(shortened(names).values()) == ["linear", "Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
-    assert list(shortened(["mine:linear", "linear"]).values()) == ["mine:linear", "linear"]
+    assert list(short_names(names).values()) == ["linear", "Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
+    assert list(short_names(["mine:linear", "linear"]).values()) == ["mine:linear", "linear"]

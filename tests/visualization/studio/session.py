@@ -20,8 +20,8 @@ from mujoco.studio import (
 from cmg_mj import load_scenario, prepare
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.studio.live import Live
-from cmg_mj.visualization.studio.messages import Standing
+from cmg_mj.visualization.studio.live import StudioSession
+from cmg_mj.visualization.studio.messages import SessionState
 from cmg_mj.visualization.studio.stepping import Stepping
 
 SIGNALS = ("x2_rad_s", "y1_rad", "y2_rad", "fog_rad_s", "u_rad_s", "x_e_rad_times_s", "push_n_m")
@@ -44,7 +44,7 @@ class Recorded(Stepping):
         return done
 
 
-def recording(live: Live, rows: list[tuple[float, ...]]) -> Callable[[mujoco.MjData], bool]:
+def recording(live: StudioSession, rows: list[tuple[float, ...]]) -> Callable[[mujoco.MjData], bool]:
     step, lines = live.step, [axis.line for axis in live.plant.axes]
 
     def recorded(data: mujoco.MjData) -> bool:
@@ -76,7 +76,7 @@ class Session:
         self.handle.dispatch(messages.LoadModelEvent())
 
     @property
-    def live(self) -> Live:
+    def live(self) -> StudioSession:
         assert self.stepping.live is not None
         return self.stepping.live
 
@@ -110,12 +110,12 @@ class Session:
         said = [*self.viewer.get_sim_events(), *self.viewer.get_sim_snapshots()]
         return [message for message in said if isinstance(message, kind)]
 
-    def standing(self) -> Standing:
+    def standing(self) -> SessionState:
         """What the panel is told next."""
-        self.heard(Standing)
+        self.heard(SessionState)
         self.now += 1.0 / 29.0
         self.handle.sync()
-        return self.heard(Standing)[-1]
+        return self.heard(SessionState)[-1]
 
     def scrub(self, index: int) -> None:
         """Go so many frames back in history."""

@@ -15,7 +15,7 @@ from mujoco.studio import (
 from cmg_mj import load_scenario, prepare
 from cmg_mj.inputs.bundled import folder
 from cmg_mj.observers import OBSERVERS, Estimate
-from cmg_mj.visualization.studio.messages import Choose, PushNow, StartAgain
+from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, laws_of
 from tests.visualization.studio.session import Session, session
 from tests.visualization.studio.test_session import of_runner, same
@@ -29,7 +29,7 @@ TIME, RATE, U, PUSH = 0, 1, 5, 7
 def test_a_push_by_button_is_a_push_of_the_scenario() -> None:
     with session("push=[]") as studio:
         studio.run(1.0)
-        studio.send(PushNow(-0.8, 0.2))
+        studio.send(PushRequest(-0.8, 0.2))
         studio.run(2.0)
         pushed = ("duration_s=3.0", "push.0.start_s=1.0", "push.0.duration_s=0.2", "push.0.torque_n_m=-0.8")
         expected = of_runner(*pushed)
@@ -40,7 +40,7 @@ def test_a_push_by_button_is_a_push_of_the_scenario() -> None:
 def test_pushes_add_up() -> None:
     with session("push.0.start_s=0.5", "push.0.torque_n_m=0.5") as studio:
         studio.run(0.55)
-        studio.send(PushNow(0.3, 0.1), PushNow(0.3, 0.1))
+        studio.send(PushRequest(0.3, 0.1), PushRequest(0.3, 0.1))
         studio.run(0.45)
         rows = studio.rows
         assert rows[rows[:, TIME] > 0.499][:, PUSH][:31].round(12).tolist() == [0.5] * 10 + [1.1] * 10 + [0.6] * 10 + [
@@ -58,7 +58,7 @@ def test_studios_mouse_reaches_the_rig_and_adds_up_with_a_push() -> None:
             state = int(mujoco.mjtState.mjSTATE_XFRC_APPLIED)
             studio.run(0.5)
             if button:
-                studio.send(PushNow(button, 0.2))
+                studio.send(PushRequest(button, 0.2))
             studio.send(messages.PerturbSnapshot(state=force.ravel(), state_sig=state))
             studio.run(0.2)
             studio.send(messages.PerturbSnapshot(state=0.0 * force.ravel(), state_sig=state))
@@ -87,7 +87,7 @@ def test_every_observer_takes_over_without_a_bump() -> None:
             studio.send(messages.LoadModelEvent())
             studio.stepping.rows.clear()
             studio.run(0.62)
-            studio.send(Choose({OBSERVER: kind}))
+            studio.send(ChangeSettings({OBSERVER: kind}))
             studio.run(2.0)
             rows = studio.rows
             same(rows[: 124 + 20], undisturbed)
@@ -100,7 +100,7 @@ def test_the_scenarios_observer_has_its_parameters_again() -> None:
     with session("observer.k1=40.0") as studio:
         for kind in ("linear", "homogeneous"):
             studio.run(0.3)
-            studio.send(Choose({OBSERVER: kind}))
+            studio.send(ChangeSettings({OBSERVER: kind}))
         assert studio.live.now.scenario.observer.parameters == {"k1": 40.0}
         assert vars(studio.live.controller.parts[0].observer)["k1"] == 40.0
 
@@ -108,17 +108,17 @@ def test_the_scenarios_observer_has_its_parameters_again() -> None:
 def test_gains_and_feedback() -> None:
     with session() as studio:
         laws = laws_of(studio.live.base)
-        studio.send(Choose(laws["LQR"]), Choose({FEEDBACK: "truth"}))
+        studio.send(ChangeSettings(laws["LQR"]), ChangeSettings({FEEDBACK: "truth"}))
         studio.run(1.0)
         said = studio.standing()
         assert (said.law, said.settings[FEEDBACK]) == ("LQR", "truth")
         same(studio.rows, of_runner("controller.lqr.state_cost=[1,1,1,1]", "controller.feedback=truth"))
-        studio.send(Choose(laws["Table 2"]))
+        studio.send(ChangeSettings(laws["Table 2"]))
         assert studio.standing().gains == (35.0, 4.0, -1.0, 0.3)
         studio.run(4.0)
-        studio.send(Choose(laws["LQG"]))
+        studio.send(ChangeSettings(laws["LQG"]))
         assert "lqg takes nothing of the observer" in studio.standing().note
-        studio.send(Choose({FEEDBACK: "observer"}), Choose(laws["LQG"]))
+        studio.send(ChangeSettings({FEEDBACK: "observer"}), ChangeSettings(laws["LQG"]))
         said = studio.standing()
         assert (said.law, said.note) == ("LQG", "")
         assert np.isfinite(studio.rows[-1, U + 1])
@@ -131,12 +131,12 @@ def test_gains_and_feedback() -> None:
 def test_noise_and_bias() -> None:
     with session("push=[]", "plant.initial_tilt_deg=0.0") as studio:
         studio.run(3.0)
-        studio.send(Choose({NOISE: 0.0}))
+        studio.send(ChangeSettings({NOISE: 0.0}))
         studio.run(3.0)
         rows = studio.rows
         noisy, quiet = (np.ptp(part[:, U]) for part in (rows[400:600], rows[-200:]))
         assert quiet < 0.1 * noisy
-        studio.send(Choose({BIAS: 1.5}))
+        studio.send(ChangeSettings({BIAS: 1.5}))
         studio.run(12.0)
         tilt = studio.data.qpos[studio.live.plant.tilt] - studio.live.plant.tilt_zero
         assert np.degrees(tilt) == pytest.approx(-1.5, abs=0.1)
@@ -152,7 +152,7 @@ def test_what_is_refused_changes_nothing_and_is_said() -> None:
             ({OBSERVER: "tests.no_such_module:Observer"}, "cannot be imported"),
             ({"controller.rate_hz": 100.0}, "stays 200 Hz"),
         ):
-            studio.send(Choose(values))
+            studio.send(ChangeSettings(values))
             assert said in studio.standing().note
         studio.run(1.0)
         same(studio.rows, of_runner("duration_s=2.5"))
@@ -194,7 +194,7 @@ FRAGILE = "tests.visualization.studio.test_changes:Fragile"
 
 def failed(studio: Session) -> None:
     studio.run(0.5)
-    studio.send(Choose({OBSERVER: FRAGILE, FEEDBACK: "truth"}))
+    studio.send(ChangeSettings({OBSERVER: FRAGILE, FEEDBACK: "truth"}))
     studio.run(3.0, every_s=0.004)
 
 
@@ -215,7 +215,7 @@ def test_history_goes_back_to_before_an_observer_failed() -> None:
         studio.scrub(-160)  # 1.9 s
         assert studio.standing().stopped == ""
         del studio.stepping.rows[:]
-        studio.send(Choose({OBSERVER: "homogeneous"}))
+        studio.send(ChangeSettings({OBSERVER: "homogeneous"}))
         studio.pause(False)
         studio.run(3.0)
         assert not studio.live.stopped
@@ -231,7 +231,7 @@ def test_a_stopped_controller_starts_again_with_another_observer() -> None:
         studio.pause(False)
         studio.run(0.02)
         assert studio.live.stopped
-        studio.send(Choose({OBSERVER: "linear"}))
+        studio.send(ChangeSettings({OBSERVER: "linear"}))
         assert studio.standing().stopped == ""
         studio.run(1.0)
         assert not studio.live.stopped
@@ -249,10 +249,10 @@ def test_a_stopped_controller_starts_again_with_another_observer() -> None:
 
 def test_a_fall_is_said_and_reset_stands_up_again() -> None:
     with session("push.0.start_s=0.5") as studio:
-        studio.send(PushNow(30.0, 0.5))
+        studio.send(PushRequest(30.0, 0.5))
         studio.run(3.0)
         assert studio.standing().stopped.startswith("the rig fell at t = 0.")
-        studio.send(StartAgain())
+        studio.send(RestartController())
         studio.run(0.5)
         assert "fell" in studio.standing().stopped
         studio.send(messages.ResetEvent(key=-1))
@@ -288,7 +288,7 @@ def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> N
     other = tmp_path / "scissored_pair.xml"
     other.write_text(other.read_text(encoding="utf-8").replace('gravity="0 0 -9.81"', 'gravity="0 0 -9.6"'))
     base = prepare(load_scenario("push_recovery"))
-    studio = Session(lambda path: base.with_values({"plant.model": path}) if path else base)
+    studio = Session(lambda path: base.with_settings({"plant.model": path}) if path else base)
     with studio.handle:
         studio.run(0.5)
         studio.send(messages.LoadModelEvent(path=str(tmp_path / "none.xml")))

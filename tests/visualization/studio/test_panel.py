@@ -11,7 +11,7 @@ from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
 from cmg_mj.visualization.studio import panel as module
-from cmg_mj.visualization.studio.messages import Choose, PushNow, ShowAxis, Standing, StartAgain
+from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
 from cmg_mj.visualization.studio.panel import Panel
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, LAW, OBSERVER
 from tests.visualization.studio.session import session
@@ -52,7 +52,7 @@ def screen() -> Iterator[Screen]:
 
 
 @pytest.fixture(scope="module")
-def standing() -> Standing:
+def standing() -> SessionState:
     with session() as studio:
         studio.run(3.0)
         return studio.standing()
@@ -70,7 +70,7 @@ def picked(label: str, choice: str) -> Callable[..., tuple[bool, int]]:
 
 
 def test_it_is_drawn_from_the_first_frame_on(
-    screen: Screen, standing: Standing, monkeypatch: pytest.MonkeyPatch
+    screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines: dict[str, int] = {}
     monkeypatch.setattr(module.implot, "PlotLine", lambda label, xs, ys: lines.update({label: len(xs)}))
@@ -87,15 +87,20 @@ def test_it_is_drawn_from_the_first_frame_on(
 @pytest.mark.parametrize(
     ("widget", "does", "sends"),
     [
-        ("Button", pressed("Push +"), PushNow(1.0, 0.1)),
-        ("Button", pressed("Push -"), PushNow(-1.0, 0.1)),
-        ("Combo", picked("observer", "adaptive"), Choose({OBSERVER: "adaptive"})),
-        ("Combo", picked("rate fed back", "the gyro's"), Choose({FEEDBACK: "fog"})),
-        ("Combo", picked("law", "LQG"), Choose({LAW: LQG})),
+        ("Button", pressed("Push +"), PushRequest(1.0, 0.1)),
+        ("Button", pressed("Push -"), PushRequest(-1.0, 0.1)),
+        ("Combo", picked("observer", "adaptive"), ChangeSettings({OBSERVER: "adaptive"})),
+        ("Combo", picked("rate fed back", "the gyro's"), ChangeSettings({FEEDBACK: "fog"})),
+        ("Combo", picked("law", "LQG"), ChangeSettings({LAW: LQG})),
     ],
 )
 def test_what_is_pressed_is_sent(
-    screen: Screen, standing: Standing, monkeypatch: pytest.MonkeyPatch, widget: str, does: Any, sends: messages.Message
+    screen: Screen,
+    standing: SessionState,
+    monkeypatch: pytest.MonkeyPatch,
+    widget: str,
+    does: Any,
+    sends: messages.Message,
 ) -> None:
     screen.panel.on_standing(standing)
     screen.frame()
@@ -104,7 +109,7 @@ def test_what_is_pressed_is_sent(
     assert screen.sent == [sends]
 
 
-def test_of_several_axes_one_is_chosen(screen: Screen, standing: Standing, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_several_axes_one_is_chosen(screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch) -> None:
     lists: list[str] = []
     combo = module.imgui.Combo
 
@@ -128,7 +133,7 @@ def test_of_several_axes_one_is_chosen(screen: Screen, standing: Standing, monke
 
 
 def test_a_number_counts_once_it_is_typed_to_the_end(
-    screen: Screen, standing: Standing, monkeypatch: pytest.MonkeyPatch
+    screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     screen.panel.on_standing(standing)
     done = {"now": False}
@@ -150,23 +155,23 @@ def test_a_number_counts_once_it_is_typed_to_the_end(
     assert screen.sent == []
     done["now"] = True
     screen.frame()
-    assert screen.sent == [Choose({BIAS: 1.25})]
+    assert screen.sent == [ChangeSettings({BIAS: 1.25})]
 
 
 def test_a_stopped_controller_is_said_and_can_be_started(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
     monkeypatch.setattr(module.imgui, "TextWrapped", said.append)
     monkeypatch.setattr(module.imgui, "Button", pressed("Start it again"))
-    screen.panel.on_standing(Standing(title="x", stopped="observer Mine raised KeyError: 'gone' at t = 2 s"))
+    screen.panel.on_standing(SessionState(title="x", stopped="observer Mine raised KeyError: 'gone' at t = 2 s"))
     screen.frame()
     assert "The controller has stopped: observer Mine raised KeyError: 'gone' at t = 2 s" in said
-    assert screen.sent == [StartAgain()]
+    assert screen.sent == [RestartController()]
 
 
 def test_what_goes_wrong_in_the_panel_ends_the_panel_alone(
-    screen: Screen, standing: Standing, caplog: pytest.LogCaptureFixture
+    screen: Screen, standing: SessionState, caplog: pytest.LogCaptureFixture
 ) -> None:
-    screen.panel.on_standing(Standing(settings={"observer.kind": "linear"}))  # incomplete
+    screen.panel.on_standing(SessionState(settings={"observer.kind": "linear"}))  # incomplete
     screen.frame()
     assert "the panel has failed and is gone" in caplog.text
     screen.panel.on_standing(standing)

@@ -7,7 +7,7 @@ import pytest
 from mujoco.studio import messages
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.visualization.studio.messages import Choose, PushNow
+from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest
 from cmg_mj.visualization.studio.settings import FEEDBACK, NOISE, OBSERVER
 from tests.visualization.studio.session import as_rows, session
 
@@ -113,7 +113,7 @@ def test_reload_begins_as_the_file_is_now() -> None:
     with session() as studio:
         studio.stepping._opened = lambda path: prepare(load_scenario("push_recovery", settings))
         studio.run(1.0)
-        studio.send(Choose({NOISE: 0.0}))
+        studio.send(ChangeSettings({NOISE: 0.0}))
         studio.stepping.rows.clear()
         studio.send(messages.LoadModelEvent(path=""))
         studio.run(3.0)
@@ -147,7 +147,7 @@ def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
     """A push by hand that has not been yet is not to come; what is gone on with has a history of its own."""
     with session("push=[]") as studio:
         studio.run(1.0, every_s=0.004)
-        studio.send(PushNow(0.8, 0.1))
+        studio.send(PushRequest(0.8, 0.1))
         studio.run(1.0, every_s=0.004)
         for frames, seconds in ((-150, 1.5), (-50, 1.0)):  # to 0.5 s, then to 1.5 s
             studio.scrub(frames)
@@ -163,9 +163,13 @@ def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
 def test_history_brings_back_what_was_chosen() -> None:
     with session() as studio:
         studio.run(1.0, every_s=0.004)
-        studio.send(Choose({OBSERVER: "adaptive"}))
+        studio.send(ChangeSettings({OBSERVER: "adaptive"}))
         studio.run(1.0, every_s=0.004)
-        studio.send(Choose({FEEDBACK: "truth"}), Choose({"plant.equilibrium_bias_deg": 2.0}), PushNow(0.5, 0.2))
+        studio.send(
+            ChangeSettings({FEEDBACK: "truth"}),
+            ChangeSettings({"plant.equilibrium_bias_deg": 2.0}),
+            PushRequest(0.5, 0.2),
+        )
         ipos = studio.live.model.body_ipos.copy()
         studio.run(1.0, every_s=0.004)
         rows = studio.rows

@@ -8,7 +8,7 @@ from mujoco.studio import messages
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.observers import Estimate
-from cmg_mj.visualization.studio.messages import Choose, PushNow, ShowAxis
+from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, ShowAxis
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, law_of, laws_of
 from tests.visualization.studio.session import SIGNALS, Session, as_rows, session
 from tests.visualization.studio.test_session import of_runner, same
@@ -49,7 +49,7 @@ def test_untouched_it_is_the_runners_trajectory_of_each_axis(settings: tuple[str
 def test_a_push_by_button_is_about_the_axis_that_is_shown() -> None:
     with session("push=[]", scenario="two_axes") as studio:
         studio.run(1.0)
-        studio.send(ShowAxis("pitch"), PushNow(-0.8, 0.2))
+        studio.send(ShowAxis("pitch"), PushRequest(-0.8, 0.2))
         said = studio.standing()
         assert (said.axes, said.axis, said.settings[BIAS]) == (("roll", "pitch"), "pitch", -0.3)
         studio.run(1.0)
@@ -60,7 +60,7 @@ def test_a_push_by_button_is_about_the_axis_that_is_shown() -> None:
         assert np.count_nonzero(rows[:, PUSH + ROLL]) == 0
         ticks = studio.standing().ticks
         np.testing.assert_array_equal(ticks[: len(rows), 2], rows[: len(ticks), RATE + PITCH])
-        studio.send(ShowAxis("roll"), PushNow(0.8, 0.2))  # what was plotted of it is there
+        studio.send(ShowAxis("roll"), PushRequest(0.8, 0.2))  # what was plotted of it is there
         np.testing.assert_array_equal(studio.standing().ticks[: len(rows), 2], rows[:, RATE + ROLL])
         studio.run(0.5)
         assert np.count_nonzero(studio.rows[:, PUSH + PITCH]) == 40
@@ -85,7 +85,7 @@ def test_history_brings_all_axes_back(back: int) -> None:
     pushes = ("push.0.start_s=1.0", "push.1.start_s=1.5", "axes.pitch.observer.kind=adaptive")
     with session(*pushes, scenario="two_axes") as studio:
         studio.run(2.0, every_s=0.004)
-        studio.send(ShowAxis("pitch"), PushNow(1.0, 0.1))  # is not to come again
+        studio.send(ShowAxis("pitch"), PushRequest(1.0, 0.1))  # is not to come again
         studio.run(0.1, every_s=0.004)
         studio.scrub(back - 10)
         time = studio.data.time
@@ -103,7 +103,7 @@ def test_what_is_chosen_is_chosen_on_all_axes_and_history_brings_it_back() -> No
         live = studio.live
         studio.run(1.0, every_s=0.004)
         rows = len(studio.rows)
-        studio.send(Choose({OBSERVER: "linear"}), Choose(laws_of(live.base)["LQR"]))
+        studio.send(ChangeSettings({OBSERVER: "linear"}), ChangeSettings(laws_of(live.base)["LQR"]))
         parts = live.now.parts
         assert [part.scenario.observer.kind for part in parts] == ["linear", "linear"]
         assert [part.scenario.controller.lqr is not None for part in parts] == [True, True]
@@ -112,7 +112,7 @@ def test_what_is_chosen_is_chosen_on_all_axes_and_history_brings_it_back() -> No
         assert studio.standing().law == "LQR"
         studio.run(1.0, every_s=0.004)
         assert len(studio.rows) > rows
-        studio.send(Choose({FEEDBACK: "fog"}), Choose({BIAS: 0.5}), Choose({NOISE: 0.0}))
+        studio.send(ChangeSettings({FEEDBACK: "fog"}), ChangeSettings({BIAS: 0.5}), ChangeSettings({NOISE: 0.0}))
         for part in live.now.parts:
             settings = part.scenario
             assert (settings.controller.feedback, settings.plant.equilibrium_bias_deg) == (
@@ -135,7 +135,7 @@ def test_what_is_chosen_is_chosen_on_all_axes_and_history_brings_it_back() -> No
         again, then = studio.rows, before[(before[:, 0] > time - 1e-9) & (before[:, 0] < 2.0 - 1e-9)]
         assert len(then) > 100
         np.testing.assert_array_equal(again[: len(then)], then[: len(again)])
-        studio.send(Choose({OBSERVER: "homogeneous"}), Choose(laws_of(live.base)["the scenario's"]))
+        studio.send(ChangeSettings({OBSERVER: "homogeneous"}), ChangeSettings(laws_of(live.base)["the scenario's"]))
         assert [part.scenario.observer.parameters for part in live.now.parts] == [{"k1": 50.0}, {"k1": 40.0}]
         assert live.now.scenario.controller.gains == "scaled"
         assert live.now.scenario.axes["pitch"].plant.equilibrium_bias_deg == -0.3
@@ -147,12 +147,12 @@ def test_a_law_is_the_runners_on_both_axes_from_the_start() -> None:
     with session(*settings, scenario="two_axes") as studio:
         laws = laws_of(studio.live.base)
         assert law_of(studio.live.base, studio.live.now) == "the scenario's"
-        studio.send(Choose(laws["LQR"]), Choose({FEEDBACK: "truth"}))
+        studio.send(ChangeSettings(laws["LQR"]), ChangeSettings({FEEDBACK: "truth"}))
         assert law_of(studio.live.base, studio.live.now) == "LQR"
         studio.run(1.0)
         base = prepare(load_scenario("two_axes", ["axes.pitch.controller.rate_limit_rad_s=3.0", "push=[]"]))
         law = {"lqr": {"state_cost": [1, 1, 1, 1]}, "feedback": "truth"}
-        trajectory = base.with_values({"controller": law, "duration_s": 1.0}).run().trajectory
+        trajectory = base.with_settings({"controller": law, "duration_s": 1.0}).run().trajectory
         assert trajectory is not None
         same(studio.rows[:200], as_rows(trajectory))
 
@@ -165,7 +165,7 @@ def test_what_is_refused_changes_no_axis() -> None:
             ({BIAS: 60.0}, "less than 45"),
             ({"controller.rate_hz": 100.0}, "stays 200 Hz"),
         ):
-            studio.send(Choose(values))
+            studio.send(ChangeSettings(values))
             assert said in studio.standing().note
         studio.run(0.5)
         same(studio.rows, runner("duration_s=2.0", "push=[]"))
@@ -173,7 +173,7 @@ def test_what_is_refused_changes_no_axis() -> None:
 
 def test_a_fall_about_the_second_axis_is_a_fall() -> None:
     with session(scenario="two_axes") as studio:
-        studio.send(ShowAxis("pitch"), PushNow(30.0, 0.5))
+        studio.send(ShowAxis("pitch"), PushRequest(30.0, 0.5))
         studio.run(1.5)
         pushed = 'push=[{start_s=0.0, duration_s=0.5, torque_n_m=30.0, axis="pitch"}]'
         outcome = prepare(load_scenario("two_axes", [pushed])).run().outcomes[0]
@@ -219,7 +219,7 @@ def test_an_axis_whose_observer_fails_stops_all_and_history_goes_back_to_before_
         studio.pause(False)
         studio.run(0.2)
         same(studio.rows, runner("duration_s=2.0", "push=[]", *fragile))
-        studio.send(Choose({OBSERVER: "homogeneous"}))
+        studio.send(ChangeSettings({OBSERVER: "homogeneous"}))
         studio.run(1.0)
         assert not studio.live.stopped
 
