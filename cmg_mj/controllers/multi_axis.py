@@ -22,7 +22,7 @@ TURN_GYRO_STREAM = 5
 """Of the noise of the gyro about the vertical: those before it are an axis' sensors'."""
 
 
-class Turning(NamedTuple):
+class YawCoupling(NamedTuple):
     """By how much the axes of a rig that turns at w couple, (n_axes, n_axes) each, zero on the diagonals.
 
     In a frame that turns at w about the vertical z, with n_i along axis i, two momenta of axis j are swept round. That
@@ -42,11 +42,11 @@ class Turning(NamedTuple):
     k_ij = 2 n_i . (z x n_j): Coriolis' acceleration, once of the frame and once of the point in it.
     """
 
-    wheels: np.ndarray
+    flywheels: np.ndarray
     """c [1]: for two axes at right angles whose pairs are alike +-1."""
-    body: np.ndarray
+    inertia: np.ndarray
     """d [s]."""
-    shown: np.ndarray
+    coriolis: np.ndarray
     """k [1]."""
 
 
@@ -58,7 +58,7 @@ class MultiAxisController:
 
         u_i = w sum_j (c_ij sin(x3_j) + d_ij x2_j) / cos(x3_i)
 
-    (`Turning`) beside the law's own u, with the x2_j that is fed back (the observers', unless `feedback` says
+    (`YawCoupling`) beside the law's own u, with the x2_j that is fed back (the observers', unless `feedback` says
     otherwise). The observers are told the law's u alone: the rest makes no torque. From the accelerometers' angular
     acceleration w k_ij x2_j is taken, with x2_j of the tick before. w is what a cheap gyro about the frame's vertical
     shows.
@@ -73,7 +73,7 @@ class MultiAxisController:
     """
 
     def __init__(
-        self, parts: Sequence[Controller], turning: Turning | None = None, gyro: MemsGyro | None = None
+        self, parts: Sequence[Controller], turning: YawCoupling | None = None, gyro: MemsGyro | None = None
     ) -> None:
         self.parts = tuple(parts)
         first = self.parts[0]

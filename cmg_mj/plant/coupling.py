@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.multi_axis import Turning
+from cmg_mj.controllers.multi_axis import YawCoupling
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.effective_inertia import at_keyframe
 from cmg_mj.plant.parts import Cube
@@ -15,7 +15,7 @@ from cmg_mj.plant.parts import Cube
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> Turning:
+def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCoupling:
     """What a turn about the vertical couples.
 
     Args:
@@ -37,7 +37,7 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> Turning:
         for n, own, about in rows
     ]
     shown = [[2.0 * float(n @ np.cross(UP, m)) for m in along] for n, _, _ in rows]
-    return Turning(np.array(wheels), np.array(body), np.array(shown))
+    return YawCoupling(np.array(wheels), np.array(body), np.array(shown))
 
 
 def _turned(model: mujoco.MjModel, data: mujoco.MjData, cube: Cube) -> np.ndarray:

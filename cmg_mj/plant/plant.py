@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from cmg_mj.controllers.backlash import ARCMIN_A_DEGREE
 from cmg_mj.controllers.controller import CONTROLLER_OPTIONS, Controller
 from cmg_mj.controllers.laws import Law, StateFeedback
-from cmg_mj.controllers.multi_axis import MultiAxisController, Turning
+from cmg_mj.controllers.multi_axis import MultiAxisController, YawCoupling
 from cmg_mj.controllers.processor import Processor, ProcessorController
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
@@ -203,7 +203,7 @@ class Plant:
         return [axis.name for axis in self.axes]
 
     @cached_property
-    def turning(self) -> Turning:
+    def turning(self) -> YawCoupling:
         """What a turn about the vertical couples."""
         return turning(self._as_filed, self.key, self.axes)
 

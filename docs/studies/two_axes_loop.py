@@ -82,7 +82,7 @@ def fastest_turn(rates: Sequence[float] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.
         for rate in rates:
             experiment = two_axes(f"plant.turn_rate_rad_s={rate}", f"controller.compensate_turning={against}")
             derived = experiment.plant.turning
-            experiment.plant.__dict__["turning"] = derived._replace(wheels=sign * derived.wheels)
+            experiment.plant.__dict__["turning"] = derived._replace(wheels=sign * derived.flywheels)
             outcome = experiment.run(keep_trajectory=False).outcomes[0]
             row.append(f"fell at {outcome.time_s:.1f} s" if outcome.fell else "stands")
         rows.append(row)

@@ -67,7 +67,8 @@ def asked_of(
 def against(plant: Plant, w: float, angles: list[float]) -> list[float]:
     """u_i = w sum_j c_ij sin(x3_j)/cos(x3_i)."""
     return [
-        w * float(row @ np.sin(angles)) / math.cos(own) for row, own in zip(plant.turning.wheels, angles, strict=True)
+        w * float(row @ np.sin(angles)) / math.cos(own)
+        for row, own in zip(plant.turning.flywheels, angles, strict=True)
     ]
 
 
@@ -112,10 +113,10 @@ def test_the_wrong_sign_doubles_it(plant: Plant) -> None:
 def test_signs_and_sizes_follow_the_wheels() -> None:
     """c_ij from the wheels' axes and speeds: none of them is assumed."""
     plant = load_plant(model="two_axes.xml")
-    np.testing.assert_allclose(plant.turning.wheels, [[0.0, 1.0], [-1.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(plant.turning.flywheels, [[0.0, 1.0], [-1.0, 0.0]], atol=1e-12)
     half = load_plant(model="two_axes.xml", flywheel_speed_rad_s=157.0)
-    np.testing.assert_allclose(half.turning.wheels, plant.turning.wheels, atol=1e-12)
-    assert load_plant(model="two_axes.xml", locked_axes=["pitch"]).turning.wheels.shape == (1, 1)
+    np.testing.assert_allclose(half.turning.flywheels, plant.turning.flywheels, atol=1e-12)
+    assert load_plant(model="two_axes.xml", locked_axes=["pitch"]).turning.flywheels.shape == (1, 1)
 
 
 def rig_with(tmp_path: Path, *changes: tuple[str, str]) -> Plant:
@@ -212,7 +213,7 @@ def test_a_tilt_that_is_swept_round_tilts_the_other_axis(plant: Plant) -> None:
         both, alone, turn = ({"yaw": w, moving: rate}, {moving: rate}, {"yaw": w})
         swept = (asked(plant, both) - asked(plant, alone) - asked(plant, turn))[i]
         u = [0.0, 0.0]
-        u[i] = w * plant.turning.body[i, j] * rate
+        u[i] = w * plant.turning.inertia[i, j] * rate
         pushed = asked_of(plant, {}, [0.0, 0.0], u)[1 + i]
         assert abs(swept) > 0.1
         assert pushed == pytest.approx(-swept, rel=1e-3)
@@ -230,5 +231,5 @@ def test_what_accelerometers_show_of_a_tilt_that_is_swept_round(plant: Plant) ->
         shown = axis.radial_tilt.acceleration(forces[0], forces[2])
         true = axis.line.rate(data.qacc)
         assert shown - true == pytest.approx(
-            w * plant.turning.shown[i, j] * rate, rel=1e-2
+            w * plant.turning.coriolis[i, j] * rate, rel=1e-2
         )  # the free base gives a little
