@@ -68,7 +68,7 @@ def export(
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     note_hints(experiment.hints)
     experiment.require_single_axis("export")
-    controller = experiment.controller()
+    controller = experiment.axis_controller()
     name = name_of(controller.observer, asked)
     place = Path("runs") / f"export-{name}-{precision}" if out is None else output_path(out)
     with claim_folder(place, files_of(name)) as folder:

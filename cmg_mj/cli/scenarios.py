@@ -72,6 +72,7 @@ def run(
     """
     from cmg_mj.results import terminal_tables as report
     from cmg_mj.simulation.experiment import prepare
+    from cmg_mj.simulation.simulate import SimulationOptions
     from cmg_mj.studies import save as runs
 
     if observer is not None:
@@ -86,7 +87,7 @@ def run(
     shown = live_run(experiment, live, connect, pace, driver, world)
     with CtrlC() as ctrl_c, shown or nullcontext():
         with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
-            options = {"on_progress": on_progress} if shown is None else shown.options(on_progress)
+            options: SimulationOptions = {"on_progress": on_progress} if shown is None else shown.options(on_progress)
             result = experiment.run(driver=driver, world=world, **options)
         if shown is not None:
             shown.ended(result)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypedDict
 
 from cmg_mj.controllers.backlash import Backlash
 from cmg_mj.controllers.integrator_trim import integrator_trim
-from cmg_mj.controllers.law_runner import LawRunner, LawTakeover
+from cmg_mj.controllers.law_runner import LawRunner, Laws, LawTakeover
 from cmg_mj.controllers.laws.protocol import Law, feedback_state
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
 from cmg_mj.observers.protocol import Measurement, Observer
-from cmg_mj.observers.runner import ObserverRunner, ObserverTakeover, read_only
+from cmg_mj.observers.runner import ObserverRunner, Observers, ObserverTakeover, read_only
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.sampled import Sensors, sampled_sensors
@@ -23,11 +23,6 @@ from cmg_mj.sensors.timing import steps_until, whole_steps
 Feedback = Literal["observer", "fog", "truth"]
 AngleSource = Literal["measured", "estimated"]
 
-
-CONTROLLER_OPTIONS = frozenset(
-    {"seed", "worlds", "feedback", "angle_source", "open_loop_observers", "bias_trim_s", "axis"}
-)
-"""Keyword arguments of `Controller` that are a user's choice; the rest is the rig's."""
 
 TAKEOVER_TICKS = 20
 """Ticks that a new observer sees before it takes over from another: 0.1 s at 200 Hz."""
@@ -49,19 +44,55 @@ class Tick(NamedTuple):
     """The observer's estimate (x1, x2, x3, its extra signals), then those of the open-loop observers."""
 
 
+class SensorReadings(NamedTuple):
+    """What `Controller.decide` takes (floats, or arrays (n_worlds,))."""
+
+    forces: Sequence[Scalar]
+    """Specific force: inner x, inner z, outer x, outer z [m/s^2]."""
+    encoders: Sequence[Scalar]
+    """Gimbal angles, one a gimbal [rad]."""
+    fog: Scalar
+    """The fibre-optic gyro's rate [rad/s]."""
+    rate: Scalar
+    """The true rate [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
+
+
+class PlantInterface(NamedTuple):
+    """What a controller knows of the plant that it drives."""
+
+    tilt: RadialTilt
+    """The tilt from its accelerometers."""
+    gimbal_angle: GimbalAngle
+    """y2 from its encoders: directions and zeros of the gimbals."""
+    timestep: float
+    """Physics step [s]."""
+    backlash: Scalar = 0.0
+    """Between the servos' motors and the gimbals, one for all worlds or (n_worlds,) [rad]."""
+
+
+class ControllerOptions(TypedDict, total=False):
+    """Keyword arguments of `Controller` that are a user's choice; the others are the plant's."""
+
+    seed: int
+    worlds: int | Sequence[int]
+    feedback: Feedback
+    angle_source: AngleSource
+    open_loop_observers: Mapping[str, Observer] | None
+    bias_trim_s: float
+    axis: int
+
+
 class Controller:
     """Runs the sensors, the observer and the law, tick after tick.
 
-    It does not know MuJoCo: `update` takes the number of the physics step and the ideal readings at that step.
+    It does not know MuJoCo. `sample` takes the number of the physics step and the ideal readings there. `control`
+    decides at a tick. `update` does both.
 
     Args:
         observer: The observer whose estimate the law uses.
         law: The control law; its `dt` is the control period, beyond its `rate_limit` no command goes.
-        tilt: The tilt estimate.
         sensors: What stands between the ideal readings and the controller.
-        directions: For each gimbal +1 or -1: the sign of u that it is given.
-        gimbal_zero: For each gimbal the angle at which y2 = 0 [rad].
-        timestep: Physics step [s].
+        plant: What it knows of the plant.
         seed: Seed of the sensors' noise.
         worlds: The number of one world, on floats, or the numbers of many, on arrays.
         feedback: Which rate the law uses: the observer's, the gyro's or the true one.
@@ -69,7 +100,6 @@ class Controller:
         open_loop_observers: Observers that ride along open loop, by name.
         bias_trim_s: For so long from the start, the integrator is held at k_e1/k_e4 e, the value that the observer's
             bias estimate asks for, instead of finding it by integration [s].
-        backlash: Between the servos' motors and the gimbals, one for all worlds or (n_worlds,) [rad].
         axis: The number of the rig's axis, on which the noise depends.
 
     Attributes:
@@ -86,28 +116,22 @@ class Controller:
         self,
         observer: Observer,
         law: Law,
-        tilt: RadialTilt,
         sensors: Sensors,
+        plant: PlantInterface,
         *,
-        directions: Sequence[float],
-        gimbal_zero: Sequence[float],
-        timestep: float,
         seed: int = 0,
         worlds: int | Sequence[int] = 0,
         feedback: Feedback = "observer",
         angle_source: AngleSource = "measured",
         open_loop_observers: Mapping[str, Observer] | None = None,
         bias_trim_s: float = 0.0,
-        backlash: Scalar = 0.0,
         axis: int = 0,
     ) -> None:
         self.observer = observer
         self.law = law
-        self.tilt = tilt
         self.sensors = sensors
-        self.directions = tuple(directions)
-        self.gimbal_zero = tuple(gimbal_zero)
-        self.timestep = timestep
+        self.plant = plant
+        self.tilt, self.gimbal_angle, self.timestep, self.backlash = plant
         self.seed = seed
         self.worlds = worlds
         self.axis = axis
@@ -117,17 +141,15 @@ class Controller:
         self.angle_source: AngleSource = angle_source
         self.open_loop_observers = dict(open_loop_observers or {})
         self._single = isinstance(worlds, int)
+        timestep = plant.timestep
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
-        self._commanding: LawRunner = LawRunner(law, self._single, timestep)
-        self._observing: ObserverRunner = ObserverRunner(
-            [observer, *self.open_loop_observers.values()], self._single, timestep
-        )
-        self.extra_signals = self._observing.extra_signals
+        self._law: Laws = LawRunner(law, self._single, timestep)
+        observers = [observer, *self.open_loop_observers.values()]
+        self._observers: Observers = ObserverRunner(observers, self._single, timestep)
+        self.extra_signals = self._observers.extra_signals
         self.bias_trim_s = bias_trim_s
         self.trim_part, self.trim_gain = integrator_trim(bias_trim_s, law, self.extra_signals[0])
         self.trimmed_until = steps_until(bias_trim_s, timestep)
-        self.backlash = backlash
-        self.gimbal_angle = GimbalAngle(self.directions, self.gimbal_zero)
         self.reset()
 
     @property
@@ -144,6 +166,7 @@ class Controller:
         self._backlash = (
             None if type(self.backlash) is float and not self.backlash else Backlash(self.backlash, self.law.dt)
         )
+        self._true_rate: Scalar = math.nan
         self.coriolis: Scalar | None = None
         """What in the accelerometers' angular acceleration is none, on a rig that turns [rad/s^2]."""
         self.step: int | None = None
@@ -182,16 +205,12 @@ class Controller:
             self._sampled, self.sensors = sampled, sensors
             self.step = None  # all of them sample at the next update, due or not
         if observer is not None:
-            observers = [observer, *self.open_loop_observers.values()]
-            if self.tick is None:
-                self._observing = ObserverRunner(observers, self._single, self.timestep)
-            else:
-                self._observing = ObserverTakeover(
-                    self._observing, TAKEOVER_TICKS, observers, self._single, self.timestep
-                )
-            self.observer, self.extra_signals = observer, self._observing.extra_signals
+            runner = ObserverRunner([observer, *self.open_loop_observers.values()], self._single, self.timestep)
+            started = self.tick is not None
+            self._observers = ObserverTakeover(self._observers, TAKEOVER_TICKS, runner) if started else runner
+            self.observer, self.extra_signals = observer, runner.extra_signals
         if law is not None:
-            self._commanding = LawTakeover(self._commanding, law, self._single, self.timestep)
+            self._law = LawTakeover(self._law, LawRunner(law, self._single, self.timestep))
             self.law = law
         if law is not None or observer is not None:
             self.trimmed_until = 0
@@ -210,17 +229,37 @@ class Controller:
         Raises:
             RunStopped: An observer returned a number that is not finite.
         """
+        self.sample(step, ideal)
+        if step % self.period:
+            return False
+        self.control(step)
+        return True
+
+    def sample(self, step: int, ideal: IdealReading) -> None:
+        """Take the samples that are due at a physics step: see `update`."""
         first, self.step = self.step is None, step
+        self._true_rate = ideal.rate
         for sensor in self._sampled:
             if step % sensor.steps_per_sample == 0 or first:  # a start between two samples still has something to show
                 sensor.sample(step, ideal)
-        if step % self.period:
-            return False
+
+    def readings(self, step: int) -> SensorReadings:
+        """What the sensors show at a physics step.
+
+        Args:
+            step: Number of the physics step.
+
+        Returns:
+            The samples that have been delivered, and the true rate of the last sampling instant.
+        """
         accelerometers, encoders, fog = self._sampled
-        u = self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), ideal.rate).u
+        return _new(SensorReadings, (accelerometers.read(step), encoders.read(step), fog.read(step), self._true_rate))
+
+    def control(self, step: int) -> None:
+        """Take the control decision of a tick, a multiple of `period`: see `update`."""
+        u = self.decide(step, *self.readings(step)).u
         if self.turns_gimbals:
-            self.gimbal_rate = u if self._backlash is None else self._backlash(u)
-        return True
+            self.command_rate(u)
 
     def command_rate(self, u: Scalar) -> None:
         """Turn the gimbals at a rate from now on [rad/s]."""
@@ -256,14 +295,14 @@ class Controller:
         if not self._single:
             read_only(y1, y2, acceleration)  # observers and the law share them
         if self.tick is None:
-            estimates, held = self._observing.start(y, step), 0.0 * y1
-            self._commanding.start(y, step)
+            estimates, held = self._observers.start(y, step), 0.0 * y1
+            self._law.start(y, step)
         else:
             held = self.tick.u
-            estimates = self._observing.advance(y, held, step)
+            estimates = self._observers.advance(y, held, step)
         estimate = estimates[0]
         if step < self.trimmed_until:
-            self._commanding.trim(self.trim_gain * estimate[self.trim_part])
+            self._law.trim(self.trim_gain * estimate[self.trim_part])
         x1, x2, x3 = (y1, estimate[1], y2) if self.angle_source == "measured" else estimate[:3]
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else rate
@@ -273,7 +312,7 @@ class Controller:
         x = feedback_state(x1, x2, x3)
         if len(estimate) > 3:
             x.extra = estimate[3:]
-        u, x_e = self._commanding.decide(y, x, held, step)
+        u, x_e = self._law.decide(y, x, held, step)
         if not self._single:
             read_only(u)  # observers get it at the next tick, the trajectory later
         self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates))

@@ -1,20 +1,19 @@
-"""A control law at work: started, asked tick by tick, limited, and a user's one held to its word."""
+"""Runs a control law tick by tick, limits its command, and checks what a user-written one returns."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NoReturn
 
 import numpy as np
 
 from cmg_mj.controllers.laws.protocol import FeedbackState, Law
 from cmg_mj.elementwise import Scalar, clip
-from cmg_mj.errors import RunStopped, raised
-from cmg_mj.observers.protocol import Measurement
+from cmg_mj.observers.protocol import Measurement, State
+from cmg_mj.observers.user_code import FAILURES, UserCode, real_array
 
 
 class LawRunner:
-    """A law that decides.
+    """Asks a law for its command at each tick.
 
     Args:
         law: The law.
@@ -27,8 +26,8 @@ class LawRunner:
         self._step = law.step
         self._least, self._most = -law.rate_limit, law.rate_limit
         self._single = single
-        self._timestep = timestep
-        self._state: Any = None
+        self._user_code = UserCode("law", type(law).__name__, timestep)
+        self._state: State = None
 
     def start(self, y: Measurement, step: int) -> None:
         """Forget everything: the next decision is the first.
@@ -42,12 +41,23 @@ class LawRunner:
         """
         try:
             self._state = self.law.init(y)
-        except (Exception, SystemExit) as error:  # a user's law may fail in any way
-            self._fail(f"raised {raised(error)}", step, error)
+        except FAILURES as error:
+            self._user_code.fail_from(error, step)
 
     def trim(self, x_e: Scalar) -> None:
         """Hold the integrator at a value [rad s]."""
         self._state = self._state._replace(x_e=x_e)
+
+    @property
+    def integrator(self) -> Scalar | None:
+        """x_e [rad s]; None for a law without one."""
+        return getattr(self._state, "x_e", None)
+
+    def take_integrator(self, predecessor: LawRunner) -> None:
+        """Go on with another law's integrator, if both have one."""
+        x_e = predecessor.integrator
+        if x_e is not None and self.integrator is not None and hasattr(self._state, "_replace"):
+            self.trim(x_e)
 
     def decide(self, y: Measurement, x: FeedbackState, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
         """The command of a tick.
@@ -72,61 +82,69 @@ class LawRunner:
             if self._single and type(command) is float and type(x_e) is float and self._least <= command <= self._most:
                 return command, x_e
             command, x_e = self._coerced(command, x_e, y)
-        except (Exception, SystemExit) as error:  # a user's law may fail in any way
-            self._fail(f"raised {raised(error)}", step, error)
+        except FAILURES as error:
+            self._user_code.fail_from(error, step)
         if self._single and not math.isfinite(command):  # many worlds are judged one by one, elsewhere
-            self._fail(f"returned {command} for u", step)
+            self._user_code.fail(f"returned {command} for u", step)
         return command, x_e
 
-    def _coerced(self, command: Any, x_e: Any, y: Measurement) -> tuple[Scalar, Scalar]:
-        """What a law has said, within the limit, as floats or as arrays of their own: it may go on changing its own."""
+    def _coerced(self, command: Scalar, x_e: Scalar, y: Measurement) -> tuple[Scalar, Scalar]:
+        """Limit a law's command; copy it and its integrator, as floats or arrays: a law may change its own in place."""
         if self._single:
             u, x_e = _number(command), _number(x_e)
             return clip(u, self._least, self._most) if math.isfinite(u) else u, x_e
         u = _of_worlds(command, y)
         return np.where(np.isfinite(u), clip(u, self._least, self._most), u), _of_worlds(x_e, y)
 
-    def _fail(self, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
-        raise RunStopped(f"law {type(self.law).__name__} {what} at t = {step * self._timestep:g} s") from cause
 
-
-class LawTakeover(LawRunner):
-    """A law that takes over from another: it starts from the first sample that it sees, with the other's integrator.
+class LawTakeover:
+    """A law that takes over in the middle of a run, from its first sample on, with its predecessor's integrator.
 
     Args:
-        before: The other one, at work.
-        law: The law.
-        single: Whether on floats (one world) or on arrays (n_worlds,).
-        timestep: Physics step [s].
+        predecessor: The law that it takes over from.
+        successor: The new law.
     """
 
-    def __init__(self, before: LawRunner, law: Law, single: bool, timestep: float) -> None:
-        super().__init__(law, single, timestep)
-        waiting = before._before if isinstance(before, LawTakeover) else None
-        self._before: LawRunner | None = waiting or before
+    def __init__(self, predecessor: Laws, successor: LawRunner) -> None:
+        self._predecessor = predecessor.in_charge if isinstance(predecessor, LawTakeover) else predecessor
+        self._successor = successor
+        self._begun = False
+
+    def start(self, y: Measurement, step: int) -> None:
+        """Forget everything, the predecessor too: see `LawRunner.start`."""
+        self._begun = True
+        self._successor.start(y, step)
+
+    def trim(self, x_e: Scalar) -> None:
+        """Hold the integrator at a value [rad s]."""
+        self._successor.trim(x_e)
+
+    @property
+    def in_charge(self) -> LawRunner:
+        """The law that took the last decision."""
+        return self._successor if self._begun else self._predecessor
 
     def decide(self, y: Measurement, x: FeedbackState, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
-        """The command of a tick: see `LawRunner`."""
-        if self._before is not None:
-            self.start(y, step)
-            x_e = getattr(self._before._state, "x_e", None)
-            if x_e is not None and hasattr(self._state, "x_e") and hasattr(self._state, "_replace"):
-                self.trim(x_e)
-            self._before = None
-        return super().decide(y, x, u, step)
+        """The command of a tick: see `LawRunner.decide`."""
+        if not self._begun:
+            self._successor.start(y, step)
+            self._successor.take_integrator(self._predecessor)
+            self._begun = True
+        return self._successor.decide(y, x, u, step)
 
 
-def _of_worlds(value: Any, y: Measurement) -> np.ndarray:
+Laws = LawRunner | LawTakeover
+
+
+def _of_worlds(value: Scalar, y: Measurement) -> np.ndarray:
     """A user's numbers, which may be one for all worlds, as an array (n_worlds,) of its own."""
-    given = np.asarray(value)
-    if given.dtype.kind not in "fiub":
-        raise TypeError(f"the law returned {given.dtype}, not real numbers")
-    return given.astype(float) if given.shape == y.y1.shape else np.full(y.y1.shape, given, dtype=float)
+    numbers = real_array(value, "the law returned")
+    return numbers.astype(float) if numbers.shape == y.y1.shape else np.full(y.y1.shape, numbers, dtype=float)
 
 
-def _number(value: Any) -> float:
+def _number(value: Scalar) -> float:
     """A user's number, which may be NumPy's, as Python's own."""
-    given = np.asarray(value)
-    if given.dtype.kind not in "fiub" or given.shape:
-        raise TypeError(f"the law returned {given.dtype} of shape {given.shape}, not a real number")
-    return float(given)
+    number = np.asarray(value)
+    if number.dtype.kind not in "fiub" or number.shape:
+        raise TypeError(f"the law returned {number.dtype} of shape {number.shape}, not a real number")
+    return float(number)

@@ -16,7 +16,7 @@ from cmg_mj.sensors.ideal import IdealReading, MultiAxisReading
 from cmg_mj.sensors.mems_gyro import MemsGyro
 from cmg_mj.sensors.sampled import normals
 
-Rows = Sequence[Sequence[float]]
+Matrix = Sequence[Sequence[float]]
 
 TURN_GYRO_STREAM = 5
 """Of the noise of the gyro about the vertical: those before it are an axis' sensors'."""
@@ -65,7 +65,7 @@ class MultiAxisController:
 
     Args:
         parts: The controllers, one an axis, of one control period.
-        turning: The coefficients; None for a rig whose turns are not minded.
+        coupling: The coefficients; None for a plant whose turns are not compensated.
         gyro: What shows w; by default the first axis' cheap gyro.
 
     Raises:
@@ -73,7 +73,7 @@ class MultiAxisController:
     """
 
     def __init__(
-        self, parts: Sequence[Controller], turning: YawCoupling | None = None, gyro: MemsGyro | None = None
+        self, parts: Sequence[Controller], coupling: YawCoupling | None = None, gyro: MemsGyro | None = None
     ) -> None:
         self.parts = tuple(parts)
         first = self.parts[0]
@@ -85,9 +85,9 @@ class MultiAxisController:
         self.seed, self.worlds = first.seed, first.worlds
         self.steps_per_sample = math.gcd(*(part.steps_per_sample for part in self.parts))
         """Physics steps between the moments at which anything may be due."""
-        self._turning = None if turning is None else [coefficients.tolist() for coefficients in turning]
+        self._coupling = None if coupling is None else [coefficients.tolist() for coefficients in coupling]
         for part in self.parts:
-            part.turns_gimbals = turning is None
+            part.turns_gimbals = coupling is None
         self.reset()
 
     def reset(self) -> None:
@@ -112,13 +112,27 @@ class MultiAxisController:
         Raises:
             RunStopped: An observer or a law of an axis returned a number that is not finite.
         """
-        self.step = step
-        ticked = [part.update(step, ideal) for part, ideal in zip(self.parts, ideals.axes, strict=True)]
-        if ticked[0] and self._turning is not None:
-            self._against(ideals, *self._turning)
-        return ticked[0]
+        self.sample(step, ideals)
+        if step % self.period:
+            return False
+        self.control(step)
+        return True
 
-    def _against(self, ideals: MultiAxisReading, wheels: Rows, body: Rows, shown: Rows) -> None:
+    def sample(self, step: int, ideals: MultiAxisReading) -> None:
+        """Take the samples that are due at a physics step: see `update`."""
+        self.step = step
+        self._ideals = ideals
+        for part, ideal in zip(self.parts, ideals.axes, strict=True):
+            part.sample(step, ideal)
+
+    def control(self, step: int) -> None:
+        """Take the control decisions of a tick, a multiple of `period`: see `update`."""
+        for part in self.parts:
+            part.control(step)
+        if self._coupling is not None:
+            self._compensate(self._ideals, *self._coupling)
+
+    def _compensate(self, ideals: MultiAxisReading, flywheels: Matrix, inertia: Matrix, coriolis: Matrix) -> None:
         """Add to each axis' command what cancels the torque of momenta that are swept round."""
         turn_rate = ideals.turn_rate
         read = self._read(np.atleast_1d(turn_rate)[None, :])[0]
@@ -127,7 +141,7 @@ class MultiAxisController:
         turned = [sin(tick.y2) for tick in ticks]
         known = zip(self.parts, ticks, ideals.axes, strict=True)
         rates = [_fed_back(part.feedback, tick, ideal) for part, tick, ideal in known]
-        for part, tick, c, d, k in zip(self.parts, ticks, wheels, body, shown, strict=True):
+        for part, tick, c, d, k in zip(self.parts, ticks, flywheels, inertia, coriolis, strict=True):
             added = w * (dot(c, turned) + dot(d, rates)) / cos(tick.y2)
             limit = part.law.rate_limit
             total = clip(tick.u + added, -limit, limit)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Unpack
 
-from cmg_mj.controllers.controller import Controller, Tick
+from cmg_mj.controllers.controller import Controller, ControllerOptions, PlantInterface, Tick
+from cmg_mj.controllers.laws.protocol import Law
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers.protocol import Measurement, Observer
 from cmg_mj.observers.runner import as_estimate
+from cmg_mj.sensors.sampled import Sensors
 
 
 class Decision(NamedTuple):
@@ -64,19 +66,29 @@ class ProcessorController(Controller):
     """A controller whose decisions a processor takes, from what the sensors show (one world only).
 
     Args:
-        processor: It.
-        observer: The observer that it runs.
-        *args: The rest of what a `Controller` takes, which says what the processor runs.
-        **options: The same.
+        processor: Takes the decisions.
+        observer: The observer that the processor runs.
+        law: The law that it runs.
+        sensors: What stands between the ideal readings and the processor.
+        plant: What the controller knows of the plant.
+        **options: Those of `Controller`.
 
     Raises:
         InputError: There are many worlds, or the rate is not to be the observer's.
     """
 
-    def __init__(self, processor: Processor, observer: Observer, *args: Any, **options: Any) -> None:
+    def __init__(
+        self,
+        processor: Processor,
+        observer: Observer,
+        law: Law,
+        sensors: Sensors,
+        plant: PlantInterface,
+        **options: Unpack[ControllerOptions],
+    ) -> None:
         self.processor = processor
-        self._elsewhere = _RemoteObserver(observer)
-        super().__init__(self._elsewhere, *args, **options)
+        self._remote = _RemoteObserver(observer)
+        super().__init__(self._remote, law, sensors, plant, **options)
         self.observer = observer
         if not isinstance(self.worlds, int) or self.feedback != "observer":
             raise InputError("a processor runs one world, on the observer's rate: no batch, and feedback = 'observer'")
@@ -94,7 +106,7 @@ class ProcessorController(Controller):
             decision = self.processor.update(forces, encoders)
         except RunStopped as error:
             raise RunStopped(f"{error}, at t = {step * self.timestep:g} s") from error
-        self._elsewhere.estimate = decision.estimate
+        self._remote.estimate = decision.estimate
         tick = super().decide(step, forces, encoders, fog, rate)
         trimmed = step < self.trimmed_until
         x_e = self.trim_gain * decision.estimate[self.trim_part] if trimmed else decision.x_e

@@ -48,6 +48,10 @@ class Estimate(NamedTuple):
     """Gimbal angle [rad]."""
 
 
+State = Any
+"""An observer's or a law's memory between two samples: whatever its author has chosen."""
+
+
 class Observer(Protocol):
     """A velocity observer in discrete time.
 
@@ -62,11 +66,11 @@ class Observer(Protocol):
     attribute `needs` says what it cannot do without (`NEEDS`).
     """
 
-    def init(self, y: Measurement) -> Any:
+    def init(self, y: Measurement) -> State:
         """The state at the first sample. The estimate of that sample is (y1, 0, y2)."""
         ...
 
-    def step(self, state: Any, y: Measurement, u: Scalar) -> tuple[Any, Estimate]:
+    def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
         """Advance by one sample period.
 
         Args:

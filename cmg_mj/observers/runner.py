@@ -1,29 +1,30 @@
-"""Observers at work: started, advanced sample by sample, and a user's one held to its word."""
+"""Runs observers step by step and checks what user-written ones return."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, RunStopped, raised
-from cmg_mj.observers.protocol import Estimate, Measurement, Observer, extra_signals
+from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.observers.protocol import Estimate, Measurement, Observer, State, extra_signals
+from cmg_mj.observers.user_code import FAILURES, UserCode, real_array
 
 
 def read_only(*arrays: np.ndarray) -> None:
-    """What is handed to several observers must not be changed by one of them: `d = y.y1; d -= 0.02` raises."""
+    """Protect arrays that several observers get: `d = y.y1; d -= 0.02` raises."""
     for array in arrays:
         array.flags.writeable = False
 
 
 class ObserverRunner:
-    """Observers that see the same samples.
+    """Steps observers that see the same samples.
 
     Args:
-        observers: The one in the loop, whose failure stops a run, then those that only ride along.
+        observers: The one in the loop, whose failure stops a run, then the open-loop ones.
         single: Whether on floats (one world) or on arrays (n_worlds,).
         timestep: Physics step [s].
 
@@ -37,14 +38,20 @@ class ObserverRunner:
     def __init__(self, observers: Sequence[Observer], single: bool, timestep: float) -> None:
         self.extra_signals = [_extra_signals(observer) for observer in observers]
         self._widths = [3 + len(names) for names in self.extra_signals]
-        self._given = list(observers)
+        self._fresh = list(observers)
         self._single = single
-        self._timestep = timestep
-        self._at_work: list[Observer] = []
-        self._states: list[Any] = []
+        names = (type(getattr(observer, "stands_for", observer)).__name__ for observer in observers)
+        self._user_codes = [UserCode("observer", name, timestep) for name in names]
+        self._running: list[Observer] = []
+        self._states: list[State] = []
+
+    @property
+    def started(self) -> bool:
+        """Whether they have seen a sample."""
+        return bool(self._running)
 
     def start(self, y: Measurement, step: int) -> list[Sequence[Scalar]]:
-        """The estimates at the first sample.
+        """Take the first sample.
 
         Args:
             y: The measurement.
@@ -56,13 +63,13 @@ class ObserverRunner:
         Raises:
             RunStopped: An observer failed.
         """
-        self._at_work = list(self._given)
-        self._states = [self._first_state(observer, y, step) for observer in self._at_work]
+        self._running = list(self._fresh)
+        self._states = [self._first_state(i, y, step) for i in range(len(self._running))]
         zero = 0.0 * y.y1
         return [as_estimate((y.y1, zero, y.y2, *[zero] * (width - 3))) for width in self._widths]
 
     def advance(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
-        """The estimates at the next sample.
+        """Take the next sample.
 
         Args:
             y: The measurement.
@@ -78,7 +85,7 @@ class ObserverRunner:
         states, single = self._states, self._single
         estimates: list[Sequence[Scalar]] = []
         total = 0.0
-        for i, observer in enumerate(self._at_work):
+        for i, observer in enumerate(self._running):
             try:
                 states[i], estimate = observer.step(states[i], y, u)
                 if single:
@@ -91,23 +98,23 @@ class ObserverRunner:
                     estimate = as_estimate([part.copy() for part in estimate])
                 else:
                     estimate = self._coerced(estimate, self._widths[i], y)
-            except (Exception, SystemExit) as error:  # a user's observer may fail in any way
+            except FAILURES as error:
                 if i == 0:
-                    self._fail(observer, f"raised {raised(error)}", step, error)
-                # One that only rides along must not end the run: it is NaN from here on.
-                self._at_work[i] = lost = _FailedObserver(self._widths[i])
-                states[i], estimate = lost.step(None, y, u)
+                    self._user_codes[0].fail_from(error, step)
+                # An open-loop observer must not end the run: it is NaN from here on.
+                self._running[i] = failed = _FailedObserver(self._widths[i])
+                states[i], estimate = failed.step(None, y, u)
             # Many worlds are judged one by one, elsewhere. NaN and infinity alike are not zero times themselves.
             if i == 0 and 0.0 * total != 0.0:
-                self._fail_not_finite(observer, estimate, step)
+                self._fail_if_not_finite(estimate, step)
             estimates.append(estimate)
         return estimates
 
-    def _first_state(self, observer: Observer, y: Measurement, step: int) -> Any:
+    def _first_state(self, i: int, y: Measurement, step: int) -> State:
         try:
-            return observer.init(y)
-        except (Exception, SystemExit) as error:  # a user's observer may fail in any way
-            self._fail(observer, f"raised {raised(error)}", step, error)
+            return self._running[i].init(y)
+        except FAILURES as error:
+            self._user_codes[i].fail_from(error, step)
 
     def _has_right_shape(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> bool:
         """Whether an estimate has all its parts, arrays (n_worlds,)."""
@@ -117,66 +124,65 @@ class ObserverRunner:
         )
 
     def _coerced(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> Sequence[Scalar]:
-        """Make a user's estimate, which may be NumPy's numbers or the same for all worlds, consist of these."""
+        """Convert a user's estimate, which may be NumPy's numbers or the same for all worlds."""
         if len(estimate) < width:
             raise ValueError(f"the estimate has {len(estimate)} parts, not {width}: x1, x2, x3 and the extra signals")
-        parts = [np.asarray(part) for part in estimate[:width]]
-        for part in parts:
-            if part.dtype.kind not in "fiub":
-                raise TypeError(f"the estimate has a part of type {part.dtype}, not real numbers")
+        parts = [real_array(part, "the estimate has a part of type") for part in estimate[:width]]
         if self._single:
             return as_estimate([float(part) for part in parts])
         return as_estimate([np.broadcast_to(part.astype(float), y.y1.shape) for part in parts])
 
-    def _fail_not_finite(self, observer: Observer, estimate: Sequence[float], step: int) -> None:
+    def _fail_if_not_finite(self, estimate: Sequence[float], step: int) -> None:
         """Stop for a number that is not finite, if there is one: a sum may overflow."""
         for name, value in zip(("x1", "x2", "x3", *self.extra_signals[0]), estimate, strict=True):
             if not math.isfinite(value):
-                self._fail(observer, f"returned {value} for {name}", step)
-
-    def _fail(self, observer: Observer, what: str, step: int, cause: BaseException | None = None) -> NoReturn:
-        name = type(getattr(observer, "stands_for", observer)).__name__
-        raise RunStopped(f"observer {name} {what} at t = {step * self._timestep:g} s") from cause
+                self._user_codes[0].fail(f"returned {value} for {name}", step)
 
 
-class ObserverTakeover(ObserverRunner):
-    """Observers that join a run which others have begun, and take over once they have had time to converge.
+class ObserverTakeover:
+    """Observers that start in the middle of a run, and take over once they have had time to converge.
 
-    They start from the first sample that they see, whose rate they take for zero. Until they take over, or the one
-    before fails, the estimate of x in the loop is its.
+    They take the rate at their first sample for zero. Until they take over, or their predecessor fails, the estimate of
+    x in the loop is the predecessor's.
 
     Args:
-        before: Those that they take over from.
-        ticks: How many samples they ride along.
-        observers: The one that will be in the loop, then those that only ride along.
-        single: Whether on floats (one world) or on arrays (n_worlds,).
-        timestep: Physics step [s].
+        predecessor: The observers that they take over from.
+        ticks: How many samples they run open loop.
+        successor: The new observers.
     """
 
-    def __init__(
-        self, before: ObserverRunner, ticks: int, observers: Sequence[Observer], single: bool, timestep: float
-    ) -> None:
-        super().__init__(observers, single, timestep)
-        self._before: ObserverRunner | None = before
+    def __init__(self, predecessor: Observers, ticks: int, successor: ObserverRunner) -> None:
+        self._predecessor: Observers | None = predecessor
         self._ticks = ticks
+        self._successor = successor
+        self.extra_signals = successor.extra_signals
+
+    def start(self, y: Measurement, step: int) -> list[Sequence[Scalar]]:
+        """Take the first sample of a run: nothing is left of the predecessor. See `ObserverRunner.start`."""
+        self._predecessor = None
+        return self._successor.start(y, step)
 
     def advance(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
-        """The estimates at the next sample: see `ObserverRunner`."""
-        estimates = super().advance(y, u, step) if self._at_work else self.start(y, step)
-        if self._before is not None:
+        """Take the next sample: see `ObserverRunner.advance`."""
+        successor = self._successor
+        estimates = successor.advance(y, u, step) if successor.started else successor.start(y, step)
+        if self._predecessor is not None:
             self._ticks -= 1
             try:
-                of_before = self._before.advance(y, u, step)[0]
-                estimates[0] = as_estimate([*of_before[:3], *estimates[0][3:]])  # beyond x a law finds what it was told
+                x = self._predecessor.advance(y, u, step)[0][:3]
+                estimates[0] = as_estimate([*x, *estimates[0][3:]])  # a law finds the new observer's extra signals
             except RunStopped:
                 self._ticks = 0
             if self._ticks <= 0:
-                self._before = None
+                self._predecessor = None
         return estimates
 
 
+Observers = ObserverRunner | ObserverTakeover
+
+
 class _FailedObserver:
-    """An open-loop observer that raised: nothing is known any more."""
+    """An open-loop observer that raised: it estimates NaN from then on."""
 
     def __init__(self, width: int) -> None:
         self.width = width
@@ -189,12 +195,16 @@ class _FailedObserver:
 
 
 def as_estimate(parts: Sequence[Scalar]) -> Sequence[Scalar]:
-    """An estimate of x alone has its parts' names."""
+    """Give an estimate of x alone its parts' names; a longer one is a plain tuple."""
     return Estimate(*parts) if len(parts) == 3 else tuple(parts)
 
 
 def _extra_signals(observer: Observer) -> tuple[str, ...]:
-    """What an observer estimates beyond x; what is wrong with its names is the user's affair."""
+    """Read what an observer estimates beyond x.
+
+    Raises:
+        InputError: Its names are wrong.
+    """
     try:
         return extra_signals(observer)
     except ValueError as error:

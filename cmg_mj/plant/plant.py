@@ -6,25 +6,25 @@ import copy
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Unpack
 
 import mujoco
 import numpy as np
 from pydantic import ValidationError
 
 from cmg_mj.controllers.backlash import ARCMIN_A_DEGREE
-from cmg_mj.controllers.controller import CONTROLLER_OPTIONS, Controller
+from cmg_mj.controllers.controller import Controller, ControllerOptions, PlantInterface
 from cmg_mj.controllers.laws import Law, StateFeedback
+from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.controllers.multi_axis import MultiAxisController, YawCoupling
-from cmg_mj.controllers.processor import Processor, ProcessorController
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.messages import complaint
-from cmg_mj.observers import Observer, make_observer
+from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, held_cubes, read_reduced
 from cmg_mj.plant.checks import survives_first_steps
@@ -38,8 +38,10 @@ from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import FINEST_STEP_S, PlantSettings
+from cmg_mj.scenario.schema import ObserverSettings
 from cmg_mj.scenario.time_grid import fitting_step
 from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from cmg_mj.sensors.ideal import MultiAxisReading
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
@@ -282,66 +284,66 @@ class Plant:
 
     # --- running -------------------------------------------------------------------------------------------
 
+    @property
+    def interface(self) -> PlantInterface:
+        """What a controller of the axis knows of the plant."""
+        zeros = tuple(cube.gimbal_zero for cube in self.cubes)
+        gimbal_angle = GimbalAngle(tuple(self.axis.directions), zeros)
+        return PlantInterface(self.radial_tilt, gimbal_angle, self.model.opt.timestep, self.backlash)
+
     def controller(
         self,
-        observer: Observer | str = "homogeneous",
+        observer: Observer | str | Mapping[str, Any] = "homogeneous",
         *,
         law: Law | None = None,
         sensors: Sensors | None = None,
-        tilt: RadialTilt | None = None,
-        backlash: Scalar | None = None,
-        processor: Processor | None = None,
-        **options: Any,
-    ) -> Any:
-        """A fresh controller for this rig.
+        **options: Unpack[ControllerOptions],
+    ) -> Controller:
+        """Make a fresh controller for a plant of one axis, without a scenario.
 
         Args:
-            observer: An observer, or its name (or package.module:Class).
+            observer: An observer, its name (or package.module:Class), or a section [observer] with its `kind` and
+                parameters, such as {"kind": "homogeneous", "k1": 20.0}.
             law: The law; by default Table 2's gains at 200 Hz.
             sensors: The sensors; by default those of the datasheets.
-            tilt: The tilt estimate; by default that for this rig's accelerometers.
-            backlash: Between the servos' motors and the gimbals; by default this rig's [rad].
-            processor: What takes the decisions in the controller's place, if anything does.
-            **options: Options of `Controller`, such as seed and feedback; whatever else is given is a parameter of the
-                observer, if that is given by name.
+            **options: Options of `Controller`, such as seed and feedback.
 
         Returns:
-            The controller, a `Controller`; of a rig of several axes a `MultiAxisController` of one an axis, all made
-            alike, whose gimbals also turn against what a turn about the vertical couples.
+            The controller.
 
         Raises:
-            InputError: The observer does not exist or refuses a parameter, or a rate does not fit the physics step.
+            InputError: The plant has several axes, the observer does not exist or refuses a parameter, or a rate does
+                not fit the physics step.
         """
         if len(self.axes) > 1:
-            if processor is not None:
-                raise InputError(f"{self.path}: tilts about several axes; a board or other processor takes one")
-            alike = {"law": law, "sensors": sensors, "tilt": tilt, "backlash": backlash, **options}
-            rigs = [self.single_axis(name) for name in self.axis_names]
-            return MultiAxisController(
-                [rig.controller(observer, **alike, axis=i) for i, rig in enumerate(rigs)], self.turning
-            )
+            raise InputError(f"{self.path}: tilts about several axes; use multi_axis_controller")
         law = law or StateFeedback(dt=0.005)
         sensors = sensors or Sensors()
-        parameters = {name: options.pop(name) for name in options.keys() - CONTROLLER_OPTIONS}
         if isinstance(observer, str):
-            noise = self.parameters.noise(sensors)
-            observer = make_observer(observer, law.dt, self.reduced, noise, **parameters)
-        elif parameters:
-            name = next(iter(parameters))
-            known = {"law", "sensors", "tilt", "backlash", "processor", *CONTROLLER_OPTIONS}
-            raise InputError(f"controller({name}=...): no such option; {nearest(name, known)}")
-        make = Controller if processor is None else partial(ProcessorController, processor)
-        return make(
-            observer,
-            law,
-            tilt or self.radial_tilt,
-            sensors,
-            directions=self.axis.directions,
-            gimbal_zero=[cube.gimbal_zero for cube in self.cubes],
-            timestep=self.model.opt.timestep,
-            backlash=self.backlash if backlash is None else backlash,
-            **options,
-        )
+            observer = {"kind": observer}
+        if isinstance(observer, Mapping):
+            settings = ObserverSettings(**observer)
+            observer = settings.make(law.dt, self.reduced, self.parameters.noise(sensors))
+        return make_controller(observer, law, sensors, self.interface, **options)
+
+    def multi_axis_controller(
+        self,
+        observer: Observer | str | Mapping[str, Any] = "homogeneous",
+        *,
+        law: Law | None = None,
+        sensors: Sensors | None = None,
+        **options: Unpack[ControllerOptions],
+    ) -> MultiAxisController:
+        """Make a fresh controller for a plant of several axes: one an axis, all made alike, as `controller` makes it.
+
+        Their gimbals also compensate what a turn about the vertical couples.
+        """
+        plants = [self.single_axis(name) for name in self.axis_names]
+        parts = [
+            plant.controller(observer, law=law, sensors=sensors, **{**options, "axis": i})
+            for i, plant in enumerate(plants)
+        ]
+        return MultiAxisController(parts, self.turning)
 
     @property
     def timestep(self) -> float:

@@ -128,6 +128,22 @@ SAME_LINE_M = 1e-3
 SAME_DIRECTION = math.cos(math.radians(1.0))
 
 
+def apply_torques(applied: np.ndarray, lines: Sequence[Line], torques: Sequence[Scalar]) -> None:
+    """Set the generalised forces of torques about tilt lines; lines of one free body share its joint.
+
+    Args:
+        applied: MuJoCo's qfrc_applied, changed in place [N m].
+        lines: The lines.
+        torques: About each line [N m].
+    """
+    for line in lines:
+        for dof in line.push[0]:
+            applied[dof] = 0.0
+    for line, torque in zip(lines, torques, strict=True):
+        for dof, share in zip(*line.push, strict=True):
+            applied[dof] += share * torque
+
+
 def line_of_joint(model: mujoco.MjModel, joint: int, key: int) -> HingeLine:
     """The axis of a hinge.
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from cmg_mj.controllers.controller import Controller, PlantInterface
 from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
 from cmg_mj.controllers.integrator_trim import integrator_trim
 from cmg_mj.controllers.laws import LAWS, Law
 from cmg_mj.controllers.laws.protocol import NEEDS, needs
 from cmg_mj.controllers.laws.registry import OF_LAWS, law_class
+from cmg_mj.controllers.make_controller import make_controller
+from cmg_mj.controllers.processor import Processor
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Observer, make_observer, observer_class
 from cmg_mj.observers.protocol import extra_signals
@@ -20,6 +24,7 @@ from cmg_mj.scenario.loading import unknown_to_law, with_source
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.time_grid import check_times
+from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import TiltNoise
 
 
@@ -56,6 +61,50 @@ class Design:
     def open_loop_observers(self) -> dict[str, Observer]:
         """Those that ride along, by name, fresh."""
         return {name: make_observer(name, *self.given) for name in self.scenario.open_loop_names()}
+
+    def controller(
+        self,
+        plant: PlantInterface,
+        *,
+        worlds: int | Sequence[int] = 0,
+        axis: int = 0,
+        processor: Processor | None = None,
+        observer: Observer | None = None,
+        law: Law | None = None,
+        sensors: Sensors | None = None,
+    ) -> Controller:
+        """Make a fresh controller.
+
+        Args:
+            plant: What it knows of the plant.
+            worlds: The number of one world, or the numbers of many.
+            axis: The number of the plant's axis.
+            processor: Takes the decisions in the host's place.
+            observer: Instead of the scenario's, as are the next two.
+            law: The control law.
+            sensors: The sensors.
+
+        Returns:
+            The controller.
+
+        Raises:
+            InputError: A rate does not fit the physics step.
+        """
+        settings = self.scenario.controller
+        return make_controller(
+            observer or self.observer(),
+            law or self.fresh_law(),
+            sensors or self.scenario.sensors,
+            plant,
+            processor,
+            seed=self.scenario.seed,
+            worlds=worlds,
+            feedback=settings.feedback,
+            angle_source=settings.angle_source,
+            bias_trim_s=settings.bias_trim_s,
+            open_loop_observers=self.open_loop_observers(),
+            axis=axis,
+        )
 
     def rehearse(self, worlds: int | None = None) -> None:
         """Try the law and every observer once: one that cannot work is found before a run, not at its first sample.

@@ -90,7 +90,9 @@ def inside(time: np.ndarray, windows: Sequence[Window]) -> np.ndarray:
     return found
 
 
-def add_swing_torques(torques: list[Scalar], swings: Sequence[Swing], axes: Sequence[str], time: float) -> list[Scalar]:
+def add_swing_torques(
+    torques: Sequence[Scalar], swings: Sequence[Swing], axes: Sequence[str], time: float
+) -> Sequence[Scalar]:
     """Each axis' torque with that of the swings.
 
     Args:

@@ -9,14 +9,15 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.multi_axis import MultiAxisController
+from cmg_mj.controllers.make_controller import AnyController
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.plant import Plant
+from cmg_mj.simulation.control_loop import ControlLoop
+from cmg_mj.simulation.physics import Joints
 
 
-def control(plant: Plant, controller: Controller | MultiAxisController, data: mujoco.MjData) -> bool:
+def control(plant: Plant, controller: AnyController, data: mujoco.MjData) -> bool:
     """Sample what is due at this physics step, and set the servos' commands if it is a control tick.
 
     Call it before every `mujoco.mj_step`, after the torques from outside have been set. Where something is due it runs
@@ -43,9 +44,7 @@ def _forward(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return data.sensordata
 
 
-def _tick(
-    plant: Plant, controller: Controller | MultiAxisController, data: mujoco.MjData, sense: Callable[[], np.ndarray]
-) -> bool:
+def _tick(plant: Plant, controller: AnyController, data: mujoco.MjData, sense: Callable[[], np.ndarray]) -> bool:
     """Sample what is due, from sensordata as `sense` gives it, and set the servos if it is a control tick."""
     step = round(data.time / plant.model.opt.timestep)
     if step % controller.steps_per_sample:
@@ -66,7 +65,7 @@ def _tick(
     return True
 
 
-def _hold(plant: Plant, controller: Controller | MultiAxisController, data: mujoco.MjData) -> None:
+def _hold(plant: Plant, controller: AnyController, data: mujoco.MjData) -> None:
     """Set the servos' commands to those of the last tick."""
     for axis, part in zip(plant.axes, controller.parts, strict=True):
         if part.gimbal_rate is not None:
@@ -89,7 +88,7 @@ class ControlCallback:
         controller: Its controller.
     """
 
-    def __init__(self, plant: Plant, controller: Controller | MultiAxisController) -> None:
+    def __init__(self, plant: Plant, controller: AnyController) -> None:
         self.plant = plant
         self.controller = controller
         self._scratch = mujoco.MjData(plant.model)
@@ -135,8 +134,18 @@ class ControlCallback:
         return True
 
 
+class CallbackLoop(ControlLoop):
+    """The loop of a run in which MuJoCo calls the controller, while `control_callback` is in force."""
+
+    def sample(self, v: Joints) -> None:
+        """Leave the samples to the callback."""
+
+    def decide(self) -> None:
+        """Leave the decision to the callback, which takes it at the first of the next physics steps."""
+
+
 @contextmanager
-def control_callback(plant: Plant, controller: Controller | MultiAxisController) -> Iterator[ControlCallback]:
+def control_callback(plant: Plant, controller: AnyController) -> Iterator[ControlCallback]:
     """Install the controller as MuJoCo's control callback, and take it out again even on an exception.
 
     `mjcb_control` is one pointer for the whole process: while it is installed, only this plant may be stepped.

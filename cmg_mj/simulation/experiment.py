@@ -6,7 +6,7 @@ import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import tomli_w
@@ -14,11 +14,13 @@ import tomli_w
 from cmg_mj.codegen.board import Board, on_a_board
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
-from cmg_mj.controllers.multi_axis import MultiAxisController
+from cmg_mj.controllers.make_controller import AnyController, join_axes
 from cmg_mj.controllers.processor import Processor
+from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.bundled import folder
 from cmg_mj.inputs.overrides import assign
+from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.results.trajectory import whole_file
@@ -30,8 +32,10 @@ from cmg_mj.scenario.resolve import resolved, with_axes
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.stability_check import hints
 from cmg_mj.scenario.time_grid import check_steps, common_period
+from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.pool import batch_key, batched, first_difference
-from cmg_mj.simulation.simulate import simulate
+from cmg_mj.simulation.simulate import SimulationOptions, simulate
 from cmg_mj.simulation.stacked import batch_values
 
 ON_THE_BOARD = "Run on the emulated board (docs/board.md), whose numbers are not quite the host's."
@@ -75,60 +79,75 @@ class Experiment:
             return self.axes[0].observer_names
         return [self.scenario.observer.kind, *self.scenario.open_loop_names()]
 
-    def controller(self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, **others: Any) -> Any:
-        """A fresh controller.
+    def controller(self, worlds: int | Sequence[int] = 0) -> AnyController:
+        """Make a fresh controller.
 
         Args:
             worlds: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
-            processor: What takes its decisions in its place.
-            **others: `observer`, `law`, `sensors`, `tilt` and `backlash` instead of the scenario's.
 
         Returns:
             The controller; of several axes a `MultiAxisController`.
+        """
+        return self._of_axes([part.axis_controller(worlds, axis=i) for i, part in enumerate(self.parts)])
+
+    def axis_controller(
+        self,
+        worlds: int | Sequence[int] = 0,
+        processor: Processor | None = None,
+        *,
+        observer: Observer | None = None,
+        law: Law | None = None,
+        sensors: Sensors | None = None,
+        tilt: RadialTilt | None = None,
+        backlash: Scalar | None = None,
+        axis: int = 0,
+    ) -> Controller:
+        """Make a fresh controller of the only axis.
+
+        Args:
+            worlds: The number of one world, or the numbers of many.
+            processor: Takes the decisions in the host's place.
+            observer: Instead of the scenario's, as are the next four.
+            law: The control law.
+            sensors: The sensors.
+            tilt: The tilt estimate.
+            backlash: Between the servos' motors and the gimbals [rad].
+            axis: The number of the axis, on which the noise depends.
+
+        Returns:
+            The controller.
 
         Raises:
-            InputError: A processor is to take the decisions of several axes.
+            InputError: The plant has several axes.
         """
-        if self.axes:
-            if processor is not None:
-                self.require_single_axis("a board or other processor")
-                others["processor"] = processor
-            return self._of_axes([own.controller(worlds, **others, axis=i) for i, own in enumerate(self.axes)])
-        settings = self.scenario.controller
-        given: dict[str, Any] = {"sensors": self.scenario.sensors} | others
-        given.setdefault("law", self.design.fresh_law())
-        return self.plant.controller(
-            given.pop("observer", None) or self.design.observer(),
-            **given,
-            seed=self.scenario.seed,
-            worlds=worlds,
-            feedback=settings.feedback,
-            angle_source=settings.angle_source,
-            bias_trim_s=settings.bias_trim_s,
-            open_loop_observers=self.design.open_loop_observers(),
-            processor=processor,
+        self.require_single_axis("one controller")
+        (part,) = self.parts
+        plant = part.plant.interface
+        plant = plant if tilt is None else plant._replace(tilt=tilt)
+        plant = plant if backlash is None else plant._replace(backlash=backlash)
+        return part.design.controller(
+            plant, worlds=worlds, axis=axis, processor=processor, observer=observer, law=law, sensors=sensors
         )
 
-    def _of_axes(self, controllers: Sequence[Controller]) -> Any:
-        """The controllers of the axes as one."""
-        if len(controllers) == 1:
-            return controllers[0]
-        against = self.scenario.controller.compensate_turning
-        return MultiAxisController(
-            controllers, self.plant.turning if against else None, self.scenario.sensors.mems_gyro
-        )
+    def _of_axes(self, controllers: Sequence[Controller]) -> AnyController:
+        """Join the controllers of the axes."""
+        compensate = self.scenario.controller.compensate_turning
+        several = len(controllers) > 1
+        coupling = self.plant.turning if several and compensate else None
+        return join_axes(controllers, coupling, self.scenario.sensors.mems_gyro)
 
-    def run(self, driver: Driver = "native", world: int = 0, **options: Any) -> Result:
+    def run(self, driver: Driver = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world. Options are those of `simulate`."""
         if driver == "board":
             self.require_single_axis("the board")
-            with on_a_board(self.controller()) as board:
+            with on_a_board(self.axis_controller()) as board:
                 return self.run_on(board, world, **options)
         return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
 
-    def run_on(self, processor: Processor, world: int = 0, **options: Any) -> Result:
+    def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
-        result = self.simulate(self.plant, self.controller(int(world), processor), **options)
+        self.require_single_axis("a board or other processor")
+        result = self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
         return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
 
     def run_many(
@@ -136,7 +155,7 @@ class Experiment:
         worlds: int | Sequence[int],
         plants: Sequence[Plant] | None = None,
         vary: Mapping[str, Sequence[Any] | np.ndarray] | None = None,
-        **options: Any,
+        **options: Unpack[SimulationOptions],
     ) -> Result:
         """Run many worlds at once.
 
@@ -160,7 +179,9 @@ class Experiment:
             return run_batch(self.with_varied(vary), numbers, **options)
         rigs = [self.plant] * len(numbers) if plants is None else list(plants)
         _require_same_structure([self.plant, *rigs], len(rigs), len(numbers))
-        controllers = [own.controller(numbers, **_batched_rig_parameters(rigs, i)) for i, own in enumerate(self.parts)]
+        controllers = [
+            own.axis_controller(numbers, **_batched_rig_parameters(rigs, i)) for i, own in enumerate(self.parts)
+        ]
         return self.simulate(rigs, self._of_axes(controllers), **options)
 
     @property
@@ -220,9 +241,10 @@ class Experiment:
     def simulate(
         self,
         plant: Plant | Sequence[Plant],
-        controller: Controller,
+        controller: AnyController,
         pushes: Sequence[Push] | None = None,
-        **options: Any,
+        driver: Driver = "native",
+        **options: Unpack[SimulationOptions],
     ) -> Result:
         """Run a controller on one rig or several, for the scenario's time and judged by its settings.
 
@@ -230,6 +252,7 @@ class Experiment:
             plant: The rig, or one a world.
             controller: A fresh one.
             pushes: Instead of the scenario's.
+            driver: What calls the controller.
             **options: Those of `simulate`.
 
         Returns:
@@ -244,6 +267,7 @@ class Experiment:
             pushes=scenario.push if pushes is None else pushes,
             swings=scenario.swing,
             settings=scenario.metrics,
+            driver=driver,
             **options,
         )
 
@@ -315,7 +339,7 @@ class Experiment:
             temporary.write_text(self.as_toml(driver, world), encoding="utf-8")
 
 
-def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Any) -> Result:
+def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:
     """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
 
     Args:
@@ -346,7 +370,7 @@ def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **option
 
 def batch_inputs(
     experiments: Sequence[Experiment], worlds: Sequence[int], **others: Any
-) -> tuple[list[Plant], Controller, Sequence[Push]]:
+) -> tuple[list[Plant], AnyController, Sequence[Push]]:
     """What a batch of different experiments is run with: a rig a world, a controller and the pushes of all worlds.
 
     Args:
@@ -366,7 +390,7 @@ def batch_inputs(
             [(each.design.fresh_law(), each.scenario.sensors, tuple(each.scenario.push)) for each in parts]
         )
         given = {"law": law, "sensors": sensors} | _batched_rig_parameters(rigs, i) | others
-        controllers.append(own.controller(worlds, **given))
+        controllers.append(own.axis_controller(worlds, **given))
     return rigs, first._of_axes(controllers), pushes
 
 

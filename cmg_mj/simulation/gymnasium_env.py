@@ -5,6 +5,7 @@ Importing this module registers `cmg_mj/ScissoredPair-v0`.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
@@ -12,18 +13,16 @@ from typing import Any, Literal
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.backlash import Backlash
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.baselines import MEMS_GYRO, References
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.sampled import sampled_sensors
 from cmg_mj.sensors.timing import whole_steps
+from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
-from cmg_mj.simulation.schedule import sampling_instants, with_swing_instants
+from cmg_mj.simulation.schedule import sampling_instants, with_swing_torques
 
 try:
     import gymnasium
@@ -145,52 +144,37 @@ class ScissoredPairEnv(gymnasium.Env):
         return changed
 
     def _start(self, experiment: Experiment, seed: int) -> None:
+        experiment.require_single_axis("an environment")
         self.experiment = experiment
-        scenario, plant, dt = experiment.scenario, experiment.plant, experiment.law.dt
-        self.experiment.require_single_axis("an environment")
-        self._worlds = OneWorld(plant)
-        self._sensors = sampled_sensors(scenario.sensors, plant.timestep, seed, self._world)
-        self._gyro = References(scenario.sensors.mems_gyro, dt, seed, self._world)
-        self._y2 = GimbalAngle(tuple(plant.axis.directions), tuple(cube.gimbal_zero for cube in plant.axis.cubes))
-        self._backlash = Backlash(plant.backlash, dt) if plant.backlash else None
-        self._fall = np.radians(scenario.metrics.fall_angle_deg).item()
-        self._period = whole_steps(dt, plant.timestep, "controller.rate_hz", f"{1.0 / dt:g} Hz")
-        self._steps_per_sample = math.gcd(self._period, *(sensor.steps_per_sample for sensor in self._sensors))
-        self._steps = whole_steps(scenario.duration_s, plant.timestep, "duration_s", f"{scenario.duration_s:g} s")
-        looks = sampling_instants(self._steps, self._steps_per_sample, scenario.push, plant.timestep, plant.axis_names)
-        self._moments = (
-            with_swing_instants(looks, scenario.swing, plant.timestep, plant.axis_names) if scenario.swing else looks
+        (part,) = experiment.parts
+        scenario = part.scenario.model_copy(update={"seed": seed, "open_loop_observers": []})
+        plant, timestep = experiment.plant, experiment.plant.timestep
+        self._physics = OneWorld(plant)
+        self._controller = dataclasses.replace(part.design, scenario=scenario).controller(
+            part.plant.interface, worlds=self._world
         )
-        self._torque: Any = 0.0
-        self._step = -1
+        self._gyro = References(scenario.sensors.mems_gyro, experiment.law.dt, seed, self._world)
+        self._fall = np.radians(scenario.metrics.fall_angle_deg).item()
+        self._steps = whole_steps(scenario.duration_s, timestep, "duration_s", f"{scenario.duration_s:g} s")
+        instants = sampling_instants(
+            self._steps, self._controller.steps_per_sample, scenario.push, timestep, plant.axis_names
+        )
+        if scenario.swing:
+            instants = with_swing_torques(instants, scenario.swing, timestep, plant.axis_names)
+        self._loop = ControlLoop(self._physics, self._controller, instants, self._fall)
+        self._ticks = self._loop.ticks()
         self._running = True
         self._to_tick()
 
     def _to_tick(self) -> Literal["tick", "end", "fall"]:
-        """From moment to moment, as `simulate` goes, until a decision is due."""
-        plant, worlds = self.experiment.plant, self._worlds
-        for step, count, (torque,) in self._moments:
-            first, self._step, self._count = self._step < 0, step, count
-            if torque is not self._torque:
-                self._torque = torque
-                worlds.push(torque)
-            q, _ = worlds.state()
-            if not abs(plant.axis.line.lean(q)) <= self._fall:
-                return "fall"
-            if step % self._steps_per_sample == 0:
-                self._sample(first)
-                if step % self._period == 0:
-                    return "tick"
-            worlds.advance(count)
-        self._step = self._steps
-        self._sample(False)
+        """Go on to the next control tick, where the agent decides."""
+        if next(self._ticks, None) is not None:
+            return "tick"
+        if not self._physics.any_running:
+            return "fall"
+        self._loop.step = self._steps
+        self._loop.sample(self._physics.state()[1])
         return "end"
-
-    def _sample(self, first: bool) -> None:
-        ideal = self.experiment.plant.ideal_readings(self._worlds.sense(), self._worlds.state()[1])
-        for sensor in self._sensors:
-            if self._step % sensor.steps_per_sample == 0 or first:
-                sensor.sample(self._step, ideal)
 
     @quiet()
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
@@ -213,19 +197,20 @@ class ScissoredPairEnv(gymnasium.Env):
         limit = self.experiment.law.rate_limit
         u = min(max(float(given[0]) * self._unit, -limit), limit)
         cost = self._cost(u)
-        self._worlds.command(u if self._backlash is None else self._backlash(u))
-        self._worlds.advance(self._count)
+        self._controller.command_rate(u)
+        self._physics.command(self._controller.gimbal_rate)
+        self._loop.advance()
         how = self._to_tick()
         self._running = how == "tick"
         if how == "fall":
-            cost += self._cost(0.0) * (self._steps - self._step) / self._period
+            cost += self._cost(0.0) * (self._steps - self._loop.step) / self._controller.period
         observation, info = self._observed()
         return observation, -cost, how == "fall", how == "end", info
 
     def _state(self) -> tuple[float, float, float]:
         """True x; at a divergence what a rig that lies still has."""
         plant = self.experiment.plant
-        q, v = self._worlds.state()
+        q, v = self._physics.state()
         x1 = plant.axis.line.lean(q) + plant.bias
         x = (x1, plant.axis.line.rate(v), plant.gimbal_angle(q))
         return x if all(abs(value) < MOST for value in x) else (self._fall, 0.0, 0.0)
@@ -235,23 +220,24 @@ class ScissoredPairEnv(gymnasium.Env):
         return (sum(squares) + u * u) * self.experiment.law.dt
 
     def _observed(self) -> tuple[np.ndarray, dict[str, Any]]:
-        forces, encoders, fog = (sensor.read(self._step) for sensor in self._sensors)
+        step, controller = self._loop.step, self._controller
+        forces, encoders, fog, _ = controller.readings(step)
         x1, x2, x3 = self._state()
-        tilt = self.experiment.plant.radial_tilt
+        tilt = controller.tilt
         extra = {
             MEMS_GYRO: float(self._gyro.rates(np.array([[x2]]))[MEMS_GYRO][0, 0]),
             "acceleration": tilt.acceleration(forces[0], forces[2]),
             "fog": fog,
         }
-        y = [tilt(*forces), self._y2(encoders), *(extra[name] for name in self._readings)]
+        y = [tilt(*forces), controller.gimbal_angle(encoders), *(extra[name] for name in self._readings)]
         high = self.observation_space.high  # pyright: ignore[reportAttributeAccessIssue]
         observation = np.clip(np.array(y, dtype=np.float64), -high, high)
         info = {
-            "time_s": self._step * self.experiment.plant.timestep,
+            "time_s": step * controller.timestep,
             "x1_rad": x1,
             "x2_rad_s": x2,
             "x3_rad": x3,
-            "readings": (self._step, tuple(forces), tuple(encoders), fog, x2),
+            "readings": (step, tuple(forces), tuple(encoders), fog, x2),
         }
         return observation, info
 
@@ -264,7 +250,7 @@ class ScissoredPairEnv(gymnasium.Env):
             self.close()
         renderer = self._renderer = self._renderer or mujoco.Renderer(model, *SIZE)
         data = mujoco.MjData(model)
-        data.qpos[:] = self._worlds.data.qpos
+        data.qpos[:] = self._physics.data.qpos
         mujoco.mj_forward(model, data)
         camera = mujoco.MjvCamera()
         mujoco.mjv_defaultFreeCamera(model, camera)

@@ -1,24 +1,78 @@
-"""Physics on its own: one world on floats, or many on arrays."""
+"""Steps the physics of a plant: one world on floats, or many on arrays."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Protocol
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
+from cmg_mj.controllers.controller import Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
+from cmg_mj.plant.tilt_line import apply_torques
+from cmg_mj.sensors.ideal import IdealReading, MultiAxisReading
 
-State = tuple[Any, Any]
-"""Joint angles, joint rates: lists of floats, or arrays (n, n_worlds)."""
+Joints = Sequence[Scalar] | np.ndarray
+"""Joint angles or rates: a list of floats, or an array (n, n_worlds)."""
+State = tuple[Joints, Joints]
+"""Joint angles, joint rates."""
+Reading = IdealReading | MultiAxisReading
+
+
+class Physics(Protocol):
+    """The physics of one world or of many, as the loop advances it.
+
+    Attributes:
+        any_running: Whether any world is still stepped.
+    """
+
+    any_running: bool
+
+    def state(self) -> State:
+        """Read joint angles and rates."""
+        ...
+
+    def tilt(self, qpos: Joints, /) -> Scalar:
+        """Compute the tilt from the keyframe, of several axes the largest [rad]."""
+        ...
+
+    def reading(self, v: Joints) -> Reading:
+        """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
+        ...
+
+    def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
+        """Set the torques about the axes [N m]; return them with a value for every world."""
+        ...
+
+    def command(self, u: Scalar, axis: int = 0) -> None:
+        """Set the gimbal rates of an axis, each module in its direction [rad/s]."""
+        ...
+
+    def advance(self, steps: int) -> None:
+        """Take physics steps."""
+        ...
+
+    def stop_fallen(self, tilt: Scalar, limit: float) -> Sequence[tuple[int, float]]:
+        """Stop the worlds whose tilt is beyond a limit, or no number; return each one's index and tilt [rad]."""
+        ...
+
+    def stop_failed(self, tick: Tick) -> Sequence[tuple[int, str]]:
+        """Stop the worlds whose observer or law returned a non-finite value; return each one's index and why."""
+        ...
+
+    def running_worlds(self) -> np.ndarray | None:
+        """Copy which worlds are running, (n_worlds,); None for one world."""
+        ...
 
 
 class OneWorld:
-    """One world on floats."""
+    """Steps one world on floats."""
+
+    any_running = True
 
     def __init__(self, plant: Plant) -> None:
         self.model = plant.model
@@ -28,43 +82,57 @@ class OneWorld:
         self._forward = partial(mujoco.mj_forward, self.model, self.data)
         self._step = partial(mujoco.mj_step, self.model, self.data)
         self._servos = [list(zip(axis.servos, axis.directions, strict=True)) for axis in plant.axes]
-        self._pushes = [list(zip(*axis.line.push, strict=True)) for axis in plant.axes]
+        self._lines = [axis.line for axis in plant.axes]
+        # Those of the only axis without a detour: they are asked for at every sampling instant.
+        single = len(plant.axes) == 1
+        self.tilt = plant.axis.line.lean if single else plant.largest_tilt
+        self._ideal = plant.axis.ideal if single else plant.ideal_readings
 
     def state(self) -> State:
-        """Joint angles and rates as floats."""
+        """Read joint angles and rates as floats."""
         return self._qpos.tolist(), self._qvel.tolist()
 
-    def sense(self) -> Any:
-        """MuJoCo's sensordata at the present state, with the torque and the commands that hold there."""
+    def reading(self, v: Joints) -> Reading:
+        """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
         self._forward()
-        return self._sensordata.tolist()
+        return self._ideal(self._sensordata.tolist(), v)
 
     def command(self, u: Scalar, axis: int = 0) -> None:
-        """Set the gimbal rate of an axis, each cube in its direction."""
+        """Set the gimbal rate of an axis, each module in its direction [rad/s]."""
         ctrl = self._ctrl
         for servo, direction in self._servos[axis]:
             ctrl[servo] = direction * u
 
-    def push(self, *torques: float) -> None:
-        """Set the torques about the axes; lines of one free body share its joint."""
-        applied = self._applied
-        for pushed in self._pushes:
-            for dof, _ in pushed:
-                applied[dof] = 0.0
-        for pushed, torque in zip(self._pushes, torques, strict=True):
-            for dof, share in pushed:
-                applied[dof] += share * torque
+    def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
+        """Set the torques about the axes [N m]."""
+        apply_torques(self._applied, self._lines, torques)
+        return torques
 
     def advance(self, steps: int) -> None:
         """Take physics steps."""
         self._step(steps)
 
+    def stop_fallen(self, tilt: Scalar, limit: float) -> Sequence[tuple[int, float]]:
+        """Stop the world if its tilt is beyond a limit, or no number."""
+        if abs(tilt) <= limit:
+            return ()
+        self.any_running = False
+        return ((0, tilt),)
+
+    def stop_failed(self, tick: Tick) -> Sequence[tuple[int, str]]:
+        """Do nothing: in one world the controller raises."""
+        return ()
+
+    def running_worlds(self) -> None:
+        """Return None: there is one world."""
+        return None
+
 
 class ManyWorlds:
-    """Many worlds on arrays, stepped by MuJoCo's own thread pool.
+    """Steps many worlds on arrays, with MuJoCo's own thread pool.
 
     Args:
-        plants: The rig of each world.
+        plants: The plant of each world.
         threads: Of the pool, on which nothing depends but how long it takes; 0: all processors.
 
     Attributes:
@@ -80,50 +148,76 @@ class ManyWorlds:
         self._qpos, self._qvel, self._ctrl = b.bind("qpos"), b.bind("qvel"), b.bind("ctrl")
         self._applied, self._sensordata = b.bind("qfrc_applied"), b.bind("sensordata")
         act = b.bind("act")
-        of: dict[Plant, list[int]] = {}
+        worlds_of: dict[Plant, list[int]] = {}
         for i, plant in enumerate(plants):
-            of.setdefault(plant, []).append(i)
-        for plant, places in of.items():  # one MjData at a time: each takes 13.6 MB
+            worlds_of.setdefault(plant, []).append(i)
+        for plant, places in worlds_of.items():  # one MjData at a time: each takes 13.6 MB
             data = plant.new_data()
             self._qpos[places], self._qvel[places] = data.qpos, data.qvel
             self._ctrl[places], act[places] = data.ctrl, data.act
         self._servos = [axis.servos for axis in first.axes]
         self._directions = [np.array(axis.directions) for axis in first.axes]
         self._pushes = [axis.line.push for axis in first.axes]
+        single = len(first.axes) == 1
+        self.tilt = first.axis.line.lean if single else first.largest_tilt
+        self._ideal = first.axis.ideal if single else first.ideal_readings
         self.running = np.ones(len(plants), dtype=bool)
-        self._all_run = True
+        self.any_running = self._all_running = True
 
     def state(self) -> State:
-        """Joint angles and rates, each (n, n_worlds)."""
+        """Copy joint angles and rates, each (n, n_worlds)."""
         return self._qpos.T.copy(), self._qvel.T.copy()
 
-    def sense(self) -> Any:
-        """MuJoCo's sensordata at the present state, with the torque and the commands that hold there, (n, n_worlds)."""
+    def reading(self, v: Joints) -> Reading:
+        """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
         try:
-            self.batch.forward(None if self._all_run else self.running)
+            self.batch.forward(None if self._all_running else self.running)
         except SimulationError as error:
             self._qpos[error.ids] = np.nan
-        return self._sensordata.T.copy()
+        return self._ideal(self._sensordata.T.copy(), v)
 
     def command(self, u: Scalar, axis: int = 0) -> None:
-        """Set the gimbal rates of an axis, each cube in its direction."""
+        """Set the gimbal rates of an axis, each module in its direction [rad/s]."""
         self._ctrl[:, self._servos[axis]] = np.multiply.outer(u, self._directions[axis])
 
-    def push(self, *torques: Scalar) -> None:
-        """Set the torques about the axes, one for all or (n_worlds,) each; lines of one free body share its joint."""
+    def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
+        """Set the torques about the axes, one for all or (n_worlds,) each; return arrays (n_worlds,) [N m]."""
         for dofs, _ in self._pushes:
             self._applied[:, dofs] = 0.0
         for (dofs, shares), torque in zip(self._pushes, torques, strict=True):
             self._applied[:, dofs] += np.multiply.outer(torque, shares)
-
-    def stop(self, worlds: np.ndarray) -> None:
-        """Step these worlds no more."""
-        self.running &= ~worlds
-        self._all_run = False
+        return [np.broadcast_to(torque, len(self.running)) for torque in torques]
 
     def advance(self, steps: int) -> None:
         """Take physics steps. A world in which MuJoCo raises is given joints that are NaN: it has diverged."""
         try:
-            self.batch.step(None if self._all_run else self.running, nstep=steps)
+            self.batch.step(None if self._all_running else self.running, nstep=steps)
         except SimulationError as error:
             self._qpos[error.ids] = np.nan
+
+    def stop_fallen(self, tilt: Scalar, limit: float) -> Sequence[tuple[int, float]]:
+        """Stop the worlds whose tilt is beyond a limit, or no number; return each one's index and tilt [rad]."""
+        return [(int(i), float(tilt[i])) for i in self._stop(~(np.abs(tilt) <= limit))]
+
+    def stop_failed(self, tick: Tick) -> Sequence[tuple[int, str]]:
+        """Stop the worlds whose observer or law returned a non-finite value; return each one's index and why."""
+        returned = {"observer returned an estimate": sum(tick.estimates[0]), "law returned a command": tick.u}
+        return [
+            (int(i), f"the {what} that is not finite")
+            for what, numbers in returned.items()
+            for i in self._stop(~np.isfinite(numbers))
+        ]
+
+    def running_worlds(self) -> np.ndarray:
+        """Copy which worlds are running, (n_worlds,)."""
+        return self.running.copy()
+
+    def _stop(self, worlds: np.ndarray) -> np.ndarray:
+        """Step these worlds no more; return the indices of those that were running."""
+        stopped = worlds & self.running
+        if not stopped.any():
+            return np.array([], dtype=int)
+        self.running &= ~stopped
+        self._all_running = False
+        self.any_running = bool(self.running.any())
+        return np.flatnonzero(stopped)

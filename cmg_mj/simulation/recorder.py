@@ -14,6 +14,7 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
+from cmg_mj.simulation.physics import Joints
 
 TICKS_A_PIECE = 256
 """So many ticks wait until they are made into columns together, which is much cheaper than one by one."""
@@ -78,9 +79,7 @@ class TickRecorder:
         self._waiting: list[tuple] = []
         self._pieces: list[list[np.ndarray]] = []
 
-    def add(
-        self, q: Sequence[Scalar], v: Sequence[Scalar], tick: Tick, torque: Scalar, running: np.ndarray | None
-    ) -> None:
+    def add(self, q: Joints, v: Joints, tick: Tick, torque: Scalar, running: np.ndarray | None) -> None:
         """Take one tick.
 
         Args:

@@ -1,4 +1,4 @@
-"""The moments of a run at which something is due, and the torques from outside between them."""
+"""The instants of a run at which something is due, and the torques from outside between them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from cmg_mj.elementwise import Scalar, where
 from cmg_mj.scenario.disturbances import Push, Swing, add_swing_torques
 from cmg_mj.sensors.timing import whole_steps
 
+Instant = tuple[int, int, Sequence[Scalar]]
+"""Physics step, steps until the next instant, each axis' torque until then, one or a world's each [N m]."""
+
 
 def sampling_instants(
     steps: int,
@@ -16,8 +19,8 @@ def sampling_instants(
     pushes: Sequence[Push],
     timestep: float,
     axes: Sequence[str] = ("",),
-) -> Iterator[tuple[int, int, list[Scalar]]]:
-    """The moments at which the loop must look: (step, steps until the next, each axis' torque, one or a world's each).
+) -> Iterator[Instant]:
+    """Find the instants of a run at which a sensor or the controller is due, or a push begins or ends.
 
     A push about an axis that the rig does not have, since it is locked, moves nothing.
     """
@@ -34,7 +37,9 @@ def sampling_instants(
     for start, end in itertools.pairwise(edges):
         torques = [torque + change for torque, change in zip(torques, changes[start], strict=True)]
         held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in torques]
-        first = min(-(-start // steps_per_sample) * steps_per_sample, end)  # the first beat not before the push's edge
+        first = min(
+            -(-start // steps_per_sample) * steps_per_sample, end
+        )  # the first sample not before the push's edge
         if first > start:
             yield start, first - start, held
         last = max(end // steps_per_sample * steps_per_sample, first)
@@ -44,9 +49,9 @@ def sampling_instants(
             yield last, end - last, held
 
 
-def with_swing_instants(
-    instants: Iterable[tuple[int, int, list[Scalar]]], swings: Sequence[Swing], timestep: float, axes: Sequence[str]
-) -> Iterator[tuple[int, int, list[Scalar]]]:
-    """The moments with the swings' torques in their middle."""
-    for step, count, held in instants:
-        yield step, count, add_swing_torques(held, swings, axes, (step + 0.5 * count) * timestep)
+def with_swing_torques(
+    instants: Iterable[Instant], swings: Sequence[Swing], timestep: float, axes: Sequence[str]
+) -> Iterator[Instant]:
+    """Add the swings' torques, at their value in the middle between two instants."""
+    for step, steps, torques in instants:
+        yield step, steps, add_swing_torques(torques, swings, axes, (step + 0.5 * steps) * timestep)

@@ -6,11 +6,12 @@ import math
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
+from cmg_mj.simulation.simulate import SimulationOptions
 from cmg_mj.studies.save import recording_title, to_record
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ class LiveRun:
     ) -> None:
         self._view.__exit__(kind, error, traceback)
 
-    def options(self, on_progress: Callable[[float], None] | None = None) -> dict[str, Any]:
+    def options(self, on_progress: Callable[[float], None] | None = None) -> SimulationOptions:
         """What `Experiment.run` must be given.
 
         Args:

@@ -60,8 +60,8 @@ def row(experiment: Experiment, worlds: int) -> list[str]:
     """An observer's row of the table."""
     host = experiment.run_many(worlds, keep_trajectory=False)
     runs = []
-    with on_a_board(experiment.controller()) as board:
-        beside = Beside(board, experiment.controller())
+    with on_a_board(experiment.axis_controller()) as board:
+        beside = Beside(board, experiment.axis_controller())
         for world in range(worlds):
             runs.append(experiment.run_on(beside, world, keep_trajectory=False))
     cells = [experiment.scenario.observer.kind, f"{np.sqrt(np.mean(np.square(beside.differences))):.1e}"]

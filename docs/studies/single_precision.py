@@ -46,7 +46,7 @@ def in_c(observer: str, signals: np.ndarray) -> np.ndarray:
     compile_with = compiler()
     if compile_with is None:
         raise InputError("no C compiler was found (CC, cc, gcc, clang)")
-    controller = prepare(load_scenario("push_recovery", [], observer)).controller()
+    controller = prepare(load_scenario("push_recovery", [], observer)).axis_controller()
     rates = np.zeros(signals.shape[1:])
     with TemporaryDirectory() as folder:
         source = export(controller, Path(folder), precision="single")[1]

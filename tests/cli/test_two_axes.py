@@ -244,7 +244,7 @@ def test_in_a_loop_of_ones_own() -> None:
 
     rig = load_plant(model="two_axes", equilibrium_bias_deg=0.3, turn_rate_rad_s=1.0)
     law = StateFeedback(dt=0.005, gains=(71.9, 9.54, -0.862, 0.223))
-    controller = rig.controller("gyro_free", seed=3, law=law)
+    controller = rig.multi_axis_controller("gyro_free", seed=3, law=law)
     data = rig.new_data()
     while data.time < 3.0:
         control(rig, controller, data)

@@ -95,7 +95,7 @@ def test_a_users_own_loop_has_it_too() -> None:
     from cmg_mj.simulation.callback import control
 
     of = experiment("plant.gimbal_backlash_arcmin=60.0", "plant.timestep_s=0.005")
-    controller, data = of.controller(), of.plant.new_data()
+    controller, data = of.axis_controller(), of.plant.new_data()
     for _ in range(100):
         control(of.plant, controller, data)
         mujoco.mj_step(of.plant.model, data)
@@ -107,7 +107,7 @@ def test_a_users_own_loop_has_it_too() -> None:
 def test_observers_are_told_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     of = experiment("plant.gimbal_backlash_arcmin=60.0")
     told: list[float] = []
-    controller = of.controller()
+    controller = of.axis_controller()
     observer: Any = controller.observer
     monkeypatch.setattr(type(observer), "step", _recorded(type(observer).step, told))
     commanded = []

@@ -12,12 +12,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.controllers.controller import TAKEOVER_TICKS, Controller
+from cmg_mj.controllers.controller import TAKEOVER_TICKS, Controller, PlantInterface
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
+from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, IdealReading, Sensors
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
@@ -270,11 +271,8 @@ def controller(observer: Any, law: StateFeedback | None = None, **options: Any) 
     return Controller(
         observer,
         law or StateFeedback(DT),
-        RadialTilt(0.1, 0.3),
         IDEAL_SENSORS,
-        directions=[1.0, -1.0],
-        gimbal_zero=[math.pi / 2.0, math.pi / 2.0],
-        timestep=0.001,
+        PlantInterface(RadialTilt(0.1, 0.3), GimbalAngle((1.0, -1.0), (math.pi / 2.0, math.pi / 2.0)), 0.001),
         **options,
     )
 
@@ -417,16 +415,13 @@ def test_nothing_is_due_between_ticks() -> None:
     assert len(observer.asked) == 3
 
 
-def test_beat_is_where_anything_may_be_due() -> None:
+def test_steps_per_sample_is_where_anything_may_be_due() -> None:
     sensors = Sensors(Accelerometer(rate_hz=1000.0), Encoder(rate_hz=100.0), Fog(rate_hz=500.0))
     of = Controller(
         Script(ESTIMATES.__getitem__),
         StateFeedback(0.01),
-        RadialTilt(0.1, 0.3),
         sensors,
-        directions=[1.0],
-        gimbal_zero=[0.0],
-        timestep=0.0005,
+        PlantInterface(RadialTilt(0.1, 0.3), GimbalAngle((1.0,), (0.0,)), 0.0005),
     )
     assert (of.period, of.steps_per_sample) == (20, 2)
 

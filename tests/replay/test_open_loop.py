@@ -32,7 +32,7 @@ def recorded(worlds: int | None) -> Trajectory:
 @pytest.mark.parametrize("worlds", [None, 3])
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_replay_is_bitwise_what_the_run_recorded(name: str, worlds: int | None) -> None:
-    controller = experiment().controller()
+    controller = experiment().axis_controller()
     observer = controller.open_loop_observers.get(name, controller.observer)
     estimate = replay(observer, recorded(worlds))
     for column, value in zip(("x1_rad", "x2_rad_s", "x3_rad"), estimate, strict=True):
@@ -44,7 +44,7 @@ def test_replay_is_bitwise_what_the_run_recorded(name: str, worlds: int | None) 
 def test_replay_knows_what_it_is_fed_with() -> None:
     """Another command gives another estimate: the comparison above is not an empty one."""
     moved = Trajectory({**recorded(3).columns, "u_rad_s": recorded(3)["u_rad_s"] + 0.1})
-    of = experiment().controller().observer
+    of = experiment().axis_controller().observer
     assert np.abs(replay(of, moved).x2 - replay(of, recorded(3)).x2).max() > 1e-3
 
 
@@ -53,7 +53,7 @@ def test_it_starts_at_the_first_row_it_is_given() -> None:
     assert part["time_s"][0] == pytest.approx(0.2)
     assert part["time_s"][-1] == pytest.approx(0.6)
     assert len(part) == 81
-    x1, x2, x3 = replay(experiment().controller().observer, part)
+    x1, x2, x3 = replay(experiment().axis_controller().observer, part)
     np.testing.assert_array_equal(x1[0], part["y1_rad"][0])
     np.testing.assert_array_equal(x2[0], 0.0)
     np.testing.assert_array_equal(x3[0], part["y2_rad"][0])
@@ -70,7 +70,7 @@ def test_a_world_that_fell_is_nan_from_there_and_leaves_the_others_alone() -> No
     for name in columns:
         if name != "time_s":
             columns[name][50:, 1] = np.nan
-    of = experiment().controller().observer
+    of = experiment().axis_controller().observer
     rate, whole = replay(of, Trajectory(columns)).x2, replay(of, recorded(3)).x2
     assert np.isnan(rate[50:, 1]).all()
     np.testing.assert_array_equal(rate[:50, 1], whole[:50, 1])

@@ -48,7 +48,7 @@ def test_every_observer_beside_the_others_is_as_by_itself(monkeypatch: pytest.Mo
     batches = Batches(monkeypatch)
     for a, b in zip(run_side_by_side(runs), alone, strict=True):
         same(a, b)
-    kinds = {experiment(name).controller().extra_signals[0] for name in OBSERVERS}
+    kinds = {experiment(name).axis_controller().extra_signals[0] for name in OBSERVERS}
     assert sorted(batches.sizes) != [3] * len(OBSERVERS)
     assert len(batches.sizes) == len(kinds)  # what is estimated beyond x is the same in a batch
 

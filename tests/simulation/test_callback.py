@@ -62,7 +62,7 @@ class Loop:
 
     def __init__(self, of: Experiment, *, cold: bool = False) -> None:
         self.of, self.plant = of, of.plant
-        self.controller = of.controller()
+        self.controller = of.axis_controller()
         self.data = mujoco.MjData(self.plant.model) if cold else self.plant.new_data()
         if cold:
             self.start()
@@ -151,8 +151,9 @@ def test_a_users_loop_starts_cold_as_well() -> None:
 
 
 def test_the_callback_drives_one_world_only() -> None:
+    of = experiment()
     with pytest.raises(InputError, match="drives one world, not a batch"):
-        experiment().run_many(2, driver="callback")
+        of.simulate([of.plant] * 2, of.controller([0, 1]), driver="callback")
 
 
 # --- what a user may do in between ---------------------------------------------------------------------
@@ -236,7 +237,7 @@ class Counted:
 
 def counting(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
     of = experiment((f"observer.kind={__name__}:Counted", *settings))
-    controller = of.controller()
+    controller = of.axis_controller()
     observer: Any = controller.observer
     return of, controller, observer.calls
 
@@ -291,7 +292,7 @@ def somebody_elses() -> Iterator[None]:
 def test_it_takes_itself_out() -> None:
     of = experiment()
     assert mujoco.get_mjcb_control() is None
-    with control_callback(of.plant, of.controller()) as callback:
+    with control_callback(of.plant, of.axis_controller()) as callback:
         assert mujoco.get_mjcb_control() is callback
     assert mujoco.get_mjcb_control() is None
 
@@ -299,8 +300,8 @@ def test_it_takes_itself_out() -> None:
 def test_it_restores_what_was_there() -> None:
     of = experiment()
     with somebody_elses():
-        with control_callback(of.plant, of.controller()) as outer:
-            with control_callback(of.plant, of.controller()) as inner:
+        with control_callback(of.plant, of.axis_controller()) as outer:
+            with control_callback(of.plant, of.axis_controller()) as inner:
                 assert mujoco.get_mjcb_control() is inner
             assert mujoco.get_mjcb_control() is outer
         assert mujoco.get_mjcb_control() is other_callback

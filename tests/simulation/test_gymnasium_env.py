@@ -34,7 +34,7 @@ UNEVEN = [
 def acting(env: ScissoredPairEnv, seed: int, **options: Any) -> tuple[list[Tick], list[dict[str, Any]], float]:
     """The bench's own controller at the environment's sensors: its ticks, the infos, the sum of rewards."""
     _, info = env.reset(seed=seed, options=options)
-    controller = env.experiment.controller()
+    controller = env.experiment.axis_controller()
     ticks, infos, total, over = [], [info], 0.0, False
     while not over:
         ticks.append(controller.decide(*info["readings"]))
@@ -112,7 +112,7 @@ def test_it_is_truncated_when_the_time_is_over() -> None:
 def test_an_observation_is_what_the_sensors_show() -> None:
     env = ScissoredPairEnv("push_recovery", SHORT, readings=READINGS, in_rad_s=True)
     observation, info = env.reset(seed=2)
-    tick = env.experiment.controller().decide(*info["readings"])
+    tick = env.experiment.axis_controller().decide(*info["readings"])
     assert observation[:2].tolist() == [tick.y1, tick.y2]
     assert observation[3:].tolist() == [tick.acceleration, tick.fog]
     rates = [(observation[2], info["x2_rad_s"])]

@@ -62,7 +62,7 @@ class Run(Protocol):
         """What it was made from."""
         ...
 
-    def controller(self) -> Controller:
+    def axis_controller(self) -> Controller:
         """A fresh controller."""
         ...
 
@@ -92,7 +92,7 @@ def measure(runs: Sequence[Run], on_progress: Callable[[float], None]) -> dict[s
     require()
     rows = []
     for i, run in enumerate(runs):
-        rows.append({"observer": run.scenario.observer.kind} | cost_of(run))
+        rows.append({"observer": run.scenario.observer.kind} | cost_of(run, run.axis_controller()))
         on_progress((i + 1.0) / len(runs))
     return {
         "processor": "Cortex-M7, single precision, emulated",
@@ -102,17 +102,17 @@ def measure(runs: Sequence[Run], on_progress: Callable[[float], None]) -> dict[s
     }
 
 
-def cost_of(run: Run, controller: Controller | None = None) -> dict[str, Any]:
+def cost_of(run: Run, controller: Controller) -> dict[str, Any]:
     """What a controller costs on the board.
 
     Args:
         run: An `Experiment`, along which it is counted, closed by the controller itself; all ticks count.
-        controller: The controller; by default that of the scenario. Another must estimate the same signals.
+        controller: The controller, that of the experiment or one that estimates the same signals.
 
     Returns:
         Its figures.
     """
-    with exported(controller or run.controller()) as files:
+    with exported(controller) as files:
         flash = flash_of(files.observer, files.folder)
         board = Board(build(files.observer, files.folder).path, counting=True)
     with board:

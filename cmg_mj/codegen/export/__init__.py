@@ -4,7 +4,7 @@
     from cmg_mj import load_scenario, prepare
     from cmg_mj.codegen.export import export
 
-    controller = prepare(load_scenario("push_recovery", observer="linear")).controller()
+    controller = prepare(load_scenario("push_recovery", observer="linear")).axis_controller()
     files = export(controller, Path("board"), precision="single")
     # [board/linear.h, board/linear.c, board/linear_example.c, board/linear_test_vector.h]
 

@@ -52,7 +52,7 @@ def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarr
     x, z = -GRAVITY * np.sin(tilt), GRAVITY * np.cos(tilt)
     forces = [part for r in (controller.tilt.r_inner, controller.tilt.r_outer) for part in (x + r * acceleration, z)]
     gimbal = 5.0 * size * np.sin(w[0] * t)
-    turned = zip(controller.directions, controller.gimbal_zero, strict=True)
+    turned = zip(controller.gimbal_angle.directions, controller.gimbal_angle.zeros, strict=True)
     encoders = [zero + direction * gimbal + 1e-3 * rng.normal(size=TICKS) for direction, zero in turned]
     samples = np.array([force + noise * rng.normal(size=TICKS) for force in forces] + encoders).T
     samples[-TICKS // 4 :] = samples[-TICKS // 4]  # equal readings, as a resolution makes them
@@ -64,11 +64,8 @@ def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
     fresh = Controller(
         copy.deepcopy(controller.observer),
         controller.law,
-        controller.tilt,
         controller.sensors,
-        directions=controller.directions,
-        gimbal_zero=controller.gimbal_zero,
-        timestep=controller.timestep,
+        controller.plant._replace(backlash=0.0),
         angle_source=controller.angle_source,
         bias_trim_s=controller.bias_trim_s,
     )

@@ -45,7 +45,8 @@ def constants_of(controller: Controller) -> Constants:
     """The numbers of a controller."""
     tilt, law = controller.tilt, cast("StateFeedback", controller.law)
     k1, k2, k3, k4 = law.gains
-    numbered = list(enumerate(zip(controller.directions, controller.gimbal_zero, strict=True), 1))
+    gimbals = controller.gimbal_angle
+    numbered = list(enumerate(zip(gimbals.directions, gimbals.zeros, strict=True), 1))
     return Constants(
         of_measure=[
             Constant("r_inner", tilt.r_inner, "inner accelerometer from the tilt axis [m]"),
@@ -64,5 +65,5 @@ def constants_of(controller: Controller) -> Constants:
         trimmed=-(-controller.trimmed_until // controller.period),
         trim_gain=Constant("trim_gain", controller.trim_gain, "from the bias to the integrator [s]"),
         trim_part=controller.trim_part,
-        gimbals=len(controller.directions),
+        gimbals=len(gimbals.directions),
     )

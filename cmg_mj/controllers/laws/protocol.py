@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.observers.protocol import Estimate, Measurement
+from cmg_mj.observers.protocol import Estimate, Measurement, State
 
 
 class FeedbackState(Estimate):
@@ -59,11 +59,11 @@ class Law(Protocol):
     @property
     def rate_limit(self) -> Scalar: ...  # noqa: D102
 
-    def init(self, y: Measurement) -> Any:
+    def init(self, y: Measurement) -> State:
         """The state before the first sample is fed back."""
         ...
 
-    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Scalar) -> tuple[Any, Scalar]:
+    def step(self, state: State, y: Measurement, x: FeedbackState, u: Scalar) -> tuple[State, Scalar]:
         """Decide on one sample.
 
         Args:
@@ -82,7 +82,7 @@ NEEDS = ("estimate",)
 """What a law may need beside y: what the observer, or in its place the gyro, says."""
 
 
-def needs(law: Any) -> tuple[str, ...]:
+def needs(law: Law | type[Law]) -> tuple[str, ...]:
     """What a law, or its class, takes beside y, out of `NEEDS`; one that does not say counts as taking all.
 
     Raises:

@@ -1,24 +1,29 @@
-"""What a controller bears: the largest push its loop recovers from, on the reduced model with the sensors' noise."""
+"""Finds the largest push that a loop recovers from, on the reduced model with the sensors' noise."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.controllers.controller import PlantInterface, Tick
+from cmg_mj.elementwise import Scalar
 from cmg_mj.scenario.design import Design
+from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import common_period
+from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from cmg_mj.sensors.ideal import IdealReading
-from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.simulation.control_loop import ControlLoop
+from cmg_mj.simulation.physics import Joints
 from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
 WORLDS = 10
 LEVELS = 24
-"""So many pushes are tried at once, and then as many between the largest borne and the next."""
+"""So many pushes are tried at once, and then as many between the largest tolerated and the next."""
 PUSH_S = 0.1
 BEFORE_S = 1.0
 """The loop runs for so long before the push comes [s]."""
@@ -27,7 +32,7 @@ AFTER_TIME_CONSTANTS = 10.0
 
 
 class PushMargin(NamedTuple):
-    """What a controller bears."""
+    """The largest pushes that a loop recovers from."""
 
     median_impulse: float
     """E: the largest impulse about the line, as a push of 0.1 s, that it recovers from, the median of ten worlds
@@ -36,106 +41,140 @@ class PushMargin(NamedTuple):
     """That of the worst of the worlds [N m s]."""
 
 
-def bearable(scenario: Scenario, made: Design) -> PushMargin:
-    """Find what the law, the observer and the sensors of a scenario bear together.
+def push_margin(scenario: Scenario, design: Design) -> PushMargin:
+    """Find the largest push from which the law, the observer and the sensors of a scenario recover together.
 
-    The rig is the reduced model (4), upright, its gimbals turning as they are told.
+    The plant is the reduced model (4), upright, its gimbals turning as commanded.
 
     Args:
         scenario: For its sensors, its rates and its fall angle.
-        made: The law and the observer for the rig.
+        design: The law and the observer for the plant.
 
     Returns:
-        What they bear.
+        The largest pushes.
     """
-    low, high = 0.0, 1.5 * ceiling(made.rig.reduced, made.law.rate_limit).push_impulse(PUSH_S)
-    borne = _largest_push(scenario, made, np.linspace(low, high, LEVELS))
-    if borne is None:
+    low, high = 0.0, 1.5 * ceiling(design.rig.reduced, design.law.rate_limit).push_impulse(PUSH_S)
+    coarse = _largest_push(scenario, design, np.linspace(low, high, LEVELS))
+    if coarse is None:
         return PushMargin(0.0, 0.0)
     step = high / (LEVELS - 1)
-    finer = _largest_push(
-        scenario, made, np.linspace(max(borne.worst_impulse - step, 0.0), borne.median_impulse + step, LEVELS)
-    )
-    return finer or borne
+    least, most = max(coarse.worst_impulse - step, 0.0), coarse.median_impulse + step
+    return _largest_push(scenario, design, np.linspace(least, most, LEVELS)) or coarse
 
 
-def _largest_push(scenario: Scenario, made: Design, impulses: np.ndarray) -> PushMargin | None:
-    """Of each world the largest of some pushes up to which it stood; None if most fell with the first."""
-    stood = _stands(scenario, made, impulses)
-    upto = np.where(stood.all(axis=1), len(impulses), np.argmin(stood, axis=1)) - 1  # per world
-    if np.median(upto) < 0:
+def _largest_push(scenario: Scenario, design: Design, impulses: np.ndarray) -> PushMargin | None:
+    """Find each world's largest push up to which it stood all; None if most fell with the first."""
+    stood = _stands(scenario, design, impulses)
+    count = np.where(stood.all(axis=1), len(impulses), np.argmin(stood, axis=1)) - 1  # per world
+    if np.median(count) < 0:
         return None
-    largest = np.where(upto < 0, 0.0, impulses[np.maximum(upto, 0)])
+    largest = np.where(count < 0, 0.0, impulses[np.maximum(count, 0)])
     return PushMargin(float(np.median(largest)), float(largest.min()))
 
 
-def _stands(scenario: Scenario, made: Design, impulses: np.ndarray) -> np.ndarray:
-    """Which worlds stood which pushes, (WORLDS, n_impulses)."""
-    model, tilt = made.rig.reduced, made.rig.tilt
-    numbers = np.repeat(np.arange(WORLDS), len(impulses)).tolist()
-    torque = np.tile(impulses / PUSH_S, WORLDS)
+def _stands(scenario: Scenario, design: Design, impulses: np.ndarray) -> np.ndarray:
+    """Find which worlds stand which pushes, (WORLDS, n_impulses)."""
+    plant = design.rig
+    model = plant.reduced
     h = common_period(scenario.model_copy(update={"push": [], "duration_s": 1.0}))
-    settings = scenario.controller
-    controller = Controller(
-        made.observer(),
-        made.law,
-        tilt,
-        scenario.sensors,
-        directions=[1.0] * model.gimbals,
-        gimbal_zero=[0.0] * model.gimbals,
-        timestep=h,
-        seed=scenario.seed,
-        worlds=numbers,
-        feedback=settings.feedback,
-        angle_source=settings.angle_source,
-        bias_trim_s=settings.bias_trim_s,
-    )
-    after = AFTER_TIME_CONSTANTS / ceiling(model, made.law.rate_limit).pole
+    alone = dataclasses.replace(design, scenario=scenario.model_copy(update={"open_loop_observers": []}))
+    gimbal_angle = GimbalAngle((1.0,) * model.gimbals, (0.0,) * model.gimbals)
+    numbers = np.repeat(np.arange(WORLDS), len(impulses)).tolist()
+    controller = alone.controller(PlantInterface(plant.tilt, gimbal_angle, h), worlds=numbers)
+    physics = ReducedPhysics(plant, len(numbers), h)
+    after = AFTER_TIME_CONSTANTS / ceiling(model, design.law.rate_limit).pole
     steps = math.ceil((BEFORE_S + PUSH_S + after) / h)
     pushed = range(round(BEFORE_S / h), round((BEFORE_S + PUSH_S) / h))
-    x = np.zeros((3, len(numbers)))
-    fallen = np.zeros(len(numbers), dtype=bool)
-    fall = math.radians(scenario.metrics.fall_angle_deg)
-    beat = controller.steps_per_sample
+    push, none = (np.tile(impulses / PUSH_S, WORLDS),), (np.zeros(len(numbers)),)
+    sample = controller.steps_per_sample
+    instants = ((step, sample, push if step in pushed else none) for step in range(0, steps, sample))
+    fall_angle = math.radians(scenario.metrics.fall_angle_deg)
+    loop = ControlLoop(physics, controller, instants, fall_angle)
     with np.errstate(all="ignore"):
-        for step in range(0, steps, beat):
-            push = torque if step in pushed else np.zeros_like(torque)
-            held = np.zeros_like(torque) if controller.gimbal_rate is None else np.asarray(controller.gimbal_rate)
-            ideal = _ideal(model, tilt, made.rig.gravity, x, held, push)
-            if controller.update(step, ideal):
-                held = np.asarray(controller.gimbal_rate)
-            x = _rk4_step(model, x, held, push, beat * h)
-            fallen |= ~(np.abs(x[0]) < fall)
-            x[:, fallen] = 0.0
-    return ~fallen.reshape(WORLDS, len(impulses))
+        for _ in loop.ticks():
+            loop.decide()
+            loop.advance()
+        physics.stop_fallen(physics.x[0], fall_angle)
+    return ~physics.fallen.reshape(WORLDS, len(impulses))
 
 
-def _slope(model: ReducedModel, x: np.ndarray, u: np.ndarray, push: np.ndarray) -> np.ndarray:
-    x1, x2, x3 = x
-    acceleration = model.tilt_acceleration(x1, x2, x3, u) + push / (model.gimbals * model.inertia(x3))
-    return np.stack([x2, acceleration, u])
+class ReducedPhysics:
+    """Steps many worlds of the reduced model (4), whose gimbals turn as commanded; see `simulation.physics.Physics`.
 
+    Args:
+        plant: The plant's parameters.
+        n_worlds: How many worlds; each starts upright and at rest.
+        timestep: Physics step [s].
 
-def _rk4_step(model: ReducedModel, x: np.ndarray, u: np.ndarray, push: np.ndarray, h: float) -> np.ndarray:
-    """A step of RK4 with the command and the push held."""
-    k1 = _slope(model, x, u, push)
-    k2 = _slope(model, x + 0.5 * h * k1, u, push)
-    k3 = _slope(model, x + 0.5 * h * k2, u, push)
-    k4 = _slope(model, x + h * k3, u, push)
-    return x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    Attributes:
+        x: The state: tilt, tilt rate, gimbal angle, (3, n_worlds) [rad, rad/s, rad].
+        fallen: Which worlds have fallen, (n_worlds,); their state stays zero.
+    """
 
+    any_running = True
 
-def _ideal(
-    model: ReducedModel, tilt: RadialTilt, gravity: float, x: np.ndarray, u: np.ndarray, push: np.ndarray
-) -> IdealReading:
-    """What perfect sensors show on a rigid body that tilts about a fixed line."""
-    x1, x2, x3 = x
-    alpha = _slope(model, x, u, push)[1]
-    forces = np.stack(
-        [
-            part
-            for r in (tilt.r_inner, tilt.r_outer)
-            for part in (r * alpha - gravity * np.sin(x1), gravity * np.cos(x1) - r * x2 * x2)
-        ]
-    )
-    return IdealReading(forces, [x3.copy()] * model.gimbals, x2.copy(), x2.copy())
+    def __init__(self, plant: PlantParameters, n_worlds: int, timestep: float) -> None:
+        self._plant, self._timestep = plant, timestep
+        self.x = np.zeros((3, n_worlds))
+        self.fallen = np.zeros(n_worlds, dtype=bool)
+        self._u = self._torque = np.zeros(n_worlds)
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return x for joint angles and rates."""
+        return self.x, self.x
+
+    def tilt(self, qpos: Joints, /) -> Scalar:
+        """Return x1."""
+        return qpos[0]
+
+    def reading(self, v: Joints) -> IdealReading:
+        """Compute what perfect sensors show on a rigid body that tilts about a fixed line."""
+        (x1, x2, x3), tilt, gravity = self.x, self._plant.tilt, self._plant.gravity
+        alpha = self._slope(self.x)[1]
+        forces = np.stack(
+            [
+                part
+                for r in (tilt.r_inner, tilt.r_outer)
+                for part in (r * alpha - gravity * np.sin(x1), gravity * np.cos(x1) - r * x2 * x2)
+            ]
+        )
+        return IdealReading(forces, [x3.copy()] * self._plant.reduced.gimbals, x2.copy(), x2.copy())
+
+    def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
+        """Set the torque about the line, (n_worlds,) [N m]."""
+        (self._torque,) = torques
+        return torques
+
+    def command(self, u: Scalar, axis: int = 0) -> None:
+        """Set the gimbal rate, (n_worlds,) [rad/s]."""
+        self._u = np.asarray(u)
+
+    def advance(self, steps: int) -> None:
+        """Take one step of RK4 over so many physics steps, with command and torque held."""
+        h, x = steps * self._timestep, self.x
+        k1 = self._slope(x)
+        k2 = self._slope(x + 0.5 * h * k1)
+        k3 = self._slope(x + 0.5 * h * k2)
+        k4 = self._slope(x + h * k3)
+        self.x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+    def stop_fallen(self, tilt: Scalar, limit: float) -> Sequence[tuple[int, float]]:
+        """Hold fallen worlds at zero; the loop goes on without an ending."""
+        self.fallen |= ~(np.abs(tilt) < limit)
+        self.x[:, self.fallen] = 0.0
+        return ()
+
+    def stop_failed(self, tick: Tick) -> Sequence[tuple[int, str]]:
+        """Do nothing: a world without a finite command falls."""
+        return ()
+
+    def running_worlds(self) -> None:
+        """Return None: nothing is recorded."""
+        return None
+
+    def _slope(self, x: np.ndarray) -> np.ndarray:
+        """Compute x' of (4) under the present command and torque."""
+        model = self._plant.reduced
+        x1, x2, x3 = x
+        acceleration = model.tilt_acceleration(x1, x2, x3, self._u) + self._torque / (model.gimbals * model.inertia(x3))
+        return np.stack([x2, acceleration, self._u])

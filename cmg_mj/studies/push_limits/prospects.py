@@ -13,7 +13,7 @@ from cmg_mj.plant.mounting.fall_check import falls_with
 from cmg_mj.plant.mounting.request import SCALES
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.studies.push_limits.largest_push import PUSH_S, PushMargin, bearable
+from cmg_mj.studies.push_limits.largest_push import PUSH_S, PushMargin, push_margin
 from cmg_mj.studies.push_limits.recoverable_states import RecoverableLimit, ceiling
 
 LOW_CEILING_DEG = 2.0
@@ -99,7 +99,7 @@ def prospects(experiment: Experiment, axis: str = "") -> Prospects:
     top = ceiling(plant.reduced, experiment.law.rate_limit)
     with set_control_callback(None), quiet():
         pole = falls_with(plant.model, plant.key, plant.axis.line, plant.axis.bias)
-    return Prospects(plant.reduced, top, bearable(experiment.scenario, experiment.design), pole)
+    return Prospects(plant.reduced, top, push_margin(experiment.scenario, experiment.design), pole)
 
 
 def smallest_sufficient_scale(ceiling_at: Callable[[float], float], scale: float) -> float | None:

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.multi_axis import MultiAxisController
+from cmg_mj.controllers.make_controller import AnyController
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.plant.mujoco_state import set_control_callback
+from cmg_mj.plant.tilt_line import apply_torques
 from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.studio.drawn_plant import copy_physics_numbers, drawn_plant
@@ -58,6 +58,7 @@ class StudioSession:
         self.plant = drawn_plant(experiment.plant)
         self.note = ""
         self.timestep = self.plant.timestep
+        self._lines = [axis.line for axis in self.plant.axes]
         scenario = experiment.scenario
         self.pushes = Pushes(scenario.push, scenario.swing, self.plant.axis_names, self.timestep)
         self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=KEPT_TICKS)
@@ -94,7 +95,7 @@ class StudioSession:
         self._begin(step)
 
     def _begin(self, step: int) -> None:
-        self.controller: Controller | MultiAxisController = self.now.controller()
+        self.controller: AnyController = self.now.controller()
         self.memory = ControllerHistory(self.now, step)
         self.stopped = ""
         self.diverged = False
@@ -118,7 +119,8 @@ class StudioSession:
         """
         step = self.sync_to_time(data)
         torques = self.pushes.at(step, self.controller.steps_per_sample)
-        self._push(data, torques)
+        # Studio's mouse writes xfrc_applied: MuJoCo adds them up.
+        apply_torques(data.qfrc_applied, self._lines, torques)
         ticked = not self.stopped and self._control(data, step, torques)
         mujoco.mj_step(self.model, data)
         self._next = step + 1
@@ -126,15 +128,6 @@ class StudioSession:
             self.diverged = True
             self._stop(data, step, f"the physics diverged at t = {data.time:g} s; reset")
         return ticked
-
-    def _push(self, data: mujoco.MjData, torques: Sequence[float]) -> None:
-        """Set the torques about the axes. Studio's mouse writes xfrc_applied: MuJoCo adds them up."""
-        lines = [axis.line.push for axis in self.plant.axes]
-        for dofs, _ in lines:
-            data.qfrc_applied[dofs] = 0.0
-        for (dofs, shares), torque in zip(lines, torques, strict=True):
-            for dof, share in zip(dofs, shares, strict=True):
-                data.qfrc_applied[dof] += share * torque
 
     def _control(self, data: mujoco.MjData, step: int, torques: Sequence[float]) -> bool:
         lean = self.plant.largest_tilt(data.qpos)

@@ -67,7 +67,7 @@ class Pushes:
             sums = [torque + change for torque, change in zip(sums, changes[step], strict=True)]
             self._torques.append([torque if abs(torque) > 1e-12 else 0.0 for torque in sums])  # pushes over are none
 
-    def at(self, step: int, beat: int) -> list[float]:
+    def at(self, step: int, beat: int) -> Sequence[float]:
         """The torques during a physics step.
 
         Args:

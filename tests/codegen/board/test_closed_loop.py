@@ -42,7 +42,7 @@ class Recorded:
     """A processor that does what the controller itself does, and keeps what it was given and decided."""
 
     def __init__(self, experiment: Experiment) -> None:
-        self.own = experiment.controller()
+        self.own = experiment.axis_controller()
         self.shown: list[tuple[list[float], list[float]]] = []
         self.decided: list[Decision] = []
 
@@ -86,7 +86,7 @@ def test_lockstep_on_the_same_inputs(observer: str) -> None:
     experiment = prepare(load_scenario("push_recovery", PUSHED if observer in ARE_PUSHED else SHORT, observer))
     host = Recorded(experiment)
     experiment.run_on(host)
-    with exported(experiment.controller()) as files:
+    with exported(experiment.axis_controller()) as files:
         image = build(files.observer, files.folder).path
         assert in_double_precision(image) == []
         board = Board(image)

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEM
 
 
 def test_what_they_cost() -> None:
-    linear, homogeneous = (cost_of(short(name)) for name in ("linear", "homogeneous"))
+    linear, homogeneous = (cost_of(run, run.axis_controller()) for run in map(short, ("linear", "homogeneous")))
     assert linear["step_instructions"] < 0.1 * homogeneous["step_instructions"]
     for row in (linear, homogeneous):
         assert row["step_instructions"] < row["update_instructions"] <= row["update_instructions_most"]
@@ -34,7 +34,7 @@ def test_what_they_cost() -> None:
 
 def test_most_of_11_is_powers(tmp_path: Path) -> None:
     """Why (11) costs more than (10): four powers an update, which are more than half of it."""
-    with exported(short("homogeneous").controller()) as files:
+    with exported(short("homogeneous").axis_controller()) as files:
         powers = (files.folder / "homogeneous.c").read_text().count("powf(")
     steps = []
     for more in ("", "extern float powf(float, float); y1 = powf(y1, y2);"):

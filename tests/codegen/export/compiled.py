@@ -39,7 +39,7 @@ def read_by_every_compiler(*sources: Path) -> None:
 
 
 def controller(kind: str, *settings: str) -> Controller:
-    return prepare(load_scenario("push_recovery", settings, kind)).controller()
+    return prepare(load_scenario("push_recovery", settings, kind)).axis_controller()
 
 
 class Compiled:
@@ -92,7 +92,7 @@ class Recorded:
 
     def __init__(self, kind: str, *settings: str) -> None:
         experiment = prepare(load_scenario("push_recovery", settings, kind))
-        controller = experiment.controller()
+        controller = experiment.axis_controller()
         samples, results, rates = [], [], []
         decide = controller.decide
 

@@ -16,7 +16,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.studies.push_limits.largest_push import PUSH_S, bearable
+from cmg_mj.studies.push_limits.largest_push import PUSH_S, push_margin
 from cmg_mj.studies.push_limits.mount_report import write_scenario
 from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
@@ -96,7 +96,7 @@ def test_no_controller_bears_more(fast: Experiment, fed: dict[str, Any]) -> None
     experiment = fast.with_settings(fed)
     top = ceiling(experiment.plant.reduced, experiment.law.rate_limit)
     assert top.pole == pytest.approx(7.85, rel=0.01)
-    borne = bearable(experiment.scenario, experiment.design).median_impulse
+    borne = push_margin(experiment.scenario, experiment.design).median_impulse
     assert 0.4 * top.push_impulse(PUSH_S) < borne < top.push_impulse(PUSH_S)
     if fed:
         assert borne > top.impulse

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 import pyarrow as pa
@@ -16,6 +17,7 @@ from cmg_mj.results.per_world_table import ID_COLUMNS
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
+from cmg_mj.simulation.simulate import SimulationOptions
 from cmg_mj.studies.sweeps import chunk as work
 from cmg_mj.studies.sweeps import study as study_module
 from cmg_mj.studies.sweeps.api import all_trials
@@ -147,7 +149,7 @@ def test_an_observer_that_raises_at_a_rig_that_lies_costs_nothing() -> None:
 def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     batches = []
 
-    def fails(experiments: list[Experiment], worlds: list[int], **options: object) -> Result:
+    def fails(experiments: list[Experiment], worlds: list[int], **options: Unpack[SimulationOptions]) -> Result:
         batches.append(len(worlds))
         if any(each.scenario.plant.initial_tilt_deg == 5.0 for each in experiments):
             raise MemoryError("not in there")

@@ -1,0 +1,61 @@
+"""Makes controllers: of one axis, by the host or a processor, and of several axes as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Unpack
+
+from cmg_mj.controllers.controller import Controller, ControllerOptions, PlantInterface
+from cmg_mj.controllers.laws.protocol import Law
+from cmg_mj.controllers.multi_axis import MultiAxisController, YawCoupling
+from cmg_mj.controllers.processor import Processor, ProcessorController
+from cmg_mj.observers.protocol import Observer
+from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.sensors.sampled import Sensors
+
+AnyController = Controller | MultiAxisController
+
+
+def make_controller(
+    observer: Observer,
+    law: Law,
+    sensors: Sensors,
+    plant: PlantInterface,
+    processor: Processor | None = None,
+    **options: Unpack[ControllerOptions],
+) -> Controller:
+    """Make a fresh controller of one axis.
+
+    Args:
+        observer: The observer in the loop.
+        law: The control law.
+        sensors: What stands between the ideal readings and the controller.
+        plant: What it knows of the plant.
+        processor: Takes the decisions in the host's place, such as a board.
+        **options: Those of `Controller`.
+
+    Returns:
+        The controller.
+
+    Raises:
+        InputError: A rate does not fit the physics step, or an option does not fit the observer or the law.
+    """
+    if processor is None:
+        return Controller(observer, law, sensors, plant, **options)
+    return ProcessorController(processor, observer, law, sensors, plant, **options)
+
+
+def join_axes(
+    controllers: Sequence[Controller], coupling: YawCoupling | None, gyro: MemsGyro | None = None
+) -> AnyController:
+    """Join the controllers of a plant's axes.
+
+    Args:
+        controllers: One an axis.
+        coupling: What a turn about the vertical couples; None if the gimbals do not compensate it.
+        gyro: Shows the turn rate; by default the first axis' cheap gyro.
+
+    Returns:
+        The controller; of one axis that axis' own.
+    """
+    return controllers[0] if len(controllers) == 1 else MultiAxisController(controllers, coupling, gyro)
