@@ -14,7 +14,6 @@ from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.plant import Plant
 from cmg_mj.simulation.control_loop import ControlLoop
-from cmg_mj.simulation.physics import Joints
 
 
 def control(plant: Plant, controller: AnyController, data: mujoco.MjData) -> bool:
@@ -137,7 +136,7 @@ class ControlCallback:
 class CallbackLoop(ControlLoop):
     """The loop of a run in which MuJoCo calls the controller, while `control_callback` is in force."""
 
-    def sample(self, v: Joints) -> None:
+    def _sampler(self) -> None:
         """Leave the samples to the callback."""
 
     def decide(self) -> None:

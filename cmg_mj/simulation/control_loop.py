@@ -10,6 +10,8 @@ from cmg_mj.elementwise import Scalar
 from cmg_mj.simulation.physics import Joints, Physics
 from cmg_mj.simulation.schedule import Instant
 
+_new = tuple.__new__  # a named tuple's own takes twice as long
+
 
 class ControlTick(NamedTuple):
     """The state at a control tick, before the decision."""
@@ -68,14 +70,14 @@ class ControlLoop:
         self._fall_angle = fall_angle
         self._steps = 0
         self._parts = list(enumerate(controller.parts))
-        self._sample: Callable[[int, Any], None] = (
-            controller.sample
-        )  # takes what `physics` reads: of one axis or several
+        self._sample = self._sampler()
 
     def ticks(self) -> Iterator[ControlTick]:
         """Go from control tick to control tick, until the instants or the running worlds are at their end."""
         physics, fall_angle = self.physics, self._fall_angle
         steps_per_sample, period = self.controller.steps_per_sample, self.controller.period
+        state, tilt, stop_fallen = physics.state, physics.tilt, physics.stop_fallen
+        reading, sample = physics.reading, self._sample
         held: Sequence[Scalar] | None = None
         torques: Sequence[Scalar] = ()
         for step, steps, instant_torques in self._instants:
@@ -83,31 +85,34 @@ class ControlLoop:
             if instant_torques is not held:
                 held = instant_torques
                 torques = physics.push(held)
-            q, v = physics.state()
-            for world, tilt in physics.stop_fallen(physics.tilt(q), fall_angle):
-                self.endings[world] = Ending(step, tilt)
+            q, v = state()
+            for world, angle in stop_fallen(tilt(q), fall_angle):
+                self.endings[world] = Ending(step, angle)
             if not physics.any_running:
                 return
             if step % steps_per_sample == 0:
-                self.sample(v)
+                if sample is not None:
+                    sample(step, reading(v))
                 if step % period == 0:
-                    yield ControlTick(step, steps, q, v, torques)
+                    yield _new(ControlTick, (step, steps, q, v, torques))
                     continue
             physics.advance(steps)
 
-    def sample(self, v: Joints) -> None:
-        """Let the sensors take the samples that are due."""
-        self._sample(self.step, self.physics.reading(v))
-
     def decide(self) -> None:
         """Let the controller decide, and command the servos."""
+        physics = self.physics
         self.controller.control(self.step)
+        stop_failed = physics.stop_failed
         for axis, part in self._parts:
-            assert part.tick is not None
-            for world, message in self.physics.stop_failed(part.tick):
-                self.endings[world] = Ending(self.step, message=message)
-            self.physics.command(part.gimbal_rate, axis)
+            if stop_failed is not None and part.tick is not None:
+                for world, message in stop_failed(part.tick):
+                    self.endings[world] = Ending(self.step, message=message)
+            physics.command(part.gimbal_rate, axis)
 
     def advance(self) -> None:
         """Take the physics to the next instant."""
         self.physics.advance(self._steps)
+
+    def _sampler(self) -> Callable[[int, Any], None] | None:
+        """Return what takes the samples that are due, of one axis or several; None if something else does."""
+        return self.controller.sample

@@ -173,7 +173,8 @@ class ScissoredPairEnv(gymnasium.Env):
         if not self._physics.any_running:
             return "fall"
         self._loop.step = self._steps
-        self._loop.sample(self._physics.state()[1])
+        _, v = self._physics.state()
+        self._controller.sample(self._steps, self._physics.axis_reading(v))
         return "end"
 
     @quiet()

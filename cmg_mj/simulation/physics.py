@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Protocol
 
@@ -32,6 +32,19 @@ class Physics(Protocol):
 
     any_running: bool
 
+    @property
+    def running(self) -> np.ndarray | None:
+        """Which worlds are still stepped, (n_worlds,); None for one world."""
+        ...
+
+    @property
+    def stop_failed(self) -> Callable[[Tick], Sequence[tuple[int, str]]] | None:
+        """What stops the worlds whose observer or law returned a non-finite value, and returns their indices and why.
+
+        None for one world, where the controller raises.
+        """
+        ...
+
     def state(self) -> State:
         """Read joint angles and rates."""
         ...
@@ -52,7 +65,7 @@ class Physics(Protocol):
         """Set the gimbal rates of an axis, each module in its direction [rad/s]."""
         ...
 
-    def advance(self, steps: int) -> None:
+    def advance(self, steps: int, /) -> None:
         """Take physics steps."""
         ...
 
@@ -60,19 +73,13 @@ class Physics(Protocol):
         """Stop the worlds whose tilt is beyond a limit, or no number; return each one's index and tilt [rad]."""
         ...
 
-    def stop_failed(self, tick: Tick) -> Sequence[tuple[int, str]]:
-        """Stop the worlds whose observer or law returned a non-finite value; return each one's index and why."""
-        ...
-
-    def running_worlds(self) -> np.ndarray | None:
-        """Copy which worlds are running, (n_worlds,); None for one world."""
-        ...
-
 
 class OneWorld:
     """Steps one world on floats."""
 
     any_running = True
+    running = None
+    stop_failed = None
 
     def __init__(self, plant: Plant) -> None:
         self.model = plant.model
@@ -80,13 +87,14 @@ class OneWorld:
         self._qpos, self._qvel, self._sensordata = self.data.qpos, self.data.qvel, self.data.sensordata
         self._ctrl, self._applied = self.data.ctrl, self.data.qfrc_applied
         self._forward = partial(mujoco.mj_forward, self.model, self.data)
-        self._step = partial(mujoco.mj_step, self.model, self.data)
+        self.advance = partial(mujoco.mj_step, self.model, self.data)  # no method: a call less in every tick
         self._servos = [list(zip(axis.servos, axis.directions, strict=True)) for axis in plant.axes]
         self._lines = [axis.line for axis in plant.axes]
         # Those of the only axis without a detour: they are asked for at every sampling instant.
         single = len(plant.axes) == 1
         self.tilt = plant.axis.line.lean if single else plant.largest_tilt
         self._ideal = plant.axis.ideal if single else plant.ideal_readings
+        self._first_axis = plant.axis
 
     def state(self) -> State:
         """Read joint angles and rates as floats."""
@@ -96,6 +104,11 @@ class OneWorld:
         """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
         self._forward()
         return self._ideal(self._sensordata.tolist(), v)
+
+    def axis_reading(self, v: Joints) -> IdealReading:
+        """Compute the same of the first axis."""
+        self._forward()
+        return self._first_axis.ideal(self._sensordata.tolist(), v)
 
     def command(self, u: Scalar, axis: int = 0) -> None:
         """Set the gimbal rate of an axis, each module in its direction [rad/s]."""
@@ -108,24 +121,12 @@ class OneWorld:
         apply_torques(self._applied, self._lines, torques)
         return torques
 
-    def advance(self, steps: int) -> None:
-        """Take physics steps."""
-        self._step(steps)
-
     def stop_fallen(self, tilt: Scalar, limit: float) -> Sequence[tuple[int, float]]:
         """Stop the world if its tilt is beyond a limit, or no number."""
         if abs(tilt) <= limit:
             return ()
         self.any_running = False
         return ((0, tilt),)
-
-    def stop_failed(self, tick: Tick) -> Sequence[tuple[int, str]]:
-        """Do nothing: in one world the controller raises."""
-        return ()
-
-    def running_worlds(self) -> None:
-        """Return None: there is one world."""
-        return None
 
 
 class ManyWorlds:
@@ -161,7 +162,7 @@ class ManyWorlds:
         single = len(first.axes) == 1
         self.tilt = first.axis.line.lean if single else first.largest_tilt
         self._ideal = first.axis.ideal if single else first.ideal_readings
-        self.running = np.ones(len(plants), dtype=bool)
+        self.running: np.ndarray = np.ones(len(plants), dtype=bool)
         self.any_running = self._all_running = True
 
     def state(self) -> State:
@@ -207,10 +208,6 @@ class ManyWorlds:
             for what, numbers in returned.items()
             for i in self._stop(~np.isfinite(numbers))
         ]
-
-    def running_worlds(self) -> np.ndarray:
-        """Copy which worlds are running, (n_worlds,)."""
-        return self.running.copy()
 
     def _stop(self, worlds: np.ndarray) -> np.ndarray:
         """Step these worlds no more; return the indices of those that were running."""

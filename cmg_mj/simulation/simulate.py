@@ -157,10 +157,11 @@ class _Simulation:
         """Decide, advance and record at every control tick."""
         timestep, on_progress = self.timestep, self.on_progress
         parts = list(zip(range(len(self.recorders)), self.controller.parts, self.recorders, strict=True))
+        worlds, decide, advance = loop.physics, loop.decide, loop.advance
         for tick in loop.ticks():
-            loop.decide()
-            loop.advance()
-            running = loop.physics.running_worlds()
+            decide()
+            advance()
+            running = None if worlds.running is None else worlds.running.copy()
             for axis, part, recorder in parts:
                 assert part.tick is not None
                 recorder.add(tick.q, tick.v, part.tick, tick.torques[axis], running)

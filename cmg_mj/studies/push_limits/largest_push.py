@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.controller import PlantInterface, Tick
+from cmg_mj.controllers.controller import PlantInterface
 from cmg_mj.elementwise import Scalar
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
@@ -112,6 +112,8 @@ class ReducedPhysics:
     """
 
     any_running = True
+    running = None
+    stop_failed = None  # a world without a finite command falls
 
     def __init__(self, plant: PlantParameters, n_worlds: int, timestep: float) -> None:
         self._plant, self._timestep = plant, timestep
@@ -163,14 +165,6 @@ class ReducedPhysics:
         self.fallen |= ~(np.abs(tilt) < limit)
         self.x[:, self.fallen] = 0.0
         return ()
-
-    def stop_failed(self, tick: Tick) -> Sequence[tuple[int, str]]:
-        """Do nothing: a world without a finite command falls."""
-        return ()
-
-    def running_worlds(self) -> None:
-        """Return None: nothing is recorded."""
-        return None
 
     def _slope(self, x: np.ndarray) -> np.ndarray:
         """Compute x' of (4) under the present command and torque."""
