@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from cmg_mj.scenario.loading import parse_scenario as parse_scenario
     from cmg_mj.scenario.plant_settings import PlantSettings as PlantSettings
     from cmg_mj.scenario.schema import Scenario as Scenario
-    from cmg_mj.sensors.sampled import Accelerometer as Accelerometer
-    from cmg_mj.sensors.sampled import Encoder as Encoder
-    from cmg_mj.sensors.sampled import Fog as Fog
+    from cmg_mj.sensors.accelerometer import Accelerometer as Accelerometer
+    from cmg_mj.sensors.encoder import Encoder as Encoder
+    from cmg_mj.sensors.fog import Fog as Fog
     from cmg_mj.sensors.sampled import Sensors as Sensors
     from cmg_mj.sensors.tilt import RadialTilt as RadialTilt
     from cmg_mj.simulation.callback import control as control
@@ -69,7 +69,10 @@ NAMES_OF_MODULES = {
     "scenario.loading": ("load_scenario", "parse_scenario"),
     "scenario.plant_settings": ("PlantSettings",),
     "scenario.schema": ("Scenario",),
-    "sensors.sampled": ("Accelerometer", "Encoder", "Fog", "Sensors"),
+    "sensors.accelerometer": ("Accelerometer",),
+    "sensors.encoder": ("Encoder",),
+    "sensors.fog": ("Fog",),
+    "sensors.sampled": ("Sensors",),
     "sensors.tilt": ("RadialTilt",),
     "simulation.callback": ("control", "control_callback"),
     "simulation.experiment": ("Experiment", "prepare"),

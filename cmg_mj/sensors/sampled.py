@@ -1,10 +1,4 @@
-"""What real sensors make of an ideal reading, and when they show it: encoders, gyro; rate, latency, skew.
-
-The accelerometers are in `accelerometer.py`, the cheap gyro in `mems_gyro.py`.
-
-Defaults are those of a datasheet class, named in each docstring. A value of zero for a resolution, a noise
-or a bandwidth switches that effect off.
-"""
+"""Sensors that sample at their own rate and deliver after their latency."""
 
 from __future__ import annotations
 
@@ -18,94 +12,16 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.elementwise import Scalar, clip, digitise, radians
-from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Positive, Rate
+from cmg_mj.elementwise import Scalar
+from cmg_mj.inputs.field_types import STRICT
 from cmg_mj.sensors.accelerometer import INSIDE_HZ, Accelerometer
+from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
+from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.sensors.noise_streams import NoiseStream, normals
 from cmg_mj.sensors.timing import steps_until, whole_steps
-
-FLICKER_STREAM = 4
-"""The stream of the accelerometers' 1/f noise: 0 to 2 are the sensors' white noise, 3 is the cheap gyro's."""
-STREAMS_PER_AXIS = 16
-"""So many streams are an axis'."""
-
-
-@dataclass(frozen=True, config=STRICT)
-class Encoder:
-    """The gimbals' absolute encoders (AS5045 in the Dynamixel MX-106: 12 bit).
-
-    Attributes:
-        rate_hz: Samples a second (the servo is polled once a control period).
-        counts_per_revolution: Resolution; 0 for none.
-        latency_s: From sampling to delivery [s].
-    """
-
-    rate_hz: Rate = 200.0
-    counts_per_revolution: NonNegative = 4096.0
-    latency_s: Instant = 0.0
-
-    channels = 0
-
-    @property
-    def sample_sigma(self) -> float:
-        """Of one reading from the angle, by the resolution [rad]."""
-        return 2.0 * math.pi / self.counts_per_revolution / math.sqrt(12.0) if self.counts_per_revolution else 0.0
-
-    def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Sequence[Scalar]]:
-        """A function (ideal reading, nothing) -> gimbal angles [rad]."""
-        if not self.counts_per_revolution:
-            return lambda ideal, normal: ideal.gimbals
-        step = 2.0 * math.pi / self.counts_per_revolution
-        return lambda ideal, normal: [digitise(angle, math.inf, step) for angle in ideal.gimbals]
-
-
-@dataclass(frozen=True, config=STRICT)
-class Fog:
-    """A fibre-optic gyro on the frame, along the tilt axis: what estimates are judged by on a real rig.
-
-    The class of KVH's DSP-1750 (angle random walk 0.013 deg/rt(h), range 490 deg/s, bandwidth 440 Hz), with
-    a margin on the noise.
-
-    Attributes:
-        rate_hz: Samples a second.
-        angle_random_walk_deg_rth: White rate noise N; one sample's sigma is N * sqrt(rate).
-        bias_deg_h: Constant offset [deg/h].
-        bandwidth_hz: First-order low-pass, exact between samples; 0 for none.
-        range_deg_s: Readings saturate here [deg/s].
-        latency_s: From sampling to delivery [s].
-    """
-
-    rate_hz: Rate = 200.0
-    angle_random_walk_deg_rth: NonNegative = 0.02
-    bias_deg_h: float = 0.0
-    bandwidth_hz: NonNegative = 440.0
-    range_deg_s: Positive = 490.0
-    latency_s: Instant = 0.0
-
-    channels = 1
-
-    @property
-    def white_noise_sigma(self) -> float:
-        """Standard deviation of one sample [rad/s]."""
-        return radians(self.angle_random_walk_deg_rth) / 60.0 * math.sqrt(self.rate_hz)
-
-    def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Scalar]:
-        """A function (ideal reading, standard normals) -> tilt rate [rad/s]. It remembers its low-pass."""
-        sigma = self.white_noise_sigma
-        bias = math.radians(self.bias_deg_h) / 3600.0
-        limit = math.radians(self.range_deg_s)
-        # The share of a step that a first-order low-pass has taken after one sample period.
-        share = 1.0 - math.exp(-2.0 * math.pi * self.bandwidth_hz / self.rate_hz) if self.bandwidth_hz else 1.0
-        passed: Scalar = None
-
-        def measure(ideal: IdealReading, normal: Sequence[Scalar]) -> Scalar:
-            nonlocal passed
-            passed = ideal.gyro if passed is None else passed + share * (ideal.gyro - passed)
-            return clip(passed + bias + sigma * normal[0], -limit, limit)
-
-        return measure
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -123,30 +39,6 @@ class Sensors:
     encoder: Encoder = Field(default_factory=Encoder)
     fog: Fog = Field(default_factory=Fog)
     mems_gyro: MemsGyro = Field(default_factory=MemsGyro)
-
-
-def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
-    """Standard normal numbers, sample after sample, that depend on (seed, world, stream) alone.
-
-    Args:
-        seed: The run's seed.
-        worlds: The number of one world, on floats, or the numbers of many, on arrays.
-        stream: Which sensor.
-        channels: Numbers a sample.
-
-    Yields:
-        One sample: `channels` floats, or an array (channels, n_worlds).
-    """
-    block = 256  # drawing one by one costs more than the rest of a sensor
-    single = isinstance(worlds, int)
-    different, places = np.unique([worlds] if single else worlds, return_inverse=True)
-    alone = np.array_equal(places, range(len(places)))  # every world once, in order
-    generators = [
-        np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(world), stream))) for world in different
-    ]
-    while True:
-        drawn = np.stack([g.standard_normal((block, channels)) for g in generators], axis=-1)
-        yield from drawn[:, :, 0].tolist() if single else drawn if alone else drawn[:, :, places]
 
 
 class SampledSensor:
@@ -281,18 +173,21 @@ def sampled_sensors(
         InputError: A rate or a time does not fit the physics step.
     """
 
-    def noise(stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
-        return normals(seed, worlds, stream + STREAMS_PER_AXIS * axis, channels) if channels else itertools.repeat(())
+    def noise(stream: NoiseStream, channels: int) -> Iterator[Sequence[Scalar]]:
+        return normals(seed, worlds, stream.on_axis(axis), channels) if channels else itertools.repeat(())
 
     pair = sensors.accelerometer
     drift = (
-        _flicker_source(pair, noise(FLICKER_STREAM, len(CORNERS_HZ) * pair.channels))
+        _flicker_source(pair, noise(NoiseStream.FLICKER, len(CORNERS_HZ) * pair.channels))
         if pair.bias_instability_ug
         else None
     )
     kind = UnevenPair if pair.skew_s or pair.bandwidth_hz else SampledSensor
+    of_pair = noise(NoiseStream.ACCELEROMETER, pair.channels)
+    of_encoder = noise(NoiseStream.ENCODER, sensors.encoder.channels)
+    of_fog = noise(NoiseStream.FOG, sensors.fog.channels)
     return [
-        kind(pair, timestep, noise(0, pair.channels), "sensors.accelerometer", pair.make_reading_function(drift)),
-        SampledSensor(sensors.encoder, timestep, noise(1, sensors.encoder.channels), "sensors.encoder"),
-        SampledSensor(sensors.fog, timestep, noise(2, sensors.fog.channels), "sensors.fog"),
+        kind(pair, timestep, of_pair, "sensors.accelerometer", pair.make_reading_function(drift)),
+        SampledSensor(sensors.encoder, timestep, of_encoder, "sensors.encoder"),
+        SampledSensor(sensors.fog, timestep, of_fog, "sensors.fog"),
     ]
