@@ -6,7 +6,7 @@ import itertools
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Generic, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -18,10 +18,13 @@ from cmg_mj.sensors.accelerometer import INSIDE_HZ, Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
 from cmg_mj.sensors.fog import Fog
-from cmg_mj.sensors.ideal import IdealReading
+from cmg_mj.sensors.ideal import Forces, IdealReading
 from cmg_mj.sensors.mems_gyro import MemsGyro
 from cmg_mj.sensors.noise_streams import NoiseStream, normals
 from cmg_mj.sensors.timing import steps_until, whole_steps
+
+Reading = TypeVar("Reading")
+"""What a sensor delivers: a number, one a gimbal, or the forces of the accelerometers."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -41,7 +44,7 @@ class Sensors:
     mems_gyro: MemsGyro = Field(default_factory=MemsGyro)
 
 
-class SampledSensor:
+class SampledSensor(Generic[Reading]):
     """One sensor at work: it samples at its own rate and delivers after its latency.
 
     Args:
@@ -49,11 +52,14 @@ class SampledSensor:
         timestep: Physics step [s].
         noise: Standard normals, a sample's at a time.
         where: The scenario's section.
-        measure: What it makes of an ideal reading and a sample's normals; by default that of its datasheet.
+        measure: What it makes of an ideal reading and a sample's normals: `sensor.make_reading_function()`.
 
     Attributes:
         steps_per_sample: Physics steps between the moments at which it may be due.
     """
+
+    _newest: Reading
+    _delivered: Reading
 
     def __init__(
         self,
@@ -61,16 +67,15 @@ class SampledSensor:
         timestep: float,
         noise: Iterator,
         where: str,
-        measure: Callable[[IdealReading, Any], Any] | None = None,
+        measure: Callable[[IdealReading, Sequence[Scalar]], Reading],
     ) -> None:
         self.period = whole_steps(1.0 / sensor.rate_hz, timestep, f"{where}.rate_hz", f"{sensor.rate_hz:g} Hz")
         self.steps_per_sample = self.period
         self.latency = steps_until(sensor.latency_s, timestep)
-        self._measure = measure or sensor.make_reading_function()
+        self._measure = measure
         self._noise = noise
-        self._on_the_way: deque = deque()
-        self._newest: Any = None
-        self._delivered: Any = None
+        self._on_the_way: deque[tuple[int, Reading]] = deque()
+        self._has_delivered = False
 
     def sample(self, step: int, ideal: IdealReading) -> None:
         """Take what is due, at a physics step that is a multiple of `steps_per_sample`, or at the first one."""
@@ -78,16 +83,17 @@ class SampledSensor:
         if self.latency:
             self._on_the_way.append((step + self.latency, self._newest))
 
-    def read(self, step: int) -> Any:
+    def read(self, step: int) -> Reading:
         """The newest sample delivered by a physics step; before the start the rig stood still."""
         if not self.latency:
             return self._newest
-        while self._on_the_way and (self._on_the_way[0][0] <= step or self._delivered is None):
+        while self._on_the_way and (self._on_the_way[0][0] <= step or not self._has_delivered):
             self._delivered = self._on_the_way.popleft()[1]
+            self._has_delivered = True
         return self._delivered
 
 
-class UnevenPair(SampledSensor):
+class UnevenPair(SampledSensor[Forces]):
     """Two accelerometers at work that sample each at its own instants, or filter more samples than they deliver."""
 
     def __init__(
@@ -96,7 +102,7 @@ class UnevenPair(SampledSensor):
         timestep: float,
         noise: Iterator,
         where: str,
-        measure: Callable[[IdealReading, Any], Any] | None = None,
+        measure: Callable[[IdealReading, Sequence[Scalar]], Forces],
     ) -> None:
         super().__init__(sensor, timestep, noise, where, measure)
         inside = f"{sensor.bandwidth_hz:g} Hz, sampled at {INSIDE_HZ:g} Hz inside the part"
@@ -107,11 +113,12 @@ class UnevenPair(SampledSensor):
         self.steps_per_sample = math.gcd(self.period, self._raw, self._skew)
         # So long a low-pass needs to forget its start, all but 1e-4 of it.
         self._settling = math.ceil(2.0 * INSIDE_HZ / sensor.bandwidth_hz) if sensor.bandwidth_hz else 0
-        self._outer: deque = deque()
+        self._outer: deque[tuple[int, Forces]] = deque()
+        self._has_sampled = False
 
     def sample(self, step: int, ideal: IdealReading) -> None:
         """Take what is due: a sample of the inner one, together with the outer's that is older by the skew."""
-        first = self._newest is None
+        first = not self._has_sampled
         if self._skew:
             if first or (step + self._skew) % self._raw == 0:
                 self._outer.append((step, ideal.accelerations))
@@ -123,6 +130,7 @@ class UnevenPair(SampledSensor):
             ideal = ideal._replace(accelerations=_combine_samples(ideal.accelerations, self._outer[0][1]))
         reading = self._measure(ideal, next(self._noise))
         if first:  # before the start the rig stood still
+            self._has_sampled = True
             for _ in range(self._settling):
                 reading = self._measure(ideal, next(self._noise))
         if first or step % self.period == 0:
@@ -131,14 +139,14 @@ class UnevenPair(SampledSensor):
                 self._on_the_way.append((step + self.latency, reading))
 
 
-def _combine_samples(inner: Any, outer: Any) -> Any:
+def _combine_samples(inner: Forces, outer: Forces) -> Forces:
     """The inner accelerometer's forces at one instant and the outer's at another."""
     if isinstance(inner, np.ndarray):
         return np.concatenate([inner[:2], outer[2:]])
     return (*inner[:2], *outer[2:])
 
 
-def _flicker_source(sensor: Accelerometer, noise: Iterator) -> Callable[[], Any]:
+def _flicker_source(sensor: Accelerometer, noise: Iterator) -> Callable[[], Forces]:
     """What the 1/f noise adds to the next sample of each channel: four floats, or an array (4, n_worlds) [m/s^2]."""
 
     def drawn() -> np.ndarray:
@@ -147,7 +155,7 @@ def _flicker_source(sensor: Accelerometer, noise: Iterator) -> Callable[[], Any]
 
     flicker = Flicker(sensor.flicker_floor, 1.0 / sensor.raw_rate_hz, drawn())
 
-    def drift() -> Any:
+    def drift() -> Forces:
         added = flicker.advance(drawn()[None])[0]
         return added.tolist() if added.ndim == 1 else added
 
@@ -156,7 +164,7 @@ def _flicker_source(sensor: Accelerometer, noise: Iterator) -> Callable[[], Any]
 
 def sampled_sensors(
     sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence[int], axis: int = 0
-) -> list[SampledSensor]:
+) -> tuple[SampledSensor[Forces], SampledSensor[Sequence[Scalar]], SampledSensor[Scalar]]:
     """What the controller reads, at work: the accelerometers, the encoders, the gyro.
 
     Args:
@@ -182,12 +190,13 @@ def sampled_sensors(
         if pair.bias_instability_ug
         else None
     )
-    kind = UnevenPair if pair.skew_s or pair.bandwidth_hz else SampledSensor
+    kind = UnevenPair if pair.skew_s or pair.bandwidth_hz else SampledSensor[Forces]
+    encoder, fog = sensors.encoder, sensors.fog
     of_pair = noise(NoiseStream.ACCELEROMETER, pair.channels)
-    of_encoder = noise(NoiseStream.ENCODER, sensors.encoder.channels)
-    of_fog = noise(NoiseStream.FOG, sensors.fog.channels)
-    return [
+    of_encoder = noise(NoiseStream.ENCODER, encoder.channels)
+    of_fog = noise(NoiseStream.FOG, fog.channels)
+    return (
         kind(pair, timestep, of_pair, "sensors.accelerometer", pair.make_reading_function(drift)),
-        SampledSensor(sensors.encoder, timestep, of_encoder, "sensors.encoder"),
-        SampledSensor(sensors.fog, timestep, of_fog, "sensors.fog"),
-    ]
+        SampledSensor(encoder, timestep, of_encoder, "sensors.encoder", encoder.make_reading_function()),
+        SampledSensor(fog, timestep, of_fog, "sensors.fog", fog.make_reading_function()),
+    )

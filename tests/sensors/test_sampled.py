@@ -203,7 +203,7 @@ def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> No
 
 def shown_by(sensor: Fog, timestep: float, steps: int, read_every: int) -> list[float]:
     """Readings of a gyro, at control ticks, of a rate that is the number of the physics step."""
-    sampled = SampledSensor(sensor, timestep, normals(0, 0, 2, 1), "sensors.fog")
+    sampled = SampledSensor(sensor, timestep, normals(0, 0, 2, 1), "sensors.fog", sensor.make_reading_function())
     shown = []
     for step in range(steps):
         if step % sampled.period == 0:
