@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import date, time
 from typing import TypeAlias
 
-TomlValue: TypeAlias = (
-    "bool | int | float | str | date | time | list[TomlValue] | tuple[TomlValue, ...] | dict[str, TomlValue]"
-)
-"""What a TOML file can hold; tuples in what is written in Python."""
+TomlValue: TypeAlias = "bool | int | float | str | date | time | Sequence[TomlValue] | Mapping[str, TomlValue]"
+"""What a TOML file can hold."""
 LONGEST_SHOWN = 80  # characters of a value in a message
 
 

@@ -6,7 +6,7 @@ import types
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from cmg_mj.errors import nearest, shown
+from cmg_mj.errors import TomlValue, nearest, shown
 from cmg_mj.inputs.sanity import path_of
 
 
@@ -79,7 +79,7 @@ def _plural(phrase: str) -> str:
     return phrase
 
 
-def complaint(root: Any, detail: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
+def complaint(root: Any, detail: Mapping[str, Any], fields: Mapping[str, TomlValue]) -> str:
     """One wrong field in words: where, what was given, what is allowed.
 
     Args:
@@ -119,7 +119,7 @@ def complaint(root: Any, detail: Mapping[str, Any], fields: Mapping[str, Any]) -
     return not_allowed(where, given, annotation, finite=kind != "finite_number")
 
 
-def not_allowed(where: str, given: Any, annotation: Any, *, finite: bool = True) -> str:
+def not_allowed(where: str, given: TomlValue, annotation: Any, *, finite: bool = True) -> str:
     """Say that a value is not what a field takes.
 
     Args:
@@ -141,7 +141,7 @@ def not_allowed(where: str, given: Any, annotation: Any, *, finite: bool = True)
     return f"{where} = {shown(given)}: must be {what}"
 
 
-def _type_at(place: Any, location: Sequence[Any]) -> Any:
+def _type_at(place: Any, location: Sequence[str | int]) -> Any:
     """The type, bounds included, of a field somewhere below a class."""
     for part in location:
         if isinstance(part, int):

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from cmg_mj.errors import InputError, nearest, raised
+from cmg_mj.errors import InputError, TomlValue, nearest, raised
 from cmg_mj.inputs.messages import complaint, fields_of, not_allowed
 
 
@@ -85,7 +85,7 @@ class UserClassKind:
                 what = nearest(name, allowed) if allowed else "it has none"
                 raise InputError(f"{self.section}.{name}: {kind} has no such parameter; {what}")
 
-    def check_types(self, kind: str, parameters: Mapping[str, Any]) -> None:
+    def check_types(self, kind: str, parameters: Mapping[str, TomlValue]) -> None:
         """Parameters are of their types: no text for a number.
 
         Raises:
