@@ -1,4 +1,4 @@
-"""What no field of a scenario takes, whatever its type: text that is none, sizes no rig has, sections without end."""
+"""Refuses what no field of a scenario takes: text that is not UTF-8, sizes that overflow, sections without end."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from cmg_mj.errors import LONGEST_SHOWN, TomlValue, shown
 SMALLEST, LARGEST = 1e-30, 1e30
 """Sizes of numbers. Products of a few numbers within them stay finite, and nothing a person can lift needs more."""
 MOST_BITS = 128
-"""Of a whole number; seeds that NumPy makes have so many."""
+"""Bits of a whole number; seeds that NumPy makes have so many."""
 DEEPEST = 12
 """So many sections and lists may lie in one another; the scenario's own are four deep."""
 
 
 def is_text(text: str) -> bool:
-    """Whether a string is text, and not bytes that Python could not read as UTF-8."""
+    """Say whether a string is text, and not bytes that Python could not read as UTF-8."""
     try:
         text.encode()
     except UnicodeEncodeError:
@@ -25,13 +25,13 @@ def is_text(text: str) -> bool:
 
 
 def path_of(parts: Iterable[str | int]) -> str:
-    """Where a field is, `plant.model`, shortened."""
+    """Write where a field is, `plant.model`, shortened."""
     path = ".".join(str(part) for part in parts)
     return path if len(path) <= LONGEST_SHOWN else f"{path[:LONGEST_SHOWN]}..."
 
 
 def unreadable(fields: Mapping[str, TomlValue]) -> Iterator[str]:
-    """What cannot be read as a scenario, whatever the fields are called.
+    """Find what cannot be read as a scenario, whatever the fields are called.
 
     Args:
         fields: The TOML file's content.
@@ -52,7 +52,7 @@ def unreadable(fields: Mapping[str, TomlValue]) -> Iterator[str]:
 
 
 def out_of_size(fields: Mapping[str, TomlValue]) -> Iterator[str]:
-    """Numbers so large or small that formulas overflow.
+    """Find numbers so large or small that formulas overflow.
 
     Args:
         fields: The TOML file's content, which is readable.
@@ -68,7 +68,7 @@ def out_of_size(fields: Mapping[str, TomlValue]) -> Iterator[str]:
 
 
 def _walk(fields: Mapping[str, TomlValue]) -> Iterator[tuple[tuple[str | int, ...], TomlValue]]:
-    """Every value with its place, and what lies too deep."""
+    """Visit every value with its place, and what lies too deep."""
     waiting: list[tuple[tuple[str | int, ...], TomlValue]] = [((), fields)]
     while waiting:  # no recursion: it would end before the sections do
         path, value = waiting.pop()
