@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import date, time
+from typing import TypeAlias
 
+TomlValue: TypeAlias = "bool | int | float | str | date | time | Sequence[TomlValue] | Mapping[str, TomlValue]"
+"""What a TOML file can hold."""
 LONGEST_SHOWN = 80  # characters of a value in a message
 
 
@@ -44,7 +47,7 @@ def raised(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
-def shown(value: Any) -> str:
+def shown(value: TomlValue) -> str:
     """A value as the user wrote it in TOML, shortened; strings in Python's quotes, which TOML takes too."""
     if isinstance(value, bool):
         text = "true" if value else "false"

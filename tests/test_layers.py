@@ -209,6 +209,19 @@ def test_public_names_are_what_they_say() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_type_checkers_know_the_public_names() -> None:
+    """What `cmg_mj/__init__.py` imports for type checkers is what it hands out."""
+    tree = ast.parse(modules()["cmg_mj"].read_text(encoding="utf-8"))
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
+    names = {
+        (f"{node.module}".removeprefix("cmg_mj."), alias.asname)
+        for node in imports
+        for alias in node.names
+        if f"{node.module}".startswith("cmg_mj.")
+    }
+    assert names == {(module, name) for module, names in cmg_mj.NAMES_OF_MODULES.items() for name in names}
+
+
 def test_documents_named_in_the_sources_exist() -> None:
     for path in [*PACKAGE.rglob("*.py"), ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
         for name in re.findall(r"docs/[\w/]+\.(?:md|py|png)", path.read_text(encoding="utf-8")):

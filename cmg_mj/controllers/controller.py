@@ -15,7 +15,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers.protocol import Measurement, Observer
 from cmg_mj.observers.runner import ObserverRunner, Observers, ObserverTakeover, read_only
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.ideal import IdealReading
+from cmg_mj.sensors.ideal import Forces, IdealReading
 from cmg_mj.sensors.sampled import Sensors, sampled_sensors
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.sensors.timing import steps_until, whole_steps
@@ -266,9 +266,7 @@ class Controller:
         """Turn the gimbals at a rate from now on [rad/s]."""
         self.gimbal_rate = u if self._backlash is None else self._backlash(u)
 
-    def decide(
-        self, step: int, forces: Sequence[Scalar], encoders: Sequence[Scalar], fog: Scalar, rate: Scalar
-    ) -> Tick:
+    def decide(self, step: int, forces: Forces, encoders: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Tick:
         """What a control tick makes of the samples that have been delivered.
 
         Args:

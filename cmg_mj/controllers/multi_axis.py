@@ -14,12 +14,9 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers.runner import read_only
 from cmg_mj.sensors.ideal import IdealReading, MultiAxisReading
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.sensors.sampled import normals
+from cmg_mj.sensors.noise_streams import NoiseStream, normals
 
 Matrix = Sequence[Sequence[float]]
-
-TURN_GYRO_STREAM = 5
-"""Of the noise of the gyro about the vertical: those before it are an axis' sensors'."""
 
 
 class YawCoupling(NamedTuple):
@@ -96,7 +93,7 @@ class MultiAxisController:
             part.reset()
         self.step: int | None = None
         """The physics step of the last update."""
-        noise = normals(self.seed, self.worlds, TURN_GYRO_STREAM, self._gyro.channels)
+        noise = normals(self.seed, self.worlds, NoiseStream.TURN_GYRO, self._gyro.channels)
         self._read = self._gyro.make_reading_function(self.law.dt, noise)
 
     def update(self, step: int, ideals: MultiAxisReading) -> bool:

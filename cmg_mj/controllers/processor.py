@@ -11,6 +11,7 @@ from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers.protocol import Measurement, Observer
 from cmg_mj.observers.runner import as_estimate
+from cmg_mj.sensors.ideal import Forces
 from cmg_mj.sensors.sampled import Sensors
 
 
@@ -98,12 +99,10 @@ class ProcessorController(Controller):
         super().reset()
         self.processor.start()
 
-    def decide(
-        self, step: int, forces: Sequence[Scalar], encoders: Sequence[Scalar], fog: Scalar, rate: Scalar
-    ) -> Tick:
+    def decide(self, step: int, forces: Forces, encoders: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Tick:
         """What the processor makes of the samples that have been delivered; as `Controller.decide`."""
         try:
-            decision = self.processor.update(forces, encoders)
+            decision = self.processor.update(tuple(forces), encoders)
         except RunStopped as error:
             raise RunStopped(f"{error}, at t = {step * self.timestep:g} s") from error
         self._remote.estimate = decision.estimate

@@ -1,4 +1,4 @@
-"""What a model file includes, before MuJoCo opens it: a pipe would never end, and a circle of files crashes it."""
+"""Checks the files of a model before MuJoCo opens them: a pipe never ends, a circle of files crashes MuJoCo."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ LARGEST = 50_000_000
 """Bytes of an XML file."""
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _ELEMENT = re.compile(r"<(\w+)\b([^<>]*)>")
-_NAMED = re.compile(r"""\b(file\w*|meshdir|texturedir|assetdir)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+_REFERENCE = re.compile(r"""\b(file\w*|meshdir|texturedir|assetdir)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _XML = ("include", "model")
 _COUNT = re.compile(
     r"""<(replicate|composite|flexcomp|texture)\b[^<>]*?\b(count|width|height)\s*=\s*["']([^"']*)["']"""
 )
 LARGEST_COUNT = 10_000
-"""Of copies of an element and of a picture's pixels in a row; MuJoCo makes all of them before it looks at them."""
+"""Copies of an element, or pixels in a row of a picture: MuJoCo makes all of them before it checks them."""
 
 
 def check_files(path: Path) -> list[Path]:
@@ -33,7 +33,7 @@ def check_files(path: Path) -> list[Path]:
         The file and those it names, as far as they are there.
 
     Raises:
-        InputError: It does.
+        InputError: The model names a pipe or device, contains itself, or asks for too many copies.
     """
     return list(dict.fromkeys(_checked(path, path, ())))
 
@@ -49,9 +49,11 @@ def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[Path]
     for element, name, count in _COUNT.findall(text):
         if math.prod(int(number) for number in re.findall(r"\d{1,20}", count)) > LARGEST_COUNT:
             raise InputError(f"{root}: <{element} {name}={count!r}>: at most {LARGEST_COUNT} are allowed")
-    named = [(element, *pair) for element, attributes in _ELEMENT.findall(text) for pair in _attributes(attributes)]
-    folders = [value for _, name, value in named if name.endswith("dir")]
-    for element, name, value in named:
+    references = [
+        (element, *pair) for element, attributes in _ELEMENT.findall(text) for pair in _attributes(attributes)
+    ]
+    folders = [value for _, name, value in references if name.endswith("dir")]
+    for element, name, value in references:
         if name.endswith("dir"):
             continue
         for file in _places(value, path, root, folders):
@@ -67,7 +69,7 @@ def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[Path]
 
 
 def _places(value: str, path: Path, root: Path, folders: list[str]) -> Iterator[Path]:
-    """Where MuJoCo may look for a file."""
+    """List the paths at which MuJoCo may look for a file."""
     for base in dict.fromkeys((path.parent, root.parent)):
         yield base / value
         for folder in folders:
@@ -75,7 +77,7 @@ def _places(value: str, path: Path, root: Path, folders: list[str]) -> Iterator[
 
 
 def _attributes(text: str) -> Iterator[tuple[str, str]]:
-    for name, double, single in _NAMED.findall(text):
+    for name, double, single in _REFERENCE.findall(text):
         yield name, html.unescape(double or single)
 
 

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong with a field, in a user's words: what, where, and what is allowed."""
+"""Words pydantic's errors for users: what is wrong, where, and what is allowed."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import types
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from cmg_mj.errors import nearest, shown
+from cmg_mj.errors import TomlValue, nearest, shown
 from cmg_mj.inputs.sanity import path_of
 
 
@@ -79,8 +79,8 @@ def _plural(phrase: str) -> str:
     return phrase
 
 
-def complaint(root: Any, detail: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
-    """One wrong field in words: where, what was given, what is allowed.
+def complaint(root: Any, detail: Mapping[str, Any], fields: Mapping[str, TomlValue]) -> str:
+    """Describe one wrong field: where, its value, what is allowed.
 
     Args:
         root: The class that was to be made.
@@ -108,23 +108,23 @@ def complaint(root: Any, detail: Mapping[str, Any], fields: Mapping[str, Any]) -
     if kind == "value_error":
         message = detail["msg"].removeprefix("Value error, ")
         return f"{where}: {message}" if where else message
-    given: Any = fields
+    value: Any = fields
     for part in location:
-        given = given[part]
+        value = value[part]
     if _section(annotation):
         if get_origin(annotation) is list:
             return f"{where}: must be a list of sections, each written under [[{where}]]"
         header = f"[{where}]" if isinstance(location[-1], str) else f"[[{location[0]}]]"
-        return f"{where} = {shown(given)}: must be a section, written under {header}"
-    return not_allowed(where, given, annotation, finite=kind != "finite_number")
+        return f"{where} = {shown(value)}: must be a section, written under {header}"
+    return not_allowed(where, value, annotation, finite=kind != "finite_number")
 
 
-def not_allowed(where: str, given: Any, annotation: Any, *, finite: bool = True) -> str:
+def not_allowed(where: str, value: TomlValue, annotation: Any, *, finite: bool = True) -> str:
     """Say that a value is not what a field takes.
 
     Args:
         where: The field.
-        given: The value.
+        value: The value.
         annotation: The field's type, with its bounds.
         finite: Whether the value is a finite number, or none at all.
 
@@ -135,14 +135,14 @@ def not_allowed(where: str, given: Any, annotation: Any, *, finite: bool = True)
     if not finite:
         what = what.replace("number", "finite number", 1)
     choices = [choice for choice in _types_in(annotation) if isinstance(choice, str)]
-    if isinstance(given, str) and len(choices) > 1:
-        typo = nearest(given, choices).partition("? ")
+    if isinstance(value, str) and len(choices) > 1:
+        typo = nearest(value, choices).partition("? ")
         what += f"; {typo[0]}?" if typo[1] else ""
-    return f"{where} = {shown(given)}: must be {what}"
+    return f"{where} = {shown(value)}: must be {what}"
 
 
-def _type_at(place: Any, location: Sequence[Any]) -> Any:
-    """The type, bounds included, of a field somewhere below a class."""
+def _type_at(place: Any, location: Sequence[str | int]) -> Any:
+    """Return the type, bounds included, of a field somewhere below a class."""
     for part in location:
         if isinstance(part, int):
             place = _types_in(place)[0] if get_origin(place) is list else float
@@ -154,12 +154,12 @@ def _type_at(place: Any, location: Sequence[Any]) -> Any:
 
 
 def _section(annotation: Any) -> dict[str, Any]:
-    """The fields of the section that a type is, may be, or lists."""
+    """Return the fields of the section that a type is, may be, or lists."""
     return next((fields for part in _types_in(annotation) if (fields := fields_of(part))), {})
 
 
 def fields_of(place: Any) -> dict[str, Any]:
-    """The fields of a section's class, or an observer's, with their types and bounds; none of any other class."""
+    """Return the fields of a section or observer class with their types and bounds; none for any other class."""
     infos = getattr(place, "__pydantic_fields__", {}) if isinstance(place, type) else {}
     return {
         name: Annotated[info.annotation, *info.metadata] if info.metadata else info.annotation
@@ -168,7 +168,7 @@ def fields_of(place: Any) -> dict[str, Any]:
 
 
 def _types_in(annotation: Any) -> list[Any]:
-    """All that a type is put together from: classes, and the choices of a Literal."""
+    """List the parts of a type: classes, and the choices of a Literal."""
     if get_origin(annotation) is Annotated:
         return _types_in(get_args(annotation)[0])
     arguments = get_args(annotation)

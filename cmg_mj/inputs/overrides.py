@@ -5,10 +5,10 @@ from __future__ import annotations
 import tomllib
 from typing import Any
 
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, TomlValue
 
 
-def override(fields: dict[str, Any], setting: str) -> None:
+def override(fields: dict[str, TomlValue], setting: str) -> None:
     """Replace a field of a scenario, or add it.
 
     Args:
@@ -29,14 +29,14 @@ def override(fields: dict[str, Any], setting: str) -> None:
     assign(fields, name.strip(), value, f"--set {setting!r}")
 
 
-def assign(fields: dict[str, Any], name: str, value: Any, said: str) -> None:
+def assign(fields: dict[str, TomlValue], name: str, value: TomlValue, setting: str) -> None:
     """Give a field of a scenario a value.
 
     Args:
         fields: The TOML file's content, which is changed.
         name: `section.field`; an element of a list by its number.
         value: Its value.
-        said: What the user said, for messages.
+        setting: The setting as the user wrote it, for messages.
 
     Raises:
         InputError: There is no such place.
@@ -51,8 +51,8 @@ def assign(fields: dict[str, Any], name: str, value: Any, said: str) -> None:
             place = place.setdefault(section, [] if following and following[0].isdecimal() else {})
         else:
             there = f"; it has {len(place)} of them, counted from 0" if isinstance(place, list) else ""
-            raise InputError(f"{said}: there is no {'.'.join(sections[: i + 1])}{there}")
+            raise InputError(f"{setting}: there is no {'.'.join(sections[: i + 1])}{there}")
     if not isinstance(place, dict):
         example = f"{'.'.join(sections)}.0.torque_n_m=2.0" if isinstance(place, list) else "plant.timestep_s=0.0005"
-        raise InputError(f"{said}: {'.'.join(sections)} is not a section; write for example {example}")
+        raise InputError(f"{setting}: {'.'.join(sections)} is not a section; write for example {example}")
     place[field] = value

@@ -1,23 +1,22 @@
-"""What no field of a scenario takes, whatever its type: text that is none, sizes no rig has, sections without end."""
+"""Refuses what no field of a scenario takes: text that is not UTF-8, sizes that overflow, sections without end."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
 
-from cmg_mj.errors import LONGEST_SHOWN, shown
+from cmg_mj.errors import LONGEST_SHOWN, TomlValue, shown
 
 SMALLEST, LARGEST = 1e-30, 1e30
 """Sizes of numbers. Products of a few numbers within them stay finite, and nothing a person can lift needs more."""
 MOST_BITS = 128
-"""Of a whole number; seeds that NumPy makes have so many."""
+"""Bits of a whole number; seeds that NumPy makes have so many."""
 DEEPEST = 12
 """So many sections and lists may lie in one another; the scenario's own are four deep."""
 
 
 def is_text(text: str) -> bool:
-    """Whether a string is text, and not bytes that Python could not read as UTF-8."""
+    """Say whether a string is text, and not bytes that Python could not read as UTF-8."""
     try:
         text.encode()
     except UnicodeEncodeError:
@@ -25,14 +24,14 @@ def is_text(text: str) -> bool:
     return True
 
 
-def path_of(parts: Any) -> str:
-    """Where a field is, `plant.model`, shortened."""
+def path_of(parts: Iterable[str | int]) -> str:
+    """Write where a field is, `plant.model`, shortened."""
     path = ".".join(str(part) for part in parts)
     return path if len(path) <= LONGEST_SHOWN else f"{path[:LONGEST_SHOWN]}..."
 
 
-def unreadable(fields: Mapping[str, Any]) -> Iterator[str]:
-    """What cannot be read as a scenario, whatever the fields are called.
+def unreadable(fields: Mapping[str, TomlValue]) -> Iterator[str]:
+    """Find what cannot be read as a scenario, whatever the fields are called.
 
     Args:
         fields: The TOML file's content.
@@ -52,8 +51,8 @@ def unreadable(fields: Mapping[str, Any]) -> Iterator[str]:
             yield f"{where}: a whole number of {value.bit_length()} bits; at most {MOST_BITS} are allowed"
 
 
-def out_of_size(fields: Mapping[str, Any]) -> Iterator[str]:
-    """Numbers so large or small that formulas overflow.
+def out_of_size(fields: Mapping[str, TomlValue]) -> Iterator[str]:
+    """Find numbers so large or small that formulas overflow.
 
     Args:
         fields: The TOML file's content, which is readable.
@@ -62,18 +61,19 @@ def out_of_size(fields: Mapping[str, Any]) -> Iterator[str]:
         Clauses for an error message.
     """
     for path, value in _walk(fields):
-        is_number = isinstance(value, (int, float)) and path != ("seed",) and math.isfinite(value)
-        if is_number and (abs(value) > LARGEST or 0.0 < abs(value) < SMALLEST):
+        if not isinstance(value, (int, float)) or path == ("seed",) or not math.isfinite(value):
+            continue
+        if abs(value) > LARGEST or 0.0 < abs(value) < SMALLEST:
             yield f"{path_of(path)} = {value:g}: sizes are from {SMALLEST:g} to {LARGEST:g}, or 0"
 
 
-def _walk(fields: Mapping[str, Any]) -> Iterator[tuple[tuple, Any]]:
-    """Every value with its place, and what lies too deep."""
-    waiting: list[tuple[tuple, Any]] = [((), fields)]
+def _walk(fields: Mapping[str, TomlValue]) -> Iterator[tuple[tuple[str | int, ...], TomlValue]]:
+    """Visit every value with its place, and what lies too deep."""
+    waiting: list[tuple[tuple[str | int, ...], TomlValue]] = [((), fields)]
     while waiting:  # no recursion: it would end before the sections do
         path, value = waiting.pop()
-        if hasattr(value, "tolist"):
-            value = value.tolist()
+        if tolist := getattr(value, "tolist", None):
+            value = tolist()
         yield path, value
         if isinstance(value, (Mapping, list, tuple)) and len(path) <= DEEPEST:
             inside = value.items() if isinstance(value, Mapping) else enumerate(value)

@@ -1,4 +1,4 @@
-"""A class by its name, or a user's own by dotted path: found, its parameters checked, made."""
+"""Finds a class by its name or dotted path, checks its parameters, and makes an object of it."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from cmg_mj.errors import InputError, nearest, raised
+from cmg_mj.errors import InputError, TomlValue, nearest, raised
 from cmg_mj.inputs.messages import complaint, fields_of, not_allowed
 
 
 @dataclass(frozen=True)
 class UserClassKind:
-    """What such classes are for, and what messages call them.
+    """A kind of class that users may write, and what messages call it.
 
     Attributes:
         what: `observer` or `law`.
@@ -45,32 +45,32 @@ class UserClassKind:
         Raises:
             InputError: There is none, or its module cannot be imported.
         """
-        said = f"{self.section}.kind = {kind!r}"
+        setting = f"{self.section}.kind = {kind!r}"
         if ":" not in kind and kind not in self.known:
             raise InputError(
-                f"{said}: no such {self.what}; {nearest(kind, self.known)}, or your own as package.module:Class"
+                f"{setting}: no such {self.what}; {nearest(kind, self.known)}, or your own as package.module:Class"
             )
         module_name, _, class_name = self.known.get(kind, kind).partition(":")
         try:
-            found = getattr(importlib.import_module(module_name), class_name)
+            cls = getattr(importlib.import_module(module_name), class_name)
         except (Exception, SystemExit) as error:  # a user's module may fail in any way while it is imported
-            raise InputError(f"{said}: cannot be imported: {raised(error)}") from error
-        if not (inspect.isclass(found) and all(callable(getattr(found, name, None)) for name in self.methods)):
+            raise InputError(f"{setting}: cannot be imported: {raised(error)}") from error
+        if not (inspect.isclass(cls) and all(callable(getattr(cls, name, None)) for name in self.methods)):
             methods = " and ".join(f"{name}({parameters})" for name, parameters in self.methods.items())
-            raise InputError(f"{said}: must be a class with the methods {methods}")
-        return found
+            raise InputError(f"{setting}: must be a class with the methods {methods}")
+        return cls
 
     def takes(self, kind: str) -> Mapping[str, inspect.Parameter]:
-        """What the constructor takes, by name."""
+        """Return the parameters of the constructor, by name."""
         return inspect.signature(self.find(kind)).parameters
 
     def may_take(self, kind: str, name: str) -> bool:
-        """Whether the constructor takes a parameter of this name."""
-        taken = self.takes(kind)
-        return name in taken or any(p.kind == inspect.Parameter.VAR_KEYWORD for p in taken.values())
+        """Say whether the constructor takes a parameter of this name."""
+        parameters = self.takes(kind)
+        return name in parameters or any(p.kind == inspect.Parameter.VAR_KEYWORD for p in parameters.values())
 
     def own(self, kind: str) -> list[str]:
-        """Names of the parameters that are the user's choice."""
+        """List the parameters that are the user's choice."""
         return [name for name in self.takes(kind) if name not in self.given]
 
     def check_names(self, kind: str, names: Iterable[str]) -> None:
@@ -85,11 +85,11 @@ class UserClassKind:
                 what = nearest(name, allowed) if allowed else "it has none"
                 raise InputError(f"{self.section}.{name}: {kind} has no such parameter; {what}")
 
-    def check_types(self, kind: str, parameters: Mapping[str, Any]) -> None:
-        """Parameters are of their types: no text for a number.
+    def check_types(self, kind: str, parameters: Mapping[str, TomlValue]) -> None:
+        """Refuse parameters of a wrong type, such as text for a number.
 
         Raises:
-            InputError: One is not, or is the bench's to give.
+            InputError: A parameter has a wrong type, or is the bench's to give.
         """
         types = fields_of(self.find(kind))
         for name, value in parameters.items():

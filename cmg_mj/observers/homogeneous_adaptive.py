@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
@@ -11,7 +11,9 @@ from pydantic.dataclasses import dataclass
 from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.field_types import STRICT, Positive
 from cmg_mj.observers.adaptive import Adaptive
+from cmg_mj.observers.adaptive import State as AdaptiveState
 from cmg_mj.observers.homogeneous import Homogeneous
+from cmg_mj.observers.model_copy import CopyState
 from cmg_mj.observers.protocol import BIAS, Measurement
 from cmg_mj.observers.reduced_model import ReducedModel
 
@@ -19,8 +21,8 @@ from cmg_mj.observers.reduced_model import ReducedModel
 class State(NamedTuple):
     """The states of both."""
 
-    adaptive: Any
-    homogeneous: Any
+    adaptive: AdaptiveState
+    homogeneous: CopyState
 
 
 class BiasedEstimate(NamedTuple):

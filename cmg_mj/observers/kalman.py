@@ -8,7 +8,6 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic.dataclasses import dataclass
-from scipy.linalg import expm
 
 from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.field_types import STRICT, Positive
@@ -116,6 +115,8 @@ class Kalman:
     @cached_property
     def process_noise(self) -> Covariance:
         """What a sample period adds to the covariance, exactly for the linearisation (6)."""
+        from scipy.linalg import expm
+
         per_torque = 1.0 / (self.model.gimbals * self.model.J1)
         A = np.zeros((4, 4))
         A[:3, :3] = self.model.A

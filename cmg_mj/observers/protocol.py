@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 from cmg_mj.elementwise import Scalar
@@ -95,7 +94,7 @@ TORQUE = "torque_n_m"
 RESERVED = ("x1_rad", "x2_rad_s", "x3_rad")
 
 
-def needs(observer: Any) -> tuple[str, ...]:
+def needs(observer: Observer | type) -> tuple[str, ...]:
     """What an observer, or its class, cannot do without beside y1, out of `NEEDS`.
 
     One that does not say counts as needing the model and the gimbals, as the papers' observers do.
@@ -122,7 +121,7 @@ def extra_signals(observer: Observer) -> tuple[str, ...]:
     Raises:
         ValueError: They are not distinct lower-case names.
     """
-    names: Sequence[Any] = getattr(observer, "extra_signals", ())
+    names = getattr(observer, "extra_signals", ())
     fits = isinstance(names, (tuple, list)) and all(
         isinstance(name, str) and re.fullmatch("[a-z][a-z0-9_]*", name) and name not in RESERVED for name in names
     )

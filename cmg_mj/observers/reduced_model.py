@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from cmg_mj.elementwise import Scalar, cos, sin
 
 if TYPE_CHECKING:
     import control
+    from numpy.typing import ArrayLike
 
 
 Terms = tuple[Scalar, Scalar, Scalar]
@@ -29,7 +30,7 @@ Rounding moves a pole at zero by about 1e-16 times the largest entry, to either 
 """
 
 
-def is_hurwitz(poles: Any) -> bool:
+def is_hurwitz(poles: ArrayLike) -> bool:
     """Whether every mode fades.
 
     Args:

@@ -70,7 +70,7 @@ def make_observer(
     """
     check_names(kind, parameters)
     taken = OF_OBSERVERS.takes(kind)
-    given: dict[str, Any] = {"dt": dt, "model": model}
+    given: dict[str, float | ReducedModel | TiltNoise | None] = {"dt": dt, "model": model}
     if "noise" in taken:
         if noise is None and taken["noise"].default is inspect.Parameter.empty:
             raise InputError(f"observer {kind}: needs the noise of its sensors (a TiltNoise after the model)")

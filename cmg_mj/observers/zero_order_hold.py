@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from cmg_mj.elementwise import Scalar
 
@@ -34,6 +33,8 @@ def hold_matrices(A: np.ndarray, B: np.ndarray, dt: float) -> tuple[np.ndarray, 
     Returns:
         Phi (n, n), Gamma_hold (n, m), Gamma_ramp (n, m).
     """
+    from scipy.linalg import expm
+
     n, m = B.shape
     augmented = np.zeros((n + 2 * m, n + 2 * m))
     augmented[:n, :n] = A * dt

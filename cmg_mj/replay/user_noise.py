@@ -10,7 +10,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.parameter_options import numbers
 from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY, Accelerometer
-from cmg_mj.sensors.sampled import Encoder
+from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.tilt import TiltNoise
 
 TILT_NOISE_DEG = 0.1

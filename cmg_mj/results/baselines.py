@@ -8,16 +8,13 @@ import numpy as np
 
 from cmg_mj.results.error_bounds import FLOORS
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.sensors.sampled import STREAMS_PER_AXIS, normals
+from cmg_mj.sensors.noise_streams import NoiseStream, normals
 
 ZERO, MEMS_GYRO = "zero", "mems_gyro"
 RATES = (ZERO, MEMS_GYRO)
 """Those that say what the rate is."""
 REFERENCES = (*RATES, *FLOORS)
 """The names of all, in the order of every table."""
-
-MEMS_GYRO_STREAM = 3
-"""The gyro's noise: streams 0 to 2 are those of the sensors that the controller reads."""
 
 
 class References:
@@ -33,7 +30,7 @@ class References:
 
     def __init__(self, gyro: MemsGyro, dt: float, seed: int, worlds: int | Sequence[int], axis: int = 0) -> None:
         self._read = gyro.make_reading_function(
-            dt, normals(seed, worlds, MEMS_GYRO_STREAM + STREAMS_PER_AXIS * axis, gyro.channels)
+            dt, normals(seed, worlds, NoiseStream.MEMS_GYRO.on_axis(axis), gyro.channels)
         )
 
     def rates(self, x2: np.ndarray) -> dict[str, np.ndarray]:

@@ -8,7 +8,6 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from cmg_mj.sensors.tilt import TiltNoise
 
@@ -46,6 +45,8 @@ def acceleration_floor(noise: TiltNoise, dt: float) -> float:
     Returns:
         After each measurement, once the filter has settled [rad/s].
     """
+    from scipy.linalg import solve_discrete_are
+
     if not (noise.tilt and noise.acceleration):
         return 0.0
     # In units of the tilt's noise and of the sample period: nothing is very large or small.

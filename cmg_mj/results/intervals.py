@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.special import stdtrit  # scipy.stats would take half a second of every command
 
 from cmg_mj.errors import InputError
 
@@ -38,6 +37,8 @@ def mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
     Returns:
         The mean and its interval; infinite ends if a value is not finite.
     """
+    from scipy.special import stdtrit  # scipy.stats would take half a second more
+
     sample = np.asarray(values, dtype=float)
     if len(sample) < 2:
         raise InputError(f"an interval needs two worlds or more, not {len(sample)}")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tabulate import tabulate
-
 
 def table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, text_columns: int = 1) -> str:
     """Write a table.
@@ -18,6 +16,8 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, text_column
     Returns:
         The table, without a line break at its end.
     """
+    from tabulate import tabulate
+
     align = ["left"] * text_columns + ["right"] * (len(headings) - text_columns)
     cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
     return tabulate(cells, headings, tablefmt="pipe", colalign=align[: len(headings)], disable_numparse=True)

@@ -6,7 +6,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
@@ -142,6 +141,8 @@ def hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]
 
 def _held(model: ReducedModel, time: float) -> tuple[np.ndarray, np.ndarray]:
     """The linearisation (6) with the integrator after a time with the command held: x+ = A x + B u."""
+    from scipy.linalg import expm
+
     n = len(model.A_e)
     whole = np.zeros((n + 1, n + 1))
     whole[:n, :n], whole[:n, n:] = model.A_e, model.B_e

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, digitise
 from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Positive, Rate
-from cmg_mj.sensors.ideal import IdealReading
+from cmg_mj.sensors.ideal import Forces, IdealReading
 from cmg_mj.sensors.low_pass import low_pass, noise_gain
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
@@ -126,50 +126,51 @@ class Accelerometer:
         return self.bias_instability_ug * 1e-6 * STANDARD_GRAVITY
 
     @property
-    def imperfections(self) -> dict[str, Any]:
+    def imperfections(self) -> dict[str, float | tuple[float, float]]:
         """What is switched on beyond noise, range and resolution: field -> its value."""
         names = [field.name for field in dataclasses.fields(self)]
-        of = ["bias_mg", *names[names.index("scale_error") :]]
-        return {name: value for name in of if (value := getattr(self, name)) not in (0.0, (0.0, 0.0))}
+        optional = ["bias_mg", *names[names.index("scale_error") :]]
+        return {name: value for name in optional if (value := getattr(self, name)) not in (0.0, (0.0, 0.0))}
 
-    def constant_errors(self) -> Callable[[Any], Any]:
+    def constant_errors(self) -> Callable[[Forces], Forces]:
         """A function: true specific forces (inner x, z, outer x, z) -> what parts without noise show [m/s^2].
 
         Floats become a tuple of four floats, an array (4, n_worlds) one of the same shape.
         """
-        own, other = [], []  # weights of a channel's own axis and of the other one
+        same_axis, other_axis = [], []  # weights of the two axes in a channel
         parts = zip(self.scale_error, self.misalignment_deg, self.cross_axis, strict=True)
         for scale, misalignment, cross in parts:
             c, s = math.cos(math.radians(misalignment)), math.sin(math.radians(misalignment))
-            own += [(1.0 + scale) * (c + cross * s), (1.0 + scale) * (c - cross * s)]
-            other += [(1.0 + scale) * (cross * c - s), (1.0 + scale) * (cross * c + s)]
+            same_axis += [(1.0 + scale) * (c + cross * s), (1.0 + scale) * (c - cross * s)]
+            other_axis += [(1.0 + scale) * (cross * c - s), (1.0 + scale) * (cross * c + s)]
         inner, outer = self.bias
         offsets = [inner, 0.0, outer, 0.0]
-        if own == [1.0] * 4 and other == [0.0] * 4:
+        if same_axis == [1.0] * 4 and other_axis == [0.0] * 4:
             column = np.array(np.broadcast_arrays(*offsets)).reshape(4, -1)
 
-            def shifted(forces: Any) -> Any:
+            def shifted(forces: Forces) -> Forces:
                 if isinstance(forces, np.ndarray):
                     return forces + column
                 ix, iz, ox, oz = forces
                 return ix + inner, iz, ox + outer, oz
 
             return shifted
-        by_own, by_other, by_one = (
-            np.array(np.broadcast_arrays(*weights)).reshape(4, -1) for weights in (own, other, offsets)
+        by_same, by_other, by_one = (
+            np.array(np.broadcast_arrays(*weights)).reshape(4, -1) for weights in (same_axis, other_axis, offsets)
         )
 
-        def distorted(forces: Any) -> Any:
+        def distorted(forces: Forces) -> Forces:
             if isinstance(forces, np.ndarray):
-                return by_own * forces + by_other * forces[CROSSWISE] + by_one
+                return by_same * forces + by_other * forces[CROSSWISE] + by_one
             crossed = [forces[i] for i in CROSSWISE]
-            return tuple(a * x + b * z + c for a, x, b, z, c in zip(own, forces, other, crossed, offsets, strict=True))
+            terms = zip(same_axis, forces, other_axis, crossed, offsets, strict=True)
+            return tuple(a * x + b * z + c for a, x, b, z, c in terms)
 
         return distorted
 
     def make_reading_function(
-        self, drift: Callable[[], Any] | None = None
-    ) -> Callable[[IdealReading, Sequence[Scalar]], Any]:
+        self, drift: Callable[[], Forces] | None = None
+    ) -> Callable[[IdealReading, Sequence[Scalar]], Forces]:
         """The parts at work: to be called once for every sample that they take (`raw_rate_hz`).
 
         Args:
@@ -191,7 +192,7 @@ class Accelerometer:
                 filters.append(low_pass(self.bandwidth_hz, INSIDE_HZ, x))
             return filters[number](x)
 
-        def measure(ideal: IdealReading, normal: Sequence[Scalar]) -> Any:
+        def measure(ideal: IdealReading, normal: Sequence[Scalar]) -> Forces:
             forces = erring(ideal.accelerations)
             wander = drift() if drift else None
             if isinstance(forces, np.ndarray):

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+import numpy as np
 
 from cmg_mj.elementwise import Scalar
+
+Forces = Sequence[Scalar] | np.ndarray
+"""Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
 
 
 class IdealReading(NamedTuple):
     """What perfect sensors would show at one instant (floats, or arrays (n_worlds,))."""
 
-    accelerations: Any
-    """Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
+    accelerations: Forces
     gimbals: Sequence[Scalar]
     """Gimbal angles, one a gimbal [rad]."""
     gyro: Scalar

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import butter
 
 from cmg_mj.elementwise import Scalar
 
@@ -39,6 +38,8 @@ def low_pass(bandwidth_hz: float, rate_hz: float, start: Scalar) -> Callable[[Sc
     Returns:
         A function: the next sample -> what the filter shows.
     """
+    from scipy.signal import butter  # 1 s of import, which only a part with a low-pass needs
+
     (b0, b1, b2), (_, a1, a2) = np.array(butter(2, bandwidth_hz, fs=rate_hz)).tolist()
     first, second = (1.0 - b0) * start, (b2 - a2) * start
 

@@ -10,9 +10,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from cmg_mj.elementwise import Scalar, atan2
+from cmg_mj.sensors.ideal import Forces
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class RadialTilt:
         correlation = (w_inner + w_outer) / (math.sqrt(2.0) * both)
         return TiltNoise(sigma * both / gravity, sigma * math.sqrt(2.0) / span, correlation)
 
-    def offset(self, tilt: float, shown: Callable[[Any], Any], gravity: float) -> float:
+    def offset(self, tilt: float, shown: Callable[[Forces], Forces], gravity: float) -> float:
         """How far y1 is off, at rest, for what the accelerometers make of the specific forces.
 
         Args:

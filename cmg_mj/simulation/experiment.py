@@ -11,7 +11,6 @@ from typing import Any, Unpack
 import numpy as np
 import tomli_w
 
-from cmg_mj.codegen.board import Board, on_a_board
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
 from cmg_mj.controllers.make_controller import AnyController, join_axes
@@ -139,6 +138,8 @@ class Experiment:
     def run(self, driver: Driver = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world. Options are those of `simulate`."""
         if driver == "board":
+            from cmg_mj.codegen.board import on_a_board
+
             self.require_single_axis("the board")
             with on_a_board(self.axis_controller()) as board:
                 return self.run_on(board, world, **options)
@@ -146,6 +147,8 @@ class Experiment:
 
     def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
+        from cmg_mj.codegen.board import Board
+
         self.require_single_axis("a board or other processor")
         result = self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
         return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result

@@ -18,9 +18,7 @@ from cmg_mj.results.terminal_tables import run_title
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.compare.comparison import ComparedObserver
-from cmg_mj.studies.compare.plot import plot_worlds
 from cmg_mj.studies.compare.statistics import standings, worlds_table
-from cmg_mj.visualization.plots.run_plot import plot_run
 
 if TYPE_CHECKING:
     from cmg_mj.visualization.recording import Run
@@ -112,6 +110,8 @@ def save_comparison(
     Raises:
         InputError: The folder, or a file, cannot be written.
     """
+    from cmg_mj.studies.compare.plot import plot_worlds
+
     writers = (
         *(trajectory_with_metadata(entry.experiment, entry.world_0).save for entry in compared),
         lambda path: _write_json(path, standings(compared)),
@@ -157,6 +157,8 @@ def _which(result: Result, at: int = 0) -> dict[str, Any]:
 
 
 def _plot(path: Path, run: Run, experiment: Experiment) -> None:
+    from cmg_mj.visualization.plots.run_plot import plot_run
+
     about = f", {run.axis}" if run.axis else ""
     plot_run(
         path,

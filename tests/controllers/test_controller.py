@@ -18,8 +18,12 @@ from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
+from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.encoder import Encoder
+from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, IdealReading, Sensors
+from cmg_mj.sensors.ideal import IdealReading
+from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import DT, GRAVITY_TORQUE, J1, J2, PAPER

@@ -18,12 +18,12 @@ from scipy.signal import butter, lfilter, welch
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.errors import InputError
 from cmg_mj.plant.plant import load_plant
-from cmg_mj.results.baselines import MEMS_GYRO_STREAM
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.low_pass import noise_gain
-from cmg_mj.sensors.sampled import FLICKER_STREAM, Sensors, sampled_sensors
+from cmg_mj.sensors.noise_streams import NoiseStream
+from cmg_mj.sensors.sampled import Sensors, sampled_sensors
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 from tests.sensors.test_sampled import G, assert_sigma
@@ -269,8 +269,10 @@ def test_the_drift_is_the_same_for_a_part_that_filters() -> None:
     assert density(184.0) == pytest.approx(density(0.0), rel=0.2)  # the slower rate folds a little more into the band
 
 
-def test_the_drift_has_a_stream_of_its_own() -> None:
-    assert FLICKER_STREAM not in (0, 1, 2, MEMS_GYRO_STREAM)
+def test_every_sensor_of_every_axis_has_a_stream_of_its_own() -> None:
+    numbers = [stream.on_axis(axis) for axis in range(3) for stream in NoiseStream]
+    assert sorted(numbers)[: len(NoiseStream)] == list(range(6))
+    assert len(set(numbers)) == len(numbers)
 
 
 # --- an unbalanced wheel -----------------------------------------------------------------------------------

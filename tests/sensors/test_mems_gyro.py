@@ -12,7 +12,7 @@ from scipy.signal import welch
 from cmg_mj.results.baselines import References
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.sensors.sampled import normals
+from cmg_mj.sensors.noise_streams import normals
 from cmg_mj.simulation.experiment import prepare
 from tests.sensors.test_sampled import assert_mean, assert_sigma
 

@@ -15,7 +15,12 @@ from scipy import stats
 
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.sensors.sampled import Accelerometer, Encoder, Fog, IdealReading, SampledSensor, normals
+from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.encoder import Encoder
+from cmg_mj.sensors.fog import Fog
+from cmg_mj.sensors.ideal import IdealReading
+from cmg_mj.sensors.noise_streams import normals
+from cmg_mj.sensors.sampled import SampledSensor
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 
@@ -198,7 +203,7 @@ def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> No
 
 def shown_by(sensor: Fog, timestep: float, steps: int, read_every: int) -> list[float]:
     """Readings of a gyro, at control ticks, of a rate that is the number of the physics step."""
-    sampled = SampledSensor(sensor, timestep, normals(0, 0, 2, 1), "sensors.fog")
+    sampled = SampledSensor(sensor, timestep, normals(0, 0, 2, 1), "sensors.fog", sensor.make_reading_function())
     shown = []
     for step in range(steps):
         if step % sampled.period == 0:

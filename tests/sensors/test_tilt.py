@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.sensors.sampled import Accelerometer
+from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.tilt import RadialTilt
 from tests.plant.full_model import states
 

@@ -10,7 +10,8 @@ import pytest
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.sampled import Fog, Sensors
+from cmg_mj.sensors.fog import Fog
+from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.simulation.pool import ARRAYS
 from cmg_mj.simulation.stacked import batch_values, value_of_world

@@ -22,7 +22,8 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.sensors.sampled import Accelerometer, Sensors
+from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.simulation.callback import control, control_callback
 from cmg_mj.simulation.experiment import Experiment, prepare
 

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic.dataclasses import dataclass
-from scipy.linalg import expm
 
 from cmg_mj.controllers.laws.protocol import FeedbackState
 from cmg_mj.elementwise import Scalar, clip, where
@@ -181,6 +180,8 @@ def sampled_cost(
     Returns:
         F (n, n), G (n, m) of x+ = F x + G u, and Q (n, n), N (n, m), R (m, m) of x'Qx + 2 x'Nu + u'Ru, a period's cost.
     """
+    from scipy.linalg import expm
+
     n, m = B.shape
     zero = np.zeros((m, n))
     both = np.block([[A, B], [zero, np.zeros((m, m))]])

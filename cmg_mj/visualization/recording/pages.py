@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Any
 
 import rerun as rr
 
 from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.resolve import versions
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.visualization.recording.run import Run
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
@@ -30,7 +30,7 @@ def log_results(
         pushes: Torques from outside.
         settings: What counts as settled.
     """
-    experiment: dict[str, Any] = {name: version(name) for name in ("cmg_mj", "mujoco")}
+    experiment: dict[str, Any] = {name: versions()[name] for name in ("cmg_mj", "mujoco")}
     experiment |= {"title": title, "runs": [run.name for run in runs]}
     rec.send_property("experiment", rr.AnyValues(**experiment))
     for run in runs:

@@ -1,0 +1,41 @@
+"""The gimbals' absolute encoders."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar, digitise
+from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Rate
+from cmg_mj.sensors.ideal import IdealReading
+
+
+@dataclass(frozen=True, config=STRICT)
+class Encoder:
+    """The gimbals' absolute encoders (AS5045 in the Dynamixel MX-106: 12 bit).
+
+    Attributes:
+        rate_hz: Samples a second (the servo is polled once a control period).
+        counts_per_revolution: Resolution; 0 for none.
+        latency_s: From sampling to delivery [s].
+    """
+
+    rate_hz: Rate = 200.0
+    counts_per_revolution: NonNegative = 4096.0
+    latency_s: Instant = 0.0
+
+    channels = 0
+
+    @property
+    def sample_sigma(self) -> float:
+        """Of one reading from the angle, by the resolution [rad]."""
+        return 2.0 * math.pi / self.counts_per_revolution / math.sqrt(12.0) if self.counts_per_revolution else 0.0
+
+    def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Sequence[Scalar]]:
+        """A function (ideal reading, nothing) -> gimbal angles [rad]."""
+        if not self.counts_per_revolution:
+            return lambda ideal, normal: ideal.gimbals
+        step = 2.0 * math.pi / self.counts_per_revolution
+        return lambda ideal, normal: [digitise(angle, math.inf, step) for angle in ideal.gimbals]

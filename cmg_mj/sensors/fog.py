@@ -1,0 +1,59 @@
+"""The fibre-optic gyro on the frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar, clip, radians
+from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Positive, Rate
+from cmg_mj.sensors.ideal import IdealReading
+
+
+@dataclass(frozen=True, config=STRICT)
+class Fog:
+    """A fibre-optic gyro on the frame, along the tilt axis: what estimates are judged by on a real rig.
+
+    The class of KVH's DSP-1750 (angle random walk 0.013 deg/rt(h), range 490 deg/s, bandwidth 440 Hz), with
+    a margin on the noise.
+
+    Attributes:
+        rate_hz: Samples a second.
+        angle_random_walk_deg_rth: White rate noise N; one sample's sigma is N * sqrt(rate).
+        bias_deg_h: Constant offset [deg/h].
+        bandwidth_hz: First-order low-pass, exact between samples; 0 for none.
+        range_deg_s: Readings saturate here [deg/s].
+        latency_s: From sampling to delivery [s].
+    """
+
+    rate_hz: Rate = 200.0
+    angle_random_walk_deg_rth: NonNegative = 0.02
+    bias_deg_h: float = 0.0
+    bandwidth_hz: NonNegative = 440.0
+    range_deg_s: Positive = 490.0
+    latency_s: Instant = 0.0
+
+    channels = 1
+
+    @property
+    def white_noise_sigma(self) -> float:
+        """Standard deviation of one sample [rad/s]."""
+        return radians(self.angle_random_walk_deg_rth) / 60.0 * math.sqrt(self.rate_hz)
+
+    def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Scalar]:
+        """A function (ideal reading, standard normals) -> tilt rate [rad/s]. It remembers its low-pass."""
+        sigma = self.white_noise_sigma
+        bias = math.radians(self.bias_deg_h) / 3600.0
+        limit = math.radians(self.range_deg_s)
+        # The share of a step that a first-order low-pass has taken after one sample period.
+        share = 1.0 - math.exp(-2.0 * math.pi * self.bandwidth_hz / self.rate_hz) if self.bandwidth_hz else 1.0
+        passed: Scalar = None
+
+        def measure(ideal: IdealReading, normal: Sequence[Scalar]) -> Scalar:
+            nonlocal passed
+            passed = ideal.gyro if passed is None else passed + share * (ideal.gyro - passed)
+            return clip(passed + bias + sigma * normal[0], -limit, limit)
+
+        return measure

@@ -1,0 +1,54 @@
+"""The random numbers of the sensors: a stream for each sensor, axis and world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from enum import IntEnum, unique
+
+import numpy as np
+
+from cmg_mj.elementwise import Scalar
+
+STREAMS_PER_AXIS = 16
+
+
+@unique
+class NoiseStream(IntEnum):
+    """Numbers of the noise streams of an axis: two sensors never share one, and a number never changes."""
+
+    ACCELEROMETER = 0
+    ENCODER = 1
+    FOG = 2
+    MEMS_GYRO = 3
+    FLICKER = 4
+    """1/f noise of the accelerometers."""
+    TURN_GYRO = 5
+    """The gyro about the vertical, which a plant of several axes has once."""
+
+    def on_axis(self, axis: int) -> int:
+        """Return the number of the stream of one axis of several."""
+        return self + STREAMS_PER_AXIS * axis
+
+
+def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
+    """Standard normal numbers, sample after sample, that depend on (seed, world, stream) alone.
+
+    Args:
+        seed: The run's seed.
+        worlds: The number of one world, on floats, or the numbers of many, on arrays.
+        stream: `NoiseStream.on_axis` of the sensor and its axis.
+        channels: Numbers a sample.
+
+    Yields:
+        One sample: `channels` floats, or an array (channels, n_worlds).
+    """
+    block = 256  # drawing one by one costs more than the rest of a sensor
+    single = isinstance(worlds, int)
+    different, places = np.unique([worlds] if single else worlds, return_inverse=True)
+    alone = np.array_equal(places, range(len(places)))  # every world once, in order
+    generators = [
+        np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(world), stream))) for world in different
+    ]
+    while True:
+        drawn = np.stack([g.standard_normal((block, channels)) for g in generators], axis=-1)
+        yield from drawn[:, :, 0].tolist() if single else drawn if alone else drawn[:, :, places]
