@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, parse_scenario, prepare
-from cmg_mj.errors import nearest, shown
+from cmg_mj.errors import TomlValue, nearest, shown
 from cmg_mj.inputs.messages import expected
 
 
@@ -46,7 +46,7 @@ def test_what_a_type_takes(annotation: Any, words: str) -> None:
         ("x" * 200, "'" + "x" * 79 + "..."),
     ],
 )
-def test_a_value_as_the_user_wrote_it(value: object, text: str) -> None:
+def test_a_value_as_the_user_wrote_it(value: TomlValue, text: str) -> None:
     assert shown(value) == text
 
 
