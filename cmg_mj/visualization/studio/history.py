@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.multi_axis import MultiAxisController
+from cmg_mj.controllers.make_controller import AnyController
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.studio.settings import law_settings
 
@@ -83,7 +82,7 @@ class ControllerHistory:
         """Count the samples before a physics step."""
         return int(np.searchsorted(np.asarray(self._steps), step))
 
-    def back_to(self, step: int) -> tuple[Controller | MultiAxisController, Experiment]:
+    def back_to(self, step: int) -> tuple[AnyController, Experiment]:
         """Restore the controller before the update at a physics step, and discard what came later.
 
         Args:
@@ -114,7 +113,7 @@ class ControllerHistory:
         return controller, experiment
 
 
-def adopt(controller: Controller | MultiAxisController, was: Experiment, now: Experiment) -> None:
+def adopt(controller: AnyController, was: Experiment, now: Experiment) -> None:
     """Change a running controller from one experiment's to another's, axis by axis.
 
     Args:

@@ -91,7 +91,7 @@ def _axis_laws(scenario: Scenario) -> dict[str, Fields]:
     """Return the fields of the law that axes set themselves."""
     return {
         f"axes.{axis}.{LAW}": {name: value for name, value in section.items() if name not in NO_LAWS}
-        for axis, section in ((axis, axis_fields(own).get(LAW, {})) for axis, own in scenario.axes.items())
+        for axis, section in ((axis, axis_fields(settings).get(LAW, {})) for axis, settings in scenario.axes.items())
     }
 
 
@@ -116,14 +116,14 @@ def changed_fields(base: Experiment, now: Experiment, values: FieldValues) -> Fi
         fields[LAW] = {**_section(fields, LAW), **stays}
         for axis in now.scenario.axes:
             fields.pop(f"axes.{axis}.{LAW}", None)
-    before = {axis: axis_fields(own) for axis, own in now.scenario.axes.items()}
-    axes = {axis: _axis_section(base, axis, own, values) for axis, own in before.items()}
+    before = {axis: axis_fields(settings) for axis, settings in now.scenario.axes.items()}
+    axes = {axis: _axis_section(base, axis, section, values) for axis, section in before.items()}
     return {"axes": axes, **fields} if axes != before else fields
 
 
-def _axis_section(base: Experiment, axis: str, own: FieldValues, values: FieldValues) -> Fields:
+def _axis_section(base: Experiment, axis: str, before: FieldValues, values: FieldValues) -> Fields:
     """Return the section [axes.NAME] after a choice for all axes."""
-    rest: Fields = dict(own)
+    rest: Fields = dict(before)
     for name in values:
         rest = _without(rest, name.split("."))
     if OBSERVER in values:
@@ -131,7 +131,7 @@ def _axis_section(base: Experiment, axis: str, own: FieldValues, values: FieldVa
         section = axis_fields(base.scenario.axes[axis]).get("observer", {})
         rest["observer"] = section if observer.kind == values[OBSERVER] else {}
     if LAW in values:
-        stays = {name: value for name, value in _section(own, LAW).items() if name in NO_LAWS}
+        stays = {name: value for name, value in _section(before, LAW).items() if name in NO_LAWS}
         rest[LAW] = {**_section(values, f"axes.{axis}.{LAW}"), **stays}
     return {name: section for name, section in rest.items() if section}
 

@@ -42,7 +42,7 @@ class View:
         contents: The entities asked for.
         hidden: Entities that are switched off, out of the legend.
         grey: Entities that are switched off in the legend.
-        listed: Entities whose line is overridden in the legend, whether on or off.
+        listed: Entities whose line is overall_observers in the legend, whether on or off.
         axis: Range of y.
         eye: Position and target of the camera.
     """
@@ -67,17 +67,17 @@ def views(path: Path) -> list[View]:
         view, below = found.setdefault(matched[1], View()), matched[2]
         batch = chunk.to_record_batch()
         values: dict[str, Any] = {name: batch.column(name).to_pylist()[0] for name in batch.schema.names if ":" in name}
-        overridden = re.sub(r"^ViewContents/overrides(/.*?)/visualizers.*", r"\1", below)
+        overall_observers = re.sub(r"^ViewContents/overrides(/.*?)/visualizers.*", r"\1", below)
         if "ViewBlueprint:display_name" in values:
             (view.name,) = values["ViewBlueprint:display_name"]
         if "ViewContents:query" in values:
             view.contents = values["ViewContents:query"]
         if values.get("EntityBehavior:visible") == [False]:
-            view.hidden.add(overridden)
+            view.hidden.add(overall_observers)
         if "SeriesLines:visible_series" in values:
-            view.listed.add(overridden)
+            view.listed.add(overall_observers)
             if values["SeriesLines:visible_series"] == [False]:
-                view.grey.add(overridden)
+                view.grey.add(overall_observers)
         if "ScalarAxis:range" in values:
             (view.axis,) = values["ScalarAxis:range"]
         for name in ("position", "look_target"):
@@ -103,8 +103,8 @@ def write(path: Path, experiment: Experiment, runs: Sequence[Run]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def ridden() -> tuple[Experiment, Run]:
-    """Every observer rides along."""
+def all_observers() -> tuple[Experiment, Run]:
+    """A run with every observer."""
     experiment = prepare(load_scenario("observer_tuning", SHORT))
     return experiment, recorded(experiment)
 
@@ -119,8 +119,8 @@ def compared() -> tuple[Experiment, list[Run]]:
 # --- many observers ------------------------------------------------------------------------------------------
 
 
-def test_the_best_of_those_riding_along_are_on(ridden: tuple[Experiment, Run], tmp_path: Path) -> None:
-    experiment, run = ridden
+def test_the_best_open_loop_observers_are_on(all_observers: tuple[Experiment, Run], tmp_path: Path) -> None:
+    experiment, run = all_observers
     found = views(write(tmp_path / "it.rrd", experiment, [run]))
     few = best_observers(run)
     assert few[0] == "homogeneous"
@@ -170,8 +170,8 @@ def test_tables_fit_their_view(compared: tuple[Experiment, list[Run]]) -> None:
         assert np.max(widths, axis=0).sum() <= 76
 
 
-def test_a_noisy_observer_takes_no_axis(ridden: tuple[Experiment, Run], tmp_path: Path) -> None:
-    experiment, run = ridden
+def test_a_noisy_observer_takes_no_axis(all_observers: tuple[Experiment, Run], tmp_path: Path) -> None:
+    experiment, run = all_observers
     noisy = run.trajectory["estimate/finite_difference/x2_rad_s"]
     for view in named(views(write(tmp_path / "it.rrd", experiment, [run])), "Tilt rate [rad/s]"):
         assert view.axis is not None

@@ -167,7 +167,7 @@ def test_an_observer_keeps_its_colour(path: Path) -> None:
 
 
 def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
-    """In degrees, in the loop and riding along; the summary has its figures."""
+    """In degrees, in the loop and open loop; the summary has its figures."""
     of = prepare(
         scenario("observer.kind=adaptive", "open_loop_observers=['homogeneous_adaptive']", "metrics.bias_from_s=0.1")
     )
@@ -197,9 +197,9 @@ def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
     assert ["", heading("tilt_rms_deg"), written("tilt_rms_deg", run.summary["tilt_rms_deg"]), ""] in rows
     assert ["", "Outcome", "done at 0.5 s", ""] in rows
     (observers,) = static(path, "/observers", "TextDocument:text")
-    riding = [[cell.strip() for cell in line.split("|")][1] for line in observers.splitlines() if "|" in line]
+    names = [[cell.strip() for cell in line.split("|")][1] for line in observers.splitlines() if "|" in line]
     rows = ["**homogeneous**", "**linear**", *REFERENCES]
-    assert [name for name in riding if name and not name.startswith(":-")] == 2 * rows  # two tables, for their width
+    assert [name for name in names if name and not name.startswith(":-")] == 2 * rows  # two tables, for their width
     assert 'kind = "made up"' in static(path, "/scenario", "TextDocument:text")[0]
     assert static(path, "/__properties", "RecordingInfo:name") == ["A title: homogeneous"]
     assert len(RrdReader(path).blueprints()) == 1
