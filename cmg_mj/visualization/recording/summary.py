@@ -43,7 +43,9 @@ def log_results(
         settings: The settle band.
     """
     package_versions = {name: versions()[name] for name in ("cmg_mj", "mujoco")}
-    rec.send_property("experiment", rr.AnyValues(True, **package_versions, title=title, runs=[run.name for run in runs]))
+    rec.send_property(
+        "experiment", rr.AnyValues(True, **package_versions, title=title, runs=[run.name for run in runs])
+    )
     for run in runs:
         numbers = {key: value for key, value in run.summary.items() if isinstance(value, float)}
         values = rr.AnyValues(True, **numbers, outcome=run.outcome.kind, time_s=run.outcome.time_s)
