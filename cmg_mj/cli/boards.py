@@ -58,9 +58,9 @@ def export(
     accelerations and encoders to the gimbal rate. NAME_example.c compiles, runs, and compares the C with the
     test vector in NAME_test_vector.h. What is written has been compared with Python on random signals.
     """
-    from cmg_mj.codegen.export import check_installed, code, save
-    from cmg_mj.codegen.export.names import files_of, name_of
-    from cmg_mj.codegen.export.signal_table import export_table
+    from cmg_mj.codegen.export import check_installed, generate_code, write_code
+    from cmg_mj.codegen.export.names import export_files, name_of
+    from cmg_mj.codegen.export.pipeline import export_table
     from cmg_mj.simulation.experiment import prepare
 
     check_observer("OBSERVER", observer)
@@ -71,16 +71,17 @@ def export(
     controller = experiment.axis_controller()
     name = name_of(controller.observer, asked)
     place = Path("runs") / f"export-{name}-{precision}" if out is None else output_path(out)
-    with claim_folder(place, files_of(name)) as folder:
-        made = code(controller, precision, name)
-        files = save(folder, made)
-    show(made.figures, export_table(made.figures), as_json)
-    if made.figures["compiler"] is None:
+    with claim_folder(place, export_files(name)) as folder:
+        code = generate_code(controller, precision, name)
+        files = write_code(folder, code)
+    figures = code.figures
+    show(figures, export_table(figures), as_json)
+    if figures["compiler"] is None:
         note(
             "no C compiler was found (CC, cc, gcc, clang): the traced formulas were compared with Python, the C was not"
         )
-    for part in made.figures["beyond_rounding"]:
-        off = made.figures["c_off_by"][part]
+    for part in figures["beyond_rounding"]:
+        off = (figures["c_off_by"] or {})[part]
         note(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer makes so much of a last digit")
     at = files[0].parent
     say_written(folder, at, f"Try it: cc -std=c99 {at / name}.c {at / name}_example.c -lm && ./a.out", as_json)

@@ -55,12 +55,12 @@ def bench(observers: str, worlds: int | None, board: bool, sweep: bool, as_json:
     if board:
         if worlds is not None:
             raise InputError("--worlds: is for the batch on the host; --board has no worlds")
-        from cmg_mj.codegen.board.cost import cost_markdown, cost_table, counted_on
+        from cmg_mj.codegen.board.cost import cost_markdown, cost_scenario, cost_table
         from cmg_mj.codegen.board.cost import measure as count
         from cmg_mj.simulation.experiment import prepare
 
         with progress("Bench on the board", 1.0) as on_progress:
-            figures = count([prepare(counted_on(name)) for name in names], on_progress)
+            figures = count([prepare(cost_scenario(name)) for name in names], on_progress)
         show(figures, cost_markdown(figures) if markdown else cost_table(figures), as_json)
         return
     if markdown:

@@ -14,7 +14,7 @@ from cmg_mj.replay.report import replay_markdown, shown_first
 from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, colours
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.recording.replay_recording import LogSeries, write_logs
-from cmg_mj.visualization.recording.signals import CONTROLLER, CUBES, Series, numbered
+from cmg_mj.visualization.recording.signals import CONTROLLER, MODULES, Series, numbered_parts
 
 
 def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:
@@ -53,7 +53,7 @@ def series(replayed: ReplayResult) -> list[Series]:
     if "reference" in log.has:
         rows.append(row("rate/true", "reference", log[REFERENCE], BASELINE_COLOURS["true"], 3.0))
     labels, names = short_names(list(replayed.estimates)), list(replayed.estimates)
-    for part, (name, color) in zip(numbered(names), colours(names).items(), strict=True):
+    for part, (name, color) in zip(numbered_parts(names), colours(names).items(), strict=True):
         estimates = replayed.estimates[name]
         rate = estimates["x2_rad_s"]
         said = {"rate_estimate": rate}
@@ -68,5 +68,5 @@ def series(replayed: ReplayResult) -> list[Series]:
         rows.append(row("acceleration/measured", "measured", measured, BASELINE_COLOURS["gyro"], 1.0, whole=False))
     if "gimbals" in log.has:
         rows.append(row("command/u", "command", log["u_rad_s"], CONTROLLER))
-        rows.append(row("gimbal/y2", "measured", np.degrees(log["y2_rad"]), CUBES[0]))
+        rows.append(row("gimbal/y2", "measured", np.degrees(log["y2_rad"]), MODULES[0]))
     return rows

@@ -13,7 +13,7 @@ import numpy as np
 from bias_limits import Case, limits
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.codegen.board.cost import counted_on, measure
+from cmg_mj.codegen.board.cost import cost_scenario, measure
 from cmg_mj.errors import InputError
 from cmg_mj.observers import OBSERVERS, needs, observer_class
 from cmg_mj.results import markdown
@@ -46,7 +46,7 @@ def bears(limit: np.ndarray) -> str:
 def instructions() -> dict[str, str]:
     """Of a whole update on the board, by observer."""
     try:
-        figures = measure([prepare(counted_on(name)) for name in OBSERVERS], lambda share: None)["figures"]
+        figures = measure([prepare(cost_scenario(name)) for name in OBSERVERS], lambda share: None)["figures"]
     except InputError as error:
         print(f"no board: {error}")
         return {}

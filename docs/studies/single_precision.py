@@ -20,7 +20,7 @@ import numpy as np
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.codegen.export import export
-from cmg_mj.codegen.export.check import FLAGS, compiler
+from cmg_mj.codegen.export.check import FLAGS, find_compiler
 from cmg_mj.errors import InputError
 from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.results.intervals import mean_interval
@@ -43,7 +43,7 @@ def in_python(observer: str, signals: np.ndarray) -> np.ndarray:
 
 def in_c(observer: str, signals: np.ndarray) -> np.ndarray:
     """The same by the exported C in single precision."""
-    compile_with = compiler()
+    compile_with = find_compiler()
     if compile_with is None:
         raise InputError("no C compiler was found (CC, cc, gcc, clang)")
     controller = prepare(load_scenario("push_recovery", [], observer)).axis_controller()

@@ -1,4 +1,4 @@
-"""The processor in the loop: an exported controller on an emulated Cortex-M7.
+"""Runs an exported controller on an emulated Cortex-M7, a processor in the loop.
 
 with on_a_board(controller) as board:
     decision = board.update(accelerations, encoders)

@@ -1,10 +1,10 @@
-"""What an update of each observer costs on a Cortex-M7: instructions, stack, memory, flash."""
+"""Measures the cost of an update on a Cortex-M7: instructions, stack, memory, flash."""
 
 from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Protocol, TypedDict
 
 from rich import box
 from rich.table import Table
@@ -16,15 +16,15 @@ from cmg_mj.codegen.board.tools import require
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.processor import Processor
 from cmg_mj.results.markdown import table
-from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 
 SECONDS = 2.5
-"""Of push_recovery, whose push begins at 2 s: so long the costs are taken down, tick after tick."""
+"""Time of push_recovery over which costs are measured at every tick; its push begins at 2 s [s]."""
 
 CLOCK_MHZ = 216.0
-"""Of the papers' STM32F746."""
+"""Clock of the papers' STM32F746 [MHz]."""
 
 COLUMNS = {
     "observer": ("observer", "{}"),
@@ -37,62 +37,77 @@ COLUMNS = {
     "state [B]": ("state_bytes", "{:.0f}"),
     "flash [B]": ("flash_bytes", "{:.0f}"),
 }
-"""Heading -> the figure and how it is printed."""
+"""Heading -> the key of a figure and its format."""
 
 
-class EndedRun(Protocol):
-    """What is needed of a `simulate.Result`, whose room uses MuJoCo and lies below this one."""
+class UpdateCost(TypedDict):
+    """The cost of a controller on the board; instructions are a median and a largest number."""
 
-    @property
-    def outcomes(self) -> Sequence[Any]:
-        """How each world ended."""
-        ...
+    step_instructions: float
+    step_instructions_most: int
+    update_instructions: float
+    update_instructions_most: int
+    update_us_at_216_mhz: float
+    stack_bytes: int
+    state_bytes: int
+    flash_bytes: int
+    ticks: int
 
-    @property
-    def trajectory(self) -> Trajectory | None:
-        """What is kept of it."""
-        ...
+
+class ObserverCost(UpdateCost):
+    """The cost of a controller with one of the observers."""
+
+    observer: str
 
 
-class Run(Protocol):
-    """What is needed of an `experiment.Experiment`, which closes its loop by a board and so lies below this room."""
+class CostFigures(TypedDict):
+    """The costs of observers, as `--json` prints them."""
+
+    processor: str
+    clock_mhz: float
+    cycles_an_instruction: float
+    figures: list[ObserverCost]
+
+
+class ProcessorExperiment(Protocol):
+    """The part of `experiment.Experiment`, a package below this one, that runs a processor in the loop."""
 
     @property
     def scenario(self) -> Scenario:
-        """What it was made from."""
+        """The scenario."""
         ...
 
     def axis_controller(self) -> Controller:
-        """A fresh controller."""
+        """Make a fresh controller."""
         ...
 
-    def run_on(self, processor: Processor, /) -> EndedRun:
-        """One world, its control decisions taken by a processor."""
+    def run_on(self, processor: Processor, /) -> Result:
+        """Run one world with the control decisions of a processor."""
         ...
 
 
-def counted_on(observer: str) -> Scenario:
-    """What an observer's costs are taken down on."""
+def cost_scenario(observer: str) -> Scenario:
+    """Load the scenario on which an observer's cost is measured."""
     return load_scenario("push_recovery", [f"duration_s={SECONDS}"], observer)
 
 
-def measure(runs: Sequence[Run], on_progress: Callable[[float], None]) -> dict[str, Any]:
-    """Count what observers cost, each along its own run on the board.
+def measure(runs: Sequence[ProcessorExperiment], on_progress: Callable[[float], None]) -> CostFigures:
+    """Measure the costs of observers, each in a run with the board.
 
     Args:
-        runs: An `Experiment` an observer, such as `prepare(counted_on("linear"))`.
+        runs: An `Experiment` for each observer, such as `prepare(cost_scenario("linear"))`.
         on_progress: Called with the share done.
 
     Returns:
-        The figures, as `--json` prints them.
+        The figures.
 
     Raises:
-        InputError: What is needed is not installed, or an observer cannot be exported.
+        InputError: A program is not installed, or an observer cannot be exported.
     """
     require()
-    rows = []
+    rows: list[ObserverCost] = []
     for i, run in enumerate(runs):
-        rows.append({"observer": run.scenario.observer.kind} | cost_of(run, run.axis_controller()))
+        rows.append({"observer": run.scenario.observer.kind, **cost_of(run, run.axis_controller())})
         on_progress((i + 1.0) / len(runs))
     return {
         "processor": "Cortex-M7, single precision, emulated",
@@ -102,15 +117,15 @@ def measure(runs: Sequence[Run], on_progress: Callable[[float], None]) -> dict[s
     }
 
 
-def cost_of(run: Run, controller: Controller) -> dict[str, Any]:
-    """What a controller costs on the board.
+def cost_of(run: ProcessorExperiment, controller: Controller) -> UpdateCost:
+    """Measure the cost of a controller on the board.
 
     Args:
-        run: An `Experiment`, along which it is counted, closed by the controller itself; all ticks count.
-        controller: The controller, that of the experiment or one that estimates the same signals.
+        run: An `Experiment`; the controller on the board closes its loop, and all ticks count.
+        controller: The controller of the experiment, or one that estimates the same signals.
 
     Returns:
-        Its figures.
+        The cost.
     """
     with exported(controller) as files:
         flash = flash_of(files.observer, files.folder)
@@ -135,8 +150,8 @@ def cost_of(run: Run, controller: Controller) -> dict[str, Any]:
     }
 
 
-def _steps(board: Board, result: EndedRun) -> list[Cost]:
-    """What the observer alone takes, given what the controller around it has been given."""
+def _steps(board: Board, result: Result) -> list[Cost]:
+    """Measure the observer alone, on the measurements of a run of the whole controller."""
     if result.outcomes[0].kind == "interrupted":
         raise KeyboardInterrupt
     assert result.trajectory is not None
@@ -148,30 +163,31 @@ def _steps(board: Board, result: EndedRun) -> list[Cost]:
 
 
 def _instructions(costs: Sequence[Cost]) -> tuple[float, int]:
-    """Median and most."""
+    """Return median and maximum."""
     counts = [cost.instructions for cost in costs]
     return statistics.median(counts), max(counts)
 
 
-def cost_table(figures: dict[str, Any]) -> Table:
-    """The table that `cmg-mj bench --board` prints."""
-    shown = Table(
+def cost_table(figures: CostFigures) -> Table:
+    """Make the table that `cmg-mj bench --board` prints."""
+    printed = Table(
         title="An update on a Cortex-M7 in single precision: instructions counted by QEMU, median and most over "
         f"{SECONDS:g} s of push_recovery;\nmicroseconds at {CLOCK_MHZ:g} MHz are an estimate: one cycle an instruction",
         box=box.SIMPLE_HEAD,
         title_justify="left",
     )
     for heading in COLUMNS:
-        shown.add_column(heading.strip(), justify="left" if heading == "observer" else "right")
+        printed.add_column(heading.strip(), justify="left" if heading == "observer" else "right")
     for row in _cells(figures):
-        shown.add_row(*row)
-    return shown
+        printed.add_row(*row)
+    return printed
 
 
-def cost_markdown(figures: dict[str, Any]) -> str:
-    """The same as Markdown."""
+def cost_markdown(figures: CostFigures) -> str:
+    """Write the table of costs in Markdown."""
     return table([heading.strip() for heading in COLUMNS], _cells(figures))
 
 
-def _cells(figures: dict[str, Any]) -> list[list[str]]:
-    return [[pattern.format(row[key]) for key, pattern in COLUMNS.values()] for row in figures["figures"]]
+def _cells(figures: CostFigures) -> list[list[str]]:
+    rows = [dict(row) for row in figures["figures"]]
+    return [[pattern.format(row[key]) for key, pattern in COLUMNS.values()] for row in rows]

@@ -1,4 +1,4 @@
-"""A controller put on an emulated board."""
+"""Exports a controller, builds it, and starts a board with it."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from cmg_mj.controllers.controller import Controller
 from cmg_mj.errors import InputError
 
 
-class Exported(NamedTuple):
-    """A controller in C of single precision.
+class ExportedFiles(NamedTuple):
+    """The files of a controller in C of single precision.
 
     Attributes:
         observer: The observer's name in C.
-        folder: Where the files are.
+        folder: Folder of the files.
     """
 
     observer: str
@@ -30,17 +30,17 @@ class Exported(NamedTuple):
 
 
 @contextmanager
-def exported(controller: Controller) -> Iterator[Exported]:
-    """Export a controller to a folder that is gone at the end.
+def exported(controller: Controller) -> Iterator[ExportedFiles]:
+    """Export a controller to a temporary folder.
 
     Args:
-        controller: What is exported: its observer and all around it.
+        controller: The controller.
 
     Yields:
-        Where it is.
+        The files, which are deleted at the end.
 
     Raises:
-        InputError: It cannot be exported.
+        InputError: The controller cannot be exported.
     """
     if controller.feedback != "observer":
         raise InputError(
@@ -49,11 +49,11 @@ def exported(controller: Controller) -> Iterator[Exported]:
         )
     with TemporaryDirectory(prefix="cmg_mj-board-") as folder:
         header = export(controller, Path(folder), precision="single", name=_name_of(controller))[0]
-        yield Exported(header.stem, Path(folder))
+        yield ExportedFiles(header.stem, Path(folder))
 
 
 def _name_of(controller: Controller) -> str:
-    """Its observer's, or any where C cannot spell that: nobody is shown this C."""
+    """Name the observer in C, with any name if C cannot spell its own: no user sees this C."""
     try:
         return name_of(controller.observer)
     except InputError:
@@ -65,18 +65,18 @@ def on_a_board(controller: Controller, *, counting: bool = False) -> Iterator[Bo
     """Export a controller, build it, and start an emulated board with it.
 
     Args:
-        controller: What runs on the board: its observer and all around it.
+        controller: The controller.
         counting: Whether the board counts instructions, which makes it slower.
 
     Yields:
-        The board, which ends with this.
+        The board, which stops at the end.
 
     Raises:
-        InputError: What is needed is not installed, or the controller cannot be exported.
+        InputError: A program is not installed, or the controller cannot be exported.
         RunStopped: The board does not start.
     """
     require()
     with exported(controller) as files:
         board = Board(build(files.observer, files.folder).path, counting=counting)
-    with board:  # it has its image by now
+    with board:  # it has loaded its image: the files may go
         yield board

@@ -1,4 +1,4 @@
-"""An exported controller and the board's own C, built into what the Cortex-M7 starts from."""
+"""Builds an exported controller and the firmware into an image for the Cortex-M7."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cmg_mj.errors import InputError
 FIRMWARE = Path(__file__).parent / "firmware"
 
 CORE = ("-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard")
-"""The STM32F746's: a Cortex-M7 whose floating-point unit has single precision alone."""
+"""Flags of the STM32F746: a Cortex-M7 whose floating-point unit has single precision alone."""
 FLAGS = (
     *CORE,
     "-std=c99",
@@ -37,7 +37,7 @@ class Image(NamedTuple):
 
     Attributes:
         path: The ELF file.
-        flash: What it occupies of the flash, all in all [bytes].
+        flash: Size of the whole image in the flash [bytes].
     """
 
     path: Path
@@ -48,38 +48,38 @@ def build(observer: str, folder: Path, controller: Path | None = None) -> Image:
     """Build an exported controller for the board.
 
     Args:
-        observer: Its name in C.
-        folder: Where its .h and .c are; the image is put there too.
-        controller: Another file in place of its .c, such as `EMPTY`.
+        observer: The observer's name in C.
+        folder: Folder of the .h and .c files, to which the image is written.
+        controller: Another file in place of the .c file, such as `EMPTY`.
 
     Returns:
         The image.
 
     Raises:
-        InputError: The compiler refuses it.
+        InputError: The compiler reports errors.
     """
     source = controller or folder / f"{observer}.c"
     path = folder / f"{observer}-{source.stem}.elf"
-    own = [FIRMWARE / name for name in ("startup.c", "mps2.c", "board.c")]
-    told = [f"-DOBSERVER={observer}"]
-    told += [f"-D{what}={observer.upper()}_{what}" for what in ("ESTIMATES", "ENCODERS")]
-    command: list[str | Path] = [COMPILER, *FLAGS, *told, "-I", folder, "-I", FIRMWARE]
-    command += ["-T", FIRMWARE / "mps2.ld", *own, source, "-lm", "-o", path]
+    firmware = [FIRMWARE / name for name in ("startup.c", "mps2.c", "board.c")]
+    macros = [f"-DOBSERVER={observer}"]
+    macros += [f"-D{size}={observer.upper()}_{size}" for size in ("ESTIMATES", "ENCODERS")]
+    command: list[str | Path] = [COMPILER, *FLAGS, *macros, "-I", folder, "-I", FIRMWARE]
+    command += ["-T", FIRMWARE / "mps2.ld", *firmware, source, "-lm", "-o", path]
     _run(command, observer)
     text, data, *_ = _run([SIZE, path], observer).splitlines()[1].split()
     return Image(path, int(text) + int(data))
 
 
 EMPTY = FIRMWARE / "empty.c"
-"""A controller that does nothing: what an image holds beside the controller."""
+"""A controller that does nothing."""
 
 
 def flash_of(observer: str, folder: Path) -> int:
-    """Flash that a controller takes with what it needs of the C library: an image less one whose controller is empty.
+    """Measure the flash of a controller and its part of the C library: an image less one with an empty controller.
 
     Args:
-        observer: Its name in C.
-        folder: Where its .h and .c are.
+        observer: The observer's name in C.
+        folder: Folder of the .h and .c files.
 
     Returns:
         The size [bytes].
@@ -89,11 +89,11 @@ def flash_of(observer: str, folder: Path) -> int:
 
 def _run(command: list[str | Path], observer: str) -> str:
     try:
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+        process = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     except OSError as error:
         raise InputError(f"{observer}: {command[0]} cannot be run: {error.strerror}") from error
-    if done.returncode:
-        lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
-        reason = (lines or done.stderr.splitlines() or [f"status {done.returncode}"])[0]
+    if process.returncode:
+        lines = [line for line in process.stderr.splitlines() if "error" in line or "undefined" in line]
+        reason = (lines or process.stderr.splitlines() or [f"status {process.returncode}"])[0]
         raise InputError(f"{observer}: {command[0]} refuses it: {reason.strip()}")
-    return done.stdout
+    return process.stdout

@@ -1,4 +1,4 @@
-"""Messages over the serial line, as firmware/board.c describes them."""
+"""Exchanges messages over the serial line, as firmware/board.c describes them."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ import struct
 
 from cmg_mj.errors import RunStopped
 
-FIRST = b"\xa5"
+START_BYTE = b"\xa5"
 
 
 class Silent(RunStopped):
-    """The other end has not answered in time."""
+    """The board has not answered in time."""
 
 
 class Closed(RunStopped):
-    """The other end is no longer there."""
+    """The board has closed the line."""
 
 
-def framed(kind: str, number: int, carried: bytes) -> bytes:
-    """A message as it goes over the line."""
-    body = bytes((ord(kind), number, len(carried))) + carried
-    return FIRST + body + struct.pack("<H", _crc(body))
+def frame(kind: str, number: int, payload: bytes) -> bytes:
+    """Encode a message for the line."""
+    body = bytes((ord(kind), number, len(payload))) + payload
+    return START_BYTE + body + struct.pack("<H", _crc(body))
 
 
 class SerialLine:
-    """A serial line with a board at its other end.
+    """A serial line to a board.
 
     Args:
-        line: The line; a stream of bytes either way.
-        patience_s: For how long an answer may fail to come [s].
+        line: The line; a stream of bytes in both directions.
+        patience_s: Longest wait for an answer [s].
     """
 
     def __init__(self, line: socket.socket, patience_s: float) -> None:
@@ -39,46 +39,46 @@ class SerialLine:
         self._number = 0
         self.patience_s = patience_s
 
-    def ask(self, kind: str, carried: bytes, layout: str) -> tuple:
+    def ask(self, kind: str, payload: bytes, layout: str) -> tuple:
         """Send a message and wait for its answer.
 
         Args:
-            kind: Its kind.
-            carried: What it carries.
-            layout: What the answer carries, as `struct` calls it.
+            kind: Kind of the message.
+            payload: Payload of the message.
+            layout: Layout of the answer's payload, in `struct`'s format.
 
         Returns:
             The numbers of the answer.
 
         Raises:
-            RunStopped: No answer came, or none to this message.
+            RunStopped: No answer comes, or an answer to another message.
         """
         self._number = (self._number + 1) % 256
         try:
-            self._line.sendall(framed(kind, self._number, carried))
+            self._line.sendall(frame(kind, self._number, payload))
         except OSError as error:
             raise Closed("the board is gone") from error
-        its_kind, number, answer = self._message()
-        if its_kind == "?":
-            raise RunStopped(f"the board knows no message {kind!r} of {len(carried)} bytes, or it came damaged")
-        if (its_kind, number) != (kind, self._number) or len(answer) != struct.calcsize(layout):
+        answer_kind, number, answer = self._message()
+        if answer_kind == "?":
+            raise RunStopped(f"the board knows no message {kind!r} of {len(payload)} bytes, or it came damaged")
+        if (answer_kind, number) != (kind, self._number) or len(answer) != struct.calcsize(layout):
             raise RunStopped(f"the board answered something else than what {kind!r} asked")
         return struct.unpack(layout, answer)
 
     def await_ready(self) -> None:
-        """Wait until the board says that it is ready.
+        """Wait until the board reports that it is ready.
 
         Raises:
-            RunStopped: It says something else, or nothing.
+            RunStopped: The board reports something else, or nothing.
         """
         if self._message() != ("!", 0, b""):
             raise RunStopped("the board says something else than that it is ready")
 
     def _message(self) -> tuple[str, int, bytes]:
-        """The next message: its kind, number, and what it carries."""
+        """Receive the next message: kind, number and payload."""
         try:
             head = self._receive(4)
-            if head[:1] != FIRST:
+            if head[:1] != START_BYTE:
                 raise RunStopped(f"the board sent the byte {head[0]:#04x} where a message should begin")
             rest = self._receive(head[3] + 2)
         except TimeoutError as error:
@@ -100,5 +100,5 @@ class SerialLine:
 
 
 def _crc(body: bytes) -> int:
-    """CRC-16/CCITT."""
+    """Compute the CRC-16/CCITT."""
     return binascii.crc_hqx(body, 0xFFFF)

@@ -1,4 +1,4 @@
-"""The programs that build for the board and emulate it, which are Debian's packages and not pip's."""
+"""Checks for the programs that build for the board and emulate it: Debian packages, not pip's."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ PACKAGES = {
     "nano.specs": "libnewlib-arm-none-eabi",
     EMULATOR: "qemu-system-arm",
 }
-"""What is needed: which of Debian's packages has it."""
+"""Program or file -> its Debian package."""
 
 
 def missing() -> list[str]:
-    """Debian's packages that are needed and not installed."""
-    return list(dict.fromkeys(package for thing, package in PACKAGES.items() if not _is_there(thing)))
+    """List the Debian packages that are not installed."""
+    return list(dict.fromkeys(package for name, package in PACKAGES.items() if not _is_installed(name)))
 
 
 def available() -> bool:
-    """Whether a controller can be exported, built and emulated here."""
+    """Return whether a controller can be exported, built and emulated here."""
     return not missing() and find_spec("casadi") is not None
 
 
 def require() -> None:
-    """See that all of Debian's is there.
+    """Require all Debian packages.
 
     Raises:
-        InputError: It is not; the line says what to install.
+        InputError: Some are not installed; the message names them.
     """
     packages = missing()
     if packages:
@@ -42,10 +42,10 @@ def require() -> None:
         )
 
 
-def _is_there(thing: str) -> bool:
-    if not thing.endswith(".specs"):
-        return shutil.which(thing) is not None
+def _is_installed(name: str) -> bool:
+    if not name.endswith(".specs"):
+        return shutil.which(name) is not None
     if shutil.which(COMPILER) is None:
         return False
-    told = subprocess.run([COMPILER, f"-print-file-name={thing}"], capture_output=True, text=True, check=False)
-    return told.stdout.strip() != thing  # the whole path where there is such a file
+    process = subprocess.run([COMPILER, f"-print-file-name={name}"], capture_output=True, text=True, check=False)
+    return process.stdout.strip() != name  # the whole path if the file exists

@@ -1,7 +1,7 @@
-"""CasADi's algorithm of a function, printed as C of one precision.
+"""Prints CasADi's algorithm of a function as C of one precision.
 
-CasADi writes C itself, but in single precision with constants and calls of `math.h` in double, and with an interface of
-its own. Its algorithm is open instead: one operation after the other, each on numbers that are there already.
+CasADi also writes C, but its single precision has constants and calls of `math.h` in double, and an interface of
+CasADi's. Its algorithm is accessible: a sequence of operations, each on results of earlier ones.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from cmg_mj.errors import InputError
 Precision = Literal["double", "single"]
 
 WIDEST = 70
-"""Characters: an expression that is longer is named, and the name goes on."""
+"""Longest expression [characters]; a longer one becomes a variable."""
 
 ATOM, UNARY, TIMES, PLUS, COMPARED, EQUAL, AND, OR, CHOICE = range(9)
-"""How tightly an expression's outermost operator binds in C, the tightest first."""
+"""Precedence of an expression's outermost operator in C, the tightest first."""
 
 INFIX = {
     casadi.OP_ADD: ("+", PLUS),
@@ -65,10 +65,9 @@ CALLS = {
 """Functions of math.h."""
 
 SELECT = -1
-"""Not CasADi's, which adds up (c ? a : 0) and (!c ? b : 0): c ? a : b."""
+"""c ? a : b, which CasADi writes as the sum of (c ? a : 0) and (!c ? b : 0)."""
 
-# C names an argument of these twice: it must be a name. Not fmax: that makes a limit of what is NaN, which would then
-# go on as a number.
+# Not fmax: it turns NaN into the limit, a number.
 TEMPLATES = {
     casadi.OP_FMAX: ("{0} < {1} ? {1} : {0}", CHOICE),
     casadi.OP_FMIN: ("{0} > {1} ? {1} : {0}", CHOICE),
@@ -81,21 +80,22 @@ TEMPLATES = {
     casadi.OP_IF_ELSE_ZERO: ("{0} ? {1} : {zero}", CHOICE),
     SELECT: ("{0} ? {1} : {2}", CHOICE),
 }
-NAMED_TWICE = {casadi.OP_FMAX, casadi.OP_FMIN, casadi.OP_SIGN, casadi.OP_SQ, casadi.OP_TWICE}
+ARGUMENT_TWICE = {casadi.OP_FMAX, casadi.OP_FMIN, casadi.OP_SIGN, casadi.OP_SQ, casadi.OP_TWICE}
+"""Operations whose template has an argument twice; the argument must be a variable."""
 
-TRUTHS = {casadi.OP_LT, casadi.OP_LE, casadi.OP_EQ, casadi.OP_NE, casadi.OP_AND, casadi.OP_OR, casadi.OP_NOT}
-"""Operations that are an int in C."""
-ASKED = {casadi.OP_AND: 2, casadi.OP_OR: 2, casadi.OP_NOT: 1, casadi.OP_IF_ELSE_ZERO: 1, SELECT: 1}
-"""Operations that take truths: how many of their arguments, from the first on."""
+BOOLEANS = {casadi.OP_LT, casadi.OP_LE, casadi.OP_EQ, casadi.OP_NE, casadi.OP_AND, casadi.OP_OR, casadi.OP_NOT}
+"""Operations whose result is an int in C."""
+BOOLEAN_ARGUMENTS = {casadi.OP_AND: 2, casadi.OP_OR: 2, casadi.OP_NOT: 1, casadi.OP_IF_ELSE_ZERO: 1, SELECT: 1}
+"""Operation -> number of its leading arguments that are booleans."""
 
 
 class Node(NamedTuple):
     """An operation of the algorithm.
 
     Attributes:
-        operation: CasADi's number of it, or `SELECT`.
-        arguments: Numbers of the nodes it takes; of an input its place.
-        value: Of a constant.
+        operation: CasADi's number of the operation, or `SELECT`.
+        arguments: Indices of the argument nodes; for an input, its place.
+        value: Value of a constant.
     """
 
     operation: int
@@ -107,23 +107,23 @@ class Text(NamedTuple):
     """A part of an expression in C.
 
     Attributes:
-        text: As it is written.
-        binds: How tightly.
+        text: The expression.
+        precedence: Precedence of the outermost operator.
     """
 
     text: str
-    binds: int = ATOM
+    precedence: int = ATOM
 
     def inside(self, loosest: int) -> str:
-        """In brackets, if it binds more loosely than this."""
-        return self.text if self.binds <= loosest else f"({self.text})"
+        """Print the expression, in brackets if it binds more loosely than `loosest`."""
+        return self.text if self.precedence <= loosest else f"({self.text})"
 
 
 def literal(value: float, precision: Precision) -> str:
-    """A constant in C that is read as exactly this number, or in single precision as the float nearest to it.
+    """Print a constant that C reads as exactly this number, or in single precision as the nearest float.
 
-    A number that is not zero stays one: what stands for "nearly zero" in double precision and would underflow becomes
-    the smallest normal number, and what would overflow the largest.
+    In single precision a number that would underflow becomes the smallest normal number, because it stands for "nearly
+    zero"; a number that would overflow becomes the largest.
     """
     if not math.isfinite(value):  # C's own are floats
         name = "NAN" if math.isnan(value) else "INFINITY"
@@ -139,14 +139,14 @@ def literal(value: float, precision: Precision) -> str:
 def body(
     function: casadi.Function, inputs: Sequence[str], outputs: Sequence[str], real: str, precision: Precision
 ) -> list[str]:
-    """The lines of a function in C.
+    """Print the body of a function.
 
     Args:
-        function: Of scalars, with scalar results.
-        inputs: What its arguments are called in C.
-        outputs: Where its results go in C. An output may take the place of an input.
-        real: The type's name.
-        precision: Of constants and functions.
+        function: A function of scalars, with scalar results.
+        inputs: Names of its arguments in C.
+        outputs: Places of its results in C. An output may have the place of an input.
+        real: Name of the floating-point type.
+        precision: Precision of constants and functions.
 
     Returns:
         Lines, not indented.
@@ -158,17 +158,17 @@ def body(
     for i, node in enumerate(nodes):
         if not uses[i]:
             continue
-        given: list[Text] = []
+        arguments: list[Text] = []
         if _is_operation(node):
-            asked = ASKED.get(node.operation, 0)
-            given = [texts[j] if k < asked else _number(nodes[j], texts[j], real) for k, j in enumerate(node.arguments)]
-        text = _text(node, given, inputs, precision)
-        named = _is_operation(node) and (
-            len(uses[i]) > 1 or any(user in NAMED_TWICE for user in uses[i]) or len(text.text) > WIDEST
+            n = BOOLEAN_ARGUMENTS.get(node.operation, 0)
+            arguments = [texts[j] if k < n else _number(nodes[j], texts[j], real) for k, j in enumerate(node.arguments)]
+        text = _text(node, arguments, inputs, precision)
+        is_variable = _is_operation(node) and (
+            len(uses[i]) > 1 or any(user in ARGUMENT_TWICE for user in uses[i]) or len(text.text) > WIDEST
         )
-        if named:
+        if is_variable:
             name = f"t{len(lines) + 1}"
-            lines.append(f"const {'int' if node.operation in TRUTHS else real} {name} = {text.text};")
+            lines.append(f"const {'int' if node.operation in BOOLEANS else real} {name} = {text.text};")
             text = Text(name)
         texts[i] = text
     reads = re.compile("|".join(re.escape(name) for name in inputs) or r"(?!)")
@@ -181,36 +181,36 @@ def body(
 
 
 def operations(function: casadi.Function) -> int:
-    """How many operations a function takes."""
+    """Count the operations of a function."""
     nodes, results = _algorithm(function)
     uses = _uses(nodes, results)
-    return sum(_is_operation(node) and bool(used) for node, used in zip(nodes, uses, strict=True))
+    return sum(_is_operation(node) and bool(users) for node, users in zip(nodes, uses, strict=True))
 
 
 def _algorithm(function: casadi.Function) -> tuple[list[Node], list[int]]:
-    """Every operation, in order, and which nodes are the results."""
+    """List the operations in order, and the indices of the results."""
     nodes: list[Node] = []
     results: dict[int, int] = {}
     at: dict[int, int] = {}  # place in CasADi's work vector -> node
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)
-        given, place = function.instruction_input(k), function.instruction_output(k)
+        inputs, place = function.instruction_input(k), function.instruction_output(k)
         if operation == casadi.OP_OUTPUT:
-            results[place[0]] = at[given[0]]
+            results[place[0]] = at[inputs[0]]
             continue
         if operation == casadi.OP_INPUT:
-            node = Node(operation, (given[0],))
+            node = Node(operation, (inputs[0],))
         elif operation == casadi.OP_CONST:
             node = Node(operation, (), function.instruction_constant(k))
         else:
-            node = _selected(nodes, Node(operation, tuple(at[i] for i in given)))
+            node = _as_select(nodes, Node(operation, tuple(at[i] for i in inputs)))
         at[place[0]] = len(nodes)
         nodes.append(node)
     return nodes, [results[i] for i in sorted(results)]
 
 
-def _selected(nodes: list[Node], node: Node) -> Node:
-    """(c ? a : 0) + (!c ? b : 0) as c ? a : b, which is the same number."""
+def _as_select(nodes: list[Node], node: Node) -> Node:
+    """Replace (c ? a : 0) + (!c ? b : 0) by c ? a : b, which is the same number."""
     if node.operation == casadi.OP_ADD:
         first, second = (nodes[i] for i in node.arguments)
         if first.operation == second.operation == casadi.OP_IF_ELSE_ZERO:
@@ -225,7 +225,7 @@ def _is_operation(node: Node) -> bool:
 
 
 def _uses(nodes: list[Node], results: list[int]) -> list[list[int]]:
-    """For every node the operations that use it, as far as anything depends on them."""
+    """List for each node the operations that use it, as far as a result depends on them."""
     uses: list[list[int]] = [[] for _ in nodes]
     for i in results:
         uses[i].append(casadi.OP_OUTPUT)
@@ -237,12 +237,12 @@ def _uses(nodes: list[Node], results: list[int]) -> list[list[int]]:
 
 
 def _number(node: Node, text: Text, real: str) -> Text:
-    """What may be a truth, as a number."""
-    return Text(f"({real}){text.inside(ATOM)}", UNARY) if node.operation in TRUTHS else text
+    """Convert a boolean to a number; leave a number as it is."""
+    return Text(f"({real}){text.inside(ATOM)}", UNARY) if node.operation in BOOLEANS else text
 
 
-def _text(node: Node, given: list[Text], inputs: Sequence[str], precision: Precision) -> Text:
-    """One operation on what is there."""
+def _text(node: Node, arguments: list[Text], inputs: Sequence[str], precision: Precision) -> Text:
+    """Print one operation on its arguments."""
     operation, suffix = node.operation, "" if precision == "double" else "f"
     if operation == casadi.OP_INPUT:
         return Text(inputs[node.arguments[0]])
@@ -250,15 +250,15 @@ def _text(node: Node, given: list[Text], inputs: Sequence[str], precision: Preci
         number = literal(node.value, precision)
         return Text(number, UNARY if number.startswith(("-", "(")) else ATOM)
     if operation in INFIX:
-        sign, binds = INFIX[operation]
-        left, right = given
-        tight = binds if binds in (PLUS, TIMES) else UNARY  # the rest is read more easily in brackets
-        return Text(f"{left.inside(tight)} {sign} {right.inside(min(tight, binds - 1))}", binds)
+        sign, precedence = INFIX[operation]
+        left, right = arguments
+        tight = precedence if precedence in (PLUS, TIMES) else UNARY  # the rest is read more easily in brackets
+        return Text(f"{left.inside(tight)} {sign} {right.inside(min(tight, precedence - 1))}", precedence)
     if operation in CALLS:
-        return Text(f"{CALLS[operation]}{suffix}({', '.join(x.text for x in given)})")
+        return Text(f"{CALLS[operation]}{suffix}({', '.join(x.text for x in arguments)})")
     if operation in TEMPLATES:
-        template, binds = TEMPLATES[operation]
-        tight = ATOM if binds == UNARY else UNARY if operation != SELECT else PLUS
-        parts = [x.inside(tight) for x in given]
-        return Text(template.format(*parts, zero=f"0.0{suffix}", one=f"1.0{suffix}"), binds)
+        template, precedence = TEMPLATES[operation]
+        tight = ATOM if precedence == UNARY else UNARY if operation != SELECT else PLUS
+        parts = [x.inside(tight) for x in arguments]
+        return Text(template.format(*parts, zero=f"0.0{suffix}", one=f"1.0{suffix}"), precedence)
     raise InputError(f"CasADi's operation {operation} is none that can be exported")

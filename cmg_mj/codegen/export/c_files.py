@@ -1,4 +1,4 @@
-"""The code of an export: NAME.h and NAME.c."""
+"""Prints the code of an export: NAME.h and NAME.c."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from functools import cached_property
 import casadi
 
 from cmg_mj.codegen.export.c_code import Precision, body, literal
-from cmg_mj.codegen.export.constants import Constants
-from cmg_mj.codegen.export.header_comment import about
-from cmg_mj.codegen.export.names import places_of
+from cmg_mj.codegen.export.constants import Constant, Constants
+from cmg_mj.codegen.export.header_comment import format_header_comment
+from cmg_mj.codegen.export.names import estimate_places
 from cmg_mj.codegen.export.trace import MEASURED, Traced
 from cmg_mj.controllers.controller import Controller
 
 WIDEST = 110
-"""Characters of a line."""
+"""Longest line [characters]."""
 
 TYPES = {"double": "double", "single": "float"}
 
 
 @dataclass(frozen=True)
-class Texts:
-    """The code of one controller's export.
+class CodePrinter:
+    """Prints the code of a controller.
 
     Attributes:
         controller: The controller.
-        traced: Its formulas.
-        constants: Its numbers.
-        precision: Of every number in C.
-        name: What everything in C begins with.
+        traced: The controller's formulas.
+        constants: The controller's constants.
+        precision: Precision of every number in C.
+        name: Prefix of everything in C.
     """
 
     controller: Controller
@@ -41,16 +41,16 @@ class Texts:
 
     @cached_property
     def places(self) -> list[str]:
-        """Of an estimate's parts."""
-        return places_of(self.controller.extra_signals[0])
+        """Names in C of an estimate's parts."""
+        return estimate_places(self.controller.extra_signals[0])
 
     def header(self) -> str:
-        """NAME.h."""
+        """Print NAME.h."""
         n, N, real = self.name, self.name.upper(), f"{self.name}_real"
         members = "".join(f"    {real} {member};\n" for member in self.traced.state or ("unused",))
         places = "".join(f"    {N}_{place},\n" for place in self.places)
         count = "    long updates; /* so far, while the integrator is trimmed */\n" if self.constants.trimmed else ""
-        return f"""{about(n, self.controller, self.precision)}
+        return f"""{format_header_comment(n, self.controller, self.precision)}
 #ifndef {N}_H
 #define {N}_H
 
@@ -85,16 +85,16 @@ extern "C" {{
  * encoders: the gimbals' angles [rad]
  * estimate: what the observer makes of it
  * u: gimbal rate to hold until the next update, each gimbal with its direction's sign [rad/s] */
-{self._declared("start")};
-{self._declared("update")};
+{self._declaration("start")};
+{self._declaration("update")};
 
 /* The observer alone: its state at the first sample, and a sample further.
  * y1: tilt [rad]
  * y2: gimbal angle [rad]
  * acceleration: of the tilt [rad/s^2]
  * u: gimbal rate held since the sample before [rad/s] */
-{self._declared("init")};
-{self._declared("step")};
+{self._declaration("init")};
+{self._declaration("step")};
 
 #ifdef __cplusplus
 }}
@@ -104,7 +104,7 @@ extern "C" {{
 """
 
     def source(self) -> str:
-        """NAME.c."""
+        """Print NAME.c."""
         n, real, traced = self.name, f"{self.name}_real", self.traced
         constants, measured = self.constants, list(MEASURED)
         raw = [f"accelerations[{i}]" for i in range(4)] + [f"encoders[{i}]" for i in range(constants.gimbals)]
@@ -124,33 +124,33 @@ extern "C" {{
 
 {self._numbers()}
 /* Tilt, gimbal angle and the tilt's acceleration from what the sensors show. */
-{self._declared("measure")}
+{self._declaration("measure")}
 {{
 {self._body(traced.measure, raw + _names(constants.of_measure), [f"*{name}" for name in measured])}}}
 
 /* u = -K_e [x1, x2, x3, x_e], limited; then a step of the integrator, unless it would wind up. */
-{self._declared("law")}
+{self._declaration("law")}
 {{
 {self._body(traced.law, ["x1", "x2", "x3", "*x_e", *_names(constants.of_law)], ["*u", "*x_e"])}}}
 
-{self._declared("init")}
+{self._declaration("init")}
 {{
     (void)state, (void)y1, (void)y2, (void)acceleration;
 {self._body(traced.init, measured, state)}}}
 
-{self._declared("step")}
+{self._declaration("step")}
 {{
     (void)state, (void)y1, (void)y2, (void)acceleration, (void)u;
 {self._body(traced.step, [*state, *measured, "u"], [*state, *estimate])}}}
 
-{self._declared("start")}
+{self._declaration("start")}
 {{
     controller->x_e = 0;
     controller->u = 0;
     controller->started = 0;
 {"    controller->updates = 0;" + chr(10) if constants.trimmed else ""}}}
 
-{self._declared("update")}
+{self._declaration("update")}
 {{
     {real} y1, y2, acceleration;
     measure(accelerations, encoders, &y1, &y2, &acceleration);
@@ -165,8 +165,8 @@ extern "C" {{
 }}
 """
 
-    def _declared(self, function: str) -> str:
-        """A function's name and parameters, on as many lines as they need."""
+    def _declaration(self, function: str) -> str:
+        """Print a function's name and parameters, on as many lines as they need."""
         n, N, real = self.name, self.name.upper(), f"{self.name}_real"
         controller, state, estimate = (
             f"{n}_controller *controller",
@@ -190,7 +190,7 @@ extern "C" {{
         return text if len(text) <= WIDEST else f"{head}(\n    {(',' + chr(10) + '    ').join(parameters)})"
 
     def _numbers(self) -> str:
-        """The constants, with what they are."""
+        """Print the constants with their meanings."""
         lines = [(f"{c.name} = {literal(c.value, self.precision)};", c.meaning) for c in self.constants.all]
         width = max(len(text) for text, _ in lines)
         return "".join(f"static const {self.name}_real {text:<{width}} /* {words} */\n" for text, words in lines)
@@ -200,5 +200,5 @@ extern "C" {{
         return "".join(f"    {line}\n" for line in lines)
 
 
-def _names(constants: Sequence) -> list[str]:
+def _names(constants: Sequence[Constant]) -> list[str]:
     return [constant.name for constant in constants]

@@ -1,4 +1,4 @@
-"""Words in C: which are taken, and how a name of Python's is spelled there."""
+"""Identifiers in C: reserved words, and the spelling of Python's names."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 import unicodedata
 from collections.abc import Collection, Sequence
 
-TAKEN = frozenset(
+RESERVED = frozenset(
     """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
@@ -33,18 +33,18 @@ TAKEN = frozenset(
 """Words of C, those of C23 and C++ that C99 has not (C++ may read the header), macros, functions of the library, its
 headers (whose files have these names already)."""
 
-SPELLED = {"ß": "ss", "ẞ": "SS"}
-"""What Unicode does not take apart, and its names do not say."""
+SPELLINGS = {"ß": "ss", "ẞ": "SS"}
+"""Spelling of letters that Unicode neither decomposes nor names usefully."""
 
 
-def spelled(text: str) -> str | None:
-    """A name of Python's in letters of C: `Größe` is Grosse, `ω_max` is omega_max.
+def spell_in_c(text: str) -> str | None:
+    """Spell a name of Python's in letters of C: `Größe` is Grosse, `ω_max` is omega_max.
 
     Args:
         text: The name.
 
     Returns:
-        The same where it is C already; None if it has a letter that is neither Latin nor Greek.
+        The name in letters of C; None if one of its letters is neither Latin nor Greek.
     """
     parts = [_letter(letter) for letter in unicodedata.normalize("NFKD", text)]
     return None if None in parts else "".join(part for part in parts if part)
@@ -55,26 +55,26 @@ def _letter(letter: str) -> str | None:
         return letter
     if unicodedata.combining(letter):
         return ""
-    if letter in SPELLED:
-        return SPELLED[letter]
-    found = re.fullmatch(
+    if letter in SPELLINGS:
+        return SPELLINGS[letter]
+    match = re.fullmatch(
         r"(?:GREEK|LATIN) (CAPITAL|SMALL) (?:LETTER|LIGATURE) (?:\w+ )*?(\w+)(?: WITH .*)?",
         unicodedata.name(letter, ""),
     )
-    if found is None:
+    if match is None:
         return None
-    size, name = found.groups()
+    size, name = match.groups()
     return name.lower() if size == "SMALL" else name.capitalize()
 
 
-def identifiers(paths: Sequence[tuple[str, ...]], taken: Collection[str] = ()) -> list[str]:
-    """Names in C, one a path, each once and none that is taken."""
+def identifiers(paths: Sequence[tuple[str, ...]], reserved: Collection[str] = ()) -> list[str]:
+    """Make a unique identifier for each path, none of them reserved."""
     names: list[str] = []
     for path in paths:
-        parts = [spelled(part) or "" for part in path]
+        parts = [spell_in_c(part) or "" for part in path]
         name = re.sub(r"[^A-Za-z0-9_]", "_", "_".join(part for part in parts if part)) or "value"
         name = name if name[0].isalpha() else f"s{name}"
-        name += "_" if name in TAKEN or name in taken else ""
-        several = itertools.chain([name], (f"{name}_{number}" for number in itertools.count(2)))
-        names.append(next(one for one in several if one not in names))
+        name += "_" if name in RESERVED or name in reserved else ""
+        candidates = itertools.chain([name], (f"{name}_{number}" for number in itertools.count(2)))
+        names.append(next(candidate for candidate in candidates if candidate not in names))
     return names

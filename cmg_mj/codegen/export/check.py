@@ -1,4 +1,4 @@
-"""Whether the traced formulas, and the C, do what Python does: on random signals."""
+"""Compares the traced formulas, and the C, with Python on random signals."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+import casadi
 import numpy as np
 
 from cmg_mj.codegen.export.c_code import Precision
@@ -23,22 +23,22 @@ from cmg_mj.errors import InputError, RunStopped
 TICKS = 400
 
 SHARE = {"double": 1e-9, "single": 1e-4}
-"""Of its largest value, by which a number may be off; besides what the observer makes of one rounding of its inputs."""
+"""Share of its largest value by which a number may be off, besides the effect of one rounding of the inputs."""
 
 ROUNDINGS = 4
-"""How many times that may be."""
+"""Multiple of the effect of one rounding by which a number may be off."""
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 GRAVITY = 9.81
 
 
 def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarray:
-    """What the sensors of a restless rig might show: the tilt swings, the gimbals wander, both with noise; then rest.
+    """Simulate sensors of a restless rig: the tilt swings, the gimbals wander, both with noise; then all rest.
 
     Args:
-        controller: Whose sensors.
-        seed: Of the random numbers; every other one swings little.
-        precision: The numbers are exact in it.
+        controller: The controller of the sensors.
+        seed: Seed of the random numbers; odd seeds swing little.
+        precision: Precision in which the numbers are exact.
 
     Returns:
         Raw accelerations [m/s^2] and encoders [rad], (TICKS, 4 + gimbals).
@@ -52,15 +52,15 @@ def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarr
     x, z = -GRAVITY * np.sin(tilt), GRAVITY * np.cos(tilt)
     forces = [part for r in (controller.tilt.r_inner, controller.tilt.r_outer) for part in (x + r * acceleration, z)]
     gimbal = 5.0 * size * np.sin(w[0] * t)
-    turned = zip(controller.gimbal_angle.directions, controller.gimbal_angle.zeros, strict=True)
-    encoders = [zero + direction * gimbal + 1e-3 * rng.normal(size=TICKS) for direction, zero in turned]
+    gimbals = zip(controller.gimbal_angle.directions, controller.gimbal_angle.zeros, strict=True)
+    encoders = [zero + direction * gimbal + 1e-3 * rng.normal(size=TICKS) for direction, zero in gimbals]
     samples = np.array([force + noise * rng.normal(size=TICKS) for force in forces] + encoders).T
     samples[-TICKS // 4 :] = samples[-TICKS // 4]  # equal readings, as a resolution makes them
     return samples.astype(np.float32).astype(float) if precision == "single" else samples
 
 
 def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
-    """The estimates and u of the controller itself, (n, 4 + extra signals)."""
+    """Compute the estimates and u by the controller, (n, 4 + extra signals)."""
     fresh = Controller(
         copy.deepcopy(controller.observer),
         controller.law,
@@ -77,19 +77,19 @@ def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
 
 
 def in_casadi(controller: Controller, traced: Traced, constants: Constants, samples: np.ndarray) -> np.ndarray:
-    """The same by the traced formulas, put together as in C."""
+    """Compute the estimates and u by the traced formulas, in the order of the C, (n, 4 + extra signals)."""
 
-    def values(function: Any, *arguments: float) -> list[float]:
+    def values(function: casadi.Function, *arguments: float) -> list[float]:
         return [float(value) for value in function.call(arguments)]
 
-    measured_with = [constant.value for constant in constants.of_measure]
-    law_of = [constant.value for constant in constants.of_law]
+    measure_constants = [constant.value for constant in constants.of_measure]
+    law_constants = [constant.value for constant in constants.of_law]
     width = 3 + len(controller.extra_signals[0])
     state: list[float] | None = None
     u = x_e = 0.0
     rows = []
     for k, row in enumerate(samples.tolist()):
-        y = values(traced.measure, *row, *measured_with)
+        y = values(traced.measure, *row, *measure_constants)
         if state is None:
             state = values(traced.init, *y)
             estimate = [y[0], 0.0, y[1], *[0.0] * (width - 3)]
@@ -99,25 +99,25 @@ def in_casadi(controller: Controller, traced: Traced, constants: Constants, samp
         if k < constants.trimmed:
             x_e = constants.trim_gain.value * estimate[constants.trim_part]
         x1, x3 = (y[0], y[1]) if controller.angle_source == "measured" else (estimate[0], estimate[2])
-        u, x_e = values(traced.law, x1, estimate[1], x3, x_e, *law_of)
+        u, x_e = values(traced.law, x1, estimate[1], x3, x_e, *law_constants)
         rows.append([*estimate, u])
     return np.array(rows)
 
 
 def columns(controller: Controller) -> list[str]:
-    """What is compared: the parts of an estimate, and u."""
+    """Name the compared columns: the parts of an estimate, and u."""
     return ["x1_rad", "x2_rad_s", "x3_rad", *controller.extra_signals[0], "u_rad_s"]
 
 
 def rounded(expected: np.ndarray, precision: Precision) -> np.ndarray:
-    """How far each column may be off by rounding, (4 + extra signals,)."""
+    """Return how far each column may be off by rounding, (4 + extra signals,)."""
     return SHARE[precision] * np.abs(expected).max(axis=0)
 
 
 def allowed(controller: Controller, samples: np.ndarray, expected: np.ndarray, precision: Precision) -> np.ndarray:
-    """How far each column may be off: by rounding, and by what the observer makes of it, (4 + extra signals,).
+    """Return how far each column may be off, by rounding and by its effect in the observer, (4 + extra signals,).
 
-    One that switches may make much of little: what a last digit of its inputs moves, rounding may move as well.
+    An observer that switches may amplify little to much: rounding may move whatever a last digit of the inputs moves.
     """
     kind = np.float32 if precision == "single" else np.float64
     near = samples.astype(kind)
@@ -130,10 +130,10 @@ def check_trace(controller: Controller, traced: Traced, constants: Constants, se
     """Compare the formulas with Python, in double precision.
 
     Returns:
-        The largest difference, in units of what is allowed.
+        The largest difference.
 
     Raises:
-        InputError: They differ by more.
+        InputError: The formulas and Python differ by more than is allowed.
     """
     largest = 0.0
     for seed in seeds:
@@ -157,43 +157,43 @@ def check_trace(controller: Controller, traced: Traced, constants: Constants, se
     return largest
 
 
-def compiler() -> list[str] | None:
-    """The C compiler that is there: CC, or else cc, gcc or clang."""
+def find_compiler() -> list[str] | None:
+    """Find a C compiler: CC, or else cc, gcc or clang."""
     try:
-        named = shlex.split(os.environ.get("CC", ""))
+        command = shlex.split(os.environ.get("CC", ""))
     except ValueError as error:
         raise InputError(f"CC = {os.environ['CC']!r}: {error}") from error
-    if named:
-        return named
-    return next(([found] for found in map(shutil.which, ("cc", "gcc", "clang")) if found), None)
+    if command:
+        return command
+    return next(([path] for path in map(shutil.which, ("cc", "gcc", "clang")) if path), None)
 
 
-def check_c(folder: Path, name: str, compile_with: Sequence[str]) -> dict[str, float]:
+def check_c(folder: Path, name: str, compiler: Sequence[str]) -> dict[str, float]:
     """Compile an export's example, which compares the C with the test vector, and run it.
 
     Args:
-        folder: Where the files are.
-        name: What they begin with.
-        compile_with: The compiler.
+        folder: Folder of the files.
+        name: Prefix of the files.
+        compiler: Command of the compiler.
 
     Returns:
-        For each part of an estimate and u by how much it is off at most.
+        Part of an estimate, or u -> its largest difference.
 
     Raises:
-        InputError: It does not compile, or it is not what Python says.
+        InputError: The example does not compile, or the C differs from Python.
     """
     program = folder / f"{name}_example"
     sources = [str(folder / f"{name}.c"), str(folder / f"{name}_example.c")]
-    said = _run([*compile_with, *FLAGS, *sources, "-o", str(program), "-lm"], "the C compiler")
-    if said.returncode:
+    process = _run([*compiler, *FLAGS, *sources, "-o", str(program), "-lm"], "the C compiler")
+    if process.returncode:
         hint = " (CC must name a compiler for this machine)" if os.environ.get("CC") else ""
-        raise InputError(f"the C does not compile with {shlex.join(compile_with)}{hint}: {_first_line(said.stderr)}")
-    said = _run([str(program)], "the compiled example")
+        raise InputError(f"the C does not compile with {shlex.join(compiler)}{hint}: {_first_line(process.stderr)}")
+    process = _run([str(program)], "the compiled example")
     program.unlink()
-    if said.returncode:
-        raise InputError(f"the C is not what Python runs: {'; '.join(said.stdout.splitlines())}")
-    found = re.findall(r"^(\w+): off by at most (\S+),", said.stdout, re.MULTILINE)
-    return {part: float(off) for part, off in found}
+    if process.returncode:
+        raise InputError(f"the C is not what Python runs: {'; '.join(process.stdout.splitlines())}")
+    differences = re.findall(r"^(\w+): off by at most (\S+),", process.stdout, re.MULTILINE)
+    return {part: float(off) for part, off in differences}
 
 
 def _run(command: Sequence[str], what: str) -> subprocess.CompletedProcess[str]:

@@ -1,4 +1,4 @@
-"""The numbers of a controller beside its observer: with names, units and words, and open to change in the C."""
+"""The constants of a controller's C: names, values and units of what the measurement, the law and the trim take."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cmg_mj.controllers.laws import StateFeedback
 
 
 class Constant(NamedTuple):
-    """A number of the controller."""
+    """A constant in the C."""
 
     name: str
     value: float
@@ -17,15 +17,15 @@ class Constant(NamedTuple):
 
 
 class Constants(NamedTuple):
-    """The numbers that the measurement, the law and the trim take.
+    """The constants that the measurement, the law and the trim take.
 
     Attributes:
         of_measure: Radii, then the gimbals' directions, then their zeros.
         of_law: The period, the gains, the limit.
-        trimmed: For how many updates the integrator is trimmed.
-        trim_gain: See `integrator_trim`.
-        trim_part: Which part of the estimate it is trimmed with.
-        gimbals: How many there are.
+        trimmed: Number of updates during which the integrator is trimmed.
+        trim_gain: Gain of the trim; see `integrator_trim`.
+        trim_part: Index of the part of the estimate that trims the integrator.
+        gimbals: Number of gimbals.
     """
 
     of_measure: list[Constant]
@@ -37,12 +37,12 @@ class Constants(NamedTuple):
 
     @property
     def all(self) -> list[Constant]:
-        """All that stand in the C."""
+        """The constants at the top of the C file."""
         return [*self.of_measure, *self.of_law, *([self.trim_gain] if self.trimmed else [])]
 
 
 def constants_of(controller: Controller) -> Constants:
-    """The numbers of a controller."""
+    """Collect the constants of a controller."""
     tilt, law = controller.tilt, cast("StateFeedback", controller.law)
     k1, k2, k3, k4 = law.gains
     gimbals = controller.gimbal_angle

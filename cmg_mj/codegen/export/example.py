@@ -1,4 +1,4 @@
-"""The files beside an export's code: a test vector, and an example that runs it."""
+"""Prints the files beside an export's code: a test vector, and an example that runs it."""
 
 from __future__ import annotations
 
@@ -9,15 +9,17 @@ from cmg_mj.codegen.export.c_code import Precision, literal
 Table = Sequence[Sequence[float]]
 
 
-def vector(name: str, precision: Precision, inputs: Table, expected: Table, allowed: Sequence[float]) -> str:
-    """NAME_test_vector.h.
+def format_test_vector(
+    name: str, precision: Precision, inputs: Table, expected: Table, allowed: Sequence[float]
+) -> str:
+    """Format NAME_test_vector.h.
 
     Args:
-        name: Of the export.
-        precision: Of its numbers.
-        inputs: Raw accelerations and encoders, a row an update.
-        expected: What Python makes of them: the estimate and u.
-        allowed: How far each of these may be off.
+        name: Name of the export.
+        precision: Precision of its numbers.
+        inputs: Raw accelerations and encoders, a row for each update.
+        expected: The estimate and u by Python, a row for each update.
+        allowed: The allowed difference of each column of `expected`.
 
     Returns:
         The text.
@@ -46,12 +48,12 @@ static const {real} {n}_allowed[{N}_ESTIMATES + 1] = {_row(allowed, precision)};
 """
 
 
-def example(name: str, parts: Sequence[str]) -> str:
-    """NAME_example.c.
+def format_example(name: str, parts: Sequence[str]) -> str:
+    """Format NAME_example.c.
 
     Args:
-        name: Of the export.
-        parts: What is compared: the parts of an estimate, and u.
+        name: Name of the export.
+        parts: Names of the compared columns: the parts of an estimate, and u.
 
     Returns:
         The text.

@@ -1,4 +1,4 @@
-"""The comment at the top of an export: what it is, and what it was made with."""
+"""Formats the comment at the top of an export: the controller and its parameters."""
 
 from __future__ import annotations
 
@@ -7,31 +7,35 @@ import inspect
 import re
 import textwrap
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING
 
 from cmg_mj.codegen.export.c_code import Precision
 from cmg_mj.controllers.controller import Controller
+from cmg_mj.observers.protocol import Observer
 from cmg_mj.observers.registry import BENCH_PARAMETERS
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 WIDTH = 110
-"""Of its lines."""
+"""Longest line of the comment [characters]."""
 
 
-def about(name: str, controller: Controller, precision: Precision) -> str:
-    """The comment.
+def format_header_comment(name: str, controller: Controller, precision: Precision) -> str:
+    """Describe an export in a comment of its header.
 
     Args:
-        name: Of the export.
-        controller: What is exported.
-        precision: Of its numbers.
+        name: Name of the export.
+        controller: The exported controller.
+        precision: Precision of its numbers.
 
     Returns:
-        A comment in C, whatever stands in a user's docstring.
+        A valid comment in C, whatever a user's docstring contains.
     """
     observer = controller.observer
     cls = type(observer)
     first = (inspect.getdoc(cls) or "").split("\n\n")[0]
-    own = [parameter for parameter in inspect.signature(cls).parameters if parameter not in BENCH_PARAMETERS]
+    parameters = [parameter for parameter in inspect.signature(cls).parameters if parameter not in BENCH_PARAMETERS]
     lines = [
         f"{name}: observer and control law, {precision} precision; by cmg_mj {version('cmg_mj')}.",
         "",
@@ -39,34 +43,34 @@ def about(name: str, controller: Controller, precision: Precision) -> str:
         *textwrap.wrap(first, WIDTH),
         "",
         f"Made for a period of {controller.law.dt:g} s with these parameters of the observer:",
-        *(f"    {line}" for line in settings_of(observer, own) or ["none"]),
+        *(f"    {line}" for line in describe_parameters(observer, parameters) or ["none"]),
     ]
-    for given, words in (("model", "this reduced model of the rig"), ("noise", "this noise of the measurement")):
-        value = getattr(observer, given, None)
-        if dataclasses.is_dataclass(value):
-            named = [field.name for field in dataclasses.fields(value)]
-            lines += [f"and {words}:", *(f"    {line}" for line in settings_of(value, named))]
+    for attribute, words in (("model", "this reduced model of the rig"), ("noise", "this noise of the measurement")):
+        value = getattr(observer, attribute, None)
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            fields = [field.name for field in dataclasses.fields(value)]
+            lines += [f"and {words}:", *(f"    {line}" for line in describe_parameters(value, fields))]
     lines += ["What belongs to the law and the sensors stands at the top of the .c file."]
     return "/* " + "\n".join(f" * {_harmless(line)}".rstrip() for line in lines)[3:] + "\n */"
 
 
 def _harmless(line: str) -> str:
-    """Without what would end a comment, begin another, or join lines."""
+    """Remove whatever would end a comment, begin another, or join lines."""
     return line.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").rstrip("\\")
 
 
-def settings_of(thing: Any, names: list[str]) -> list[str]:
-    """What a value was made with, as in `tau = 0.02  Time constant [s]`, an entry each.
+def describe_parameters(instance: Observer | DataclassInstance, names: list[str]) -> list[str]:
+    """Describe the parameters of an object, as in `tau = 0.02  Time constant [s]`.
 
     Args:
-        thing: A value whose docstring has a part "Attributes:".
-        names: Of its constructor's parameters.
+        instance: An object whose docstring has a section "Attributes:".
+        names: Parameters of its constructor.
 
     Returns:
-        Lines.
+        Lines, one or more for each parameter.
     """
-    values = {name: getattr(thing, name) for name in names if hasattr(thing, name)}
-    words = _attributes(type(thing).__doc__ or "")
+    values = {name: getattr(instance, name) for name in names if hasattr(instance, name)}
+    words = _attributes(type(instance).__doc__ or "")
     width = max((len(f"{name} = {value!r}") for name, value in values.items()), default=0)
     lines = []
     for name, value in values.items():
@@ -76,7 +80,7 @@ def settings_of(thing: Any, names: list[str]) -> list[str]:
 
 
 def _attributes(docstring: str) -> dict[str, str]:
-    """Name -> words, of the part "Attributes:" of a docstring."""
+    """Read the section "Attributes:" of a docstring: name -> description."""
     _, _, part = inspect.cleandoc(docstring).partition("Attributes:\n")
     block = re.split(r"\n(?=\S)", part)[0]
     entries = re.findall(r"^    (\w+)[^:\n]*: (.*(?:\n        .*)*)", block, re.MULTILINE)

@@ -1,4 +1,4 @@
-"""An export: traced, compared, printed, compared, written."""
+"""Generates a controller's C: traces the formulas, compares them with Python, prints them, compares the C."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import copy
 import shlex
 import tempfile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypedDict
 
 from cmg_mj.codegen.export import check
 from cmg_mj.codegen.export.c_code import Precision, operations
-from cmg_mj.codegen.export.c_files import Texts
+from cmg_mj.codegen.export.c_files import CodePrinter
 from cmg_mj.codegen.export.constants import constants_of
-from cmg_mj.codegen.export.example import example, vector
-from cmg_mj.codegen.export.names import files_of, name_of
+from cmg_mj.codegen.export.example import format_example, format_test_vector
+from cmg_mj.codegen.export.names import export_files, name_of
 from cmg_mj.codegen.export.trace import trace
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.dry_run import dry_run_observer
@@ -22,32 +22,34 @@ from cmg_mj.errors import InputError, raised
 from cmg_mj.results.run_folder.folder import write_text
 
 
+class Figures(TypedDict):
+    """The sizes of an export and its differences from Python, as `--json` prints them."""
+
+    observer: str
+    precision: Precision
+    files: list[str]
+    numbers_in_state: int
+    operations: dict[str, int]
+    trace_off_by: float
+    compiler: str | None
+    c_off_by: dict[str, float] | None
+    beyond_rounding: list[str]
+
+
 class Code(NamedTuple):
     """A controller as C, compared with Python.
 
     Attributes:
         files: Name -> text.
-        figures: What it is and how it was compared, as JSON can hold it.
+        figures: The figures of the export.
     """
 
     files: dict[str, str]
-    figures: dict[str, Any]
+    figures: Figures
 
 
-def code(controller: Controller, precision: Precision, name: str | None = None) -> Code:
-    """Make a controller's C, and compare it with Python.
-
-    Args:
-        controller: The controller.
-        precision: Of every number in C.
-        name: What it is to be called in C.
-
-    Returns:
-        The code.
-
-    Raises:
-        InputError: It cannot be exported, or C is not what Python runs.
-    """
+def generate_code(controller: Controller, precision: Precision, name: str | None = None) -> Code:
+    """Generate a controller's C and compare it with Python; see `export`."""
     if type(controller.law) is not StateFeedback:
         raise InputError(
             f"law {type(controller.law).__name__}: cannot be exported: C has the law (8) alone; set "
@@ -55,48 +57,48 @@ def code(controller: Controller, precision: Precision, name: str | None = None) 
         )
     cls = type(controller.observer)
     try:
-        return _code(controller, precision, name_of(controller.observer, name))
+        return _generate(controller, precision, name_of(controller.observer, name))
     except InputError as error:
         raise InputError(f"{cls.__module__}:{cls.__qualname__} cannot be exported: {error}") from error
 
 
-def _code(controller: Controller, precision: Precision, name: str) -> Code:
+def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     if controller.feedback != "observer":
         raise InputError(
             f"controller.feedback = {controller.feedback!r}: what is exported has the observer's rate alone; set "
             "controller.feedback=observer"
         )
     try:
-        tried, traced_one = copy.deepcopy(controller.observer), copy.deepcopy(controller.observer)
+        for_dry_run, for_trace = copy.deepcopy(controller.observer), copy.deepcopy(controller.observer)
     except Exception as error:  # a user's observer may hold anything
         raise InputError(f"it cannot be copied: {raised(error)}") from error
-    dry_run_observer(tried, None)
+    dry_run_observer(for_dry_run, None)
     constants = constants_of(controller)
-    traced = trace(traced_one, constants)
+    traced = trace(for_trace, constants)
     off = check.check_trace(controller, traced, constants, seeds=(1, 2, 3))
 
-    texts = Texts(controller, traced, constants, precision, name)
+    printer = CodePrinter(controller, traced, constants, precision, name)
     samples = check.signals(controller, 0, precision)
     expected = check.in_python(controller, samples)
     allowed = check.allowed(controller, samples, expected, precision)
-    beside = (
-        example(name, check.columns(controller)),
-        vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
+    other_files = (
+        format_example(name, check.columns(controller)),
+        format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
     )
-    files = dict(zip(files_of(name), (texts.header(), texts.source(), *beside), strict=True))
-    compile_with = check.compiler()
-    figures = {
+    files = dict(zip(export_files(name), (printer.header(), printer.source(), *other_files), strict=True))
+    compiler = check.find_compiler()
+    figures: Figures = {
         "observer": name,
         "precision": precision,
         "files": list(files),
         "numbers_in_state": len(traced.state),
         "operations": {part: operations(getattr(traced, part)) for part in ("measure", "step", "law")},
         "trace_off_by": off,
-        "compiler": None if compile_with is None else shlex.join(compile_with),
+        "compiler": None if compiler is None else shlex.join(compiler),
         "c_off_by": None,
         "beyond_rounding": [],
     }
-    if compile_with is not None:
+    if compiler is not None:
         with tempfile.TemporaryDirectory() as temporary:
             folder = Path(temporary)
             try:
@@ -104,7 +106,27 @@ def _code(controller: Controller, precision: Precision, name: str) -> Code:
                     write_text(folder / file, text)
             except OSError as error:
                 raise InputError(f"temporary folder {folder}: cannot be written: {error.strerror}") from error
-            off_by = figures["c_off_by"] = check.check_c(folder, name, compile_with)
+            off_by = figures["c_off_by"] = check.check_c(folder, name, compiler)
         bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
     return Code(files, figures)
+
+
+def export_table(figures: Figures) -> str:
+    """Print the figures of an export as text."""
+    operations = figures["operations"]
+    lines = [
+        f"{figures['observer']}, {figures['precision']} precision",
+        f"  numbers in the observer's state   {figures['numbers_in_state']}",
+        f"  operations an update              {sum(operations.values())}, of them the observer {operations['step']}",
+        f"  formulas, off from Python by      {_difference(figures['trace_off_by'])}",
+    ]
+    if figures["c_off_by"] is not None:
+        lines.append(f"  C, off from Python, by {figures['compiler']}:")
+        width = max(map(len, figures["c_off_by"]))
+        lines += [f"    {name:<{width}}  {_difference(off)}" for name, off in figures["c_off_by"].items()]
+    return "\n".join(lines)
+
+
+def _difference(size: float) -> str:
+    return f"{size:.2g}" if size else "0 (bit for bit)"

@@ -1,4 +1,4 @@
-"""What cannot be exported, and where in the user's code it stands."""
+"""Locates in the user's code what cannot be exported."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ _LIBRARY_PATHS = (
 
 
 class NotExportable(InputError):
-    """Something that has no place in a formula."""
+    """An operation that no formula can express."""
 
 
 def here() -> str:
-    """The line that is at work now, the first one below what traces it: `(own.py, line 12: if y1 > 0.1:)`."""
+    """Locate the running line, the innermost one outside this package: `(own.py, line 12: if y1 > 0.1:)`."""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None and frame.f_code.co_filename.startswith(_LIBRARY_PATHS):
         frame = frame.f_back
-    return "" if frame is None else _shown(frame.f_code.co_filename, frame.f_lineno)
+    return "" if frame is None else _format_line(frame.f_code.co_filename, frame.f_lineno)
 
 
 def raised_at(traceback: TracebackType | None) -> str:
-    """The innermost line of the user's that an exception came from."""
+    """Locate the innermost line of the user's code that an exception came from."""
     place = ""
     while traceback is not None:
         file = traceback.tb_frame.f_code.co_filename
         if not file.startswith(_LIBRARY_PATHS):
-            place = _shown(file, traceback.tb_lineno)
+            place = _format_line(file, traceback.tb_lineno)
         traceback = traceback.tb_next
     return place
 
 
-def _shown(file: str, line: int) -> str:
+def _format_line(file: str, line: int) -> str:
     text = linecache.getline(file, line).strip()
     near = os.path.relpath(file)
     name = near if len(near) < len(file) else file

@@ -1,15 +1,16 @@
-"""A number that is not known yet: what an observer's code does with it is written down, as CasADi's graph.
+"""A symbolic number, which records the operations of an observer's code as CasADi's graph.
 
 NumPy hands its operators and functions over to a class with `__array_ufunc__` (NEP 13) and `__array_function__`
-(NEP 18). So code that is written for arrays, as `elementwise` is in its second branch, takes a symbol as it is. What
-has no place in a formula, such as `if y1 > 0.1:` or `math.sin(y1)`, asks the symbol for its value and is refused with
-its place in the user's file.
+(NEP 18). Code written for arrays, such as the second branch of `elementwise`, therefore takes symbols unchanged. Code
+that no formula can express, such as `if y1 > 0.1:` or `math.sin(y1)`, asks the symbol for its value. The symbol then
+raises `NotExportable` with the line of the user's file.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeAlias
 
 import casadi
 import numpy as np
@@ -17,6 +18,8 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from cmg_mj.codegen.export.source_location import NotExportable, here
 from cmg_mj.elementwise import Symbolic
+
+Operand: TypeAlias = "Symbol | float | np.generic | np.ndarray"
 
 OPERATIONS: dict[np.ufunc, int] = {
     np.add: casadi.OP_ADD,
@@ -64,15 +67,15 @@ OPERATIONS: dict[np.ufunc, int] = {
 }
 """NumPy's function -> CasADi's operation."""
 
-TURNED = {np.greater: np.less, np.greater_equal: np.less_equal}
-"""NumPy's function -> the same with its arguments exchanged."""
+EXCHANGED = {np.greater: np.less, np.greater_equal: np.less_equal}
+"""NumPy's function -> the function with the same result for exchanged arguments."""
 
 
 class Symbol(Symbolic, NDArrayOperatorsMixin):
-    """A number that is not known yet.
+    """A symbolic number.
 
     Attributes:
-        sx: CasADi's expression for it.
+        sx: CasADi's expression of the number.
     """
 
     __slots__ = ("sx",)
@@ -83,14 +86,20 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
     def __repr__(self) -> str:
         return f"Symbol({self.sx})"
 
-    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Operand, **kwargs: Operand) -> Operand:
         if method != "__call__" or kwargs:
             raise NotExportable(f"numpy.{ufunc.__name__} with {', '.join(kwargs) or method} {here()}")
         if any(isinstance(x, np.ndarray) and x.ndim for x in inputs):
             return np.frompyfunc(partial(_apply, ufunc), ufunc.nin, 1)(*map(_boxed, inputs))
         return _apply(ufunc, *inputs)
 
-    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+    def __array_function__(
+        self,
+        function: Callable[..., Operand],
+        types: Collection[type],
+        args: tuple[Any, ...],
+        kwargs: Mapping[str, Operand],
+    ) -> Operand:
         if function is np.where and len(args) == 3 and not kwargs:
             return _where(*args)
         if function is np.clip and len(args) == 3 and not kwargs:
@@ -103,7 +112,7 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
             "(where, clip, sign), or numpy.where"
         )
 
-    def _number(self, *_: Any) -> NoReturn:
+    def _number(self, *_: int | None) -> NoReturn:
         raise NotExportable(
             f"a plain number is asked for {here()}, as by float(), int(), round() or a function of math; use "
             "cmg_mj.elementwise, or numpy's functions"
@@ -111,7 +120,7 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
 
     __float__ = __int__ = __index__ = __complex__ = __round__ = _number
 
-    # What NumPy calls on every element of an array of objects.
+    # NumPy calls these on every element of an object array.
     def sin(self) -> Symbol:
         """Sine."""
         return np.sin(self)  # pyright: ignore
@@ -129,11 +138,11 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
         return np.exp(self)  # pyright: ignore
 
 
-def expression(x: Any) -> casadi.SX:
-    """CasADi's expression of a symbol or of a plain number.
+def expression(x: Operand | Symbolic) -> casadi.SX:
+    """Convert a symbol or a plain number to CasADi's expression.
 
     Raises:
-        NotExportable: It is neither.
+        NotExportable: The operand is neither.
     """
     if isinstance(x, np.ndarray) and x.ndim == 0:
         x = x[()]
@@ -144,8 +153,8 @@ def expression(x: Any) -> casadi.SX:
     raise NotExportable(f"{type(x).__name__} where a real number belongs {here()}")
 
 
-def _boxed(x: Any) -> Any:
-    """A symbol as an array of objects, which does not hand over again."""
+def _boxed(x: Operand) -> Operand:
+    """Wrap a symbol in an object array, which does not hand over again."""
     if not isinstance(x, Symbol):
         return x
     box = np.empty((), dtype=object)
@@ -153,9 +162,9 @@ def _boxed(x: Any) -> Any:
     return box
 
 
-def _apply(ufunc: np.ufunc, *inputs: Any) -> Symbol:
-    if ufunc in TURNED:
-        return _apply(TURNED[ufunc], *reversed(inputs))
+def _apply(ufunc: np.ufunc, *inputs: Operand) -> Symbol:
+    if ufunc in EXCHANGED:
+        return _apply(EXCHANGED[ufunc], *reversed(inputs))
     if ufunc is np.square:
         return _apply(np.multiply, *inputs, *inputs)
     if ufunc is np.positive:
@@ -164,15 +173,15 @@ def _apply(ufunc: np.ufunc, *inputs: Any) -> Symbol:
     if operation is None:
         raise NotExportable(f"numpy.{ufunc.__name__} {here()}: it is not among the functions that can be exported")
     if ufunc in (np.maximum, np.minimum) and not isinstance(inputs[0], Symbol):
-        inputs = inputs[::-1]  # what may be NaN comes first: see `c_code`
+        inputs = inputs[::-1]  # the operand that may be NaN comes first: see `c_code`
     make = casadi.SX.unary if len(inputs) == 1 else casadi.SX.binary
     return Symbol(make(operation, *map(expression, inputs)))
 
 
-def _where(condition: Any, a: Any, b: Any) -> Any:
+def _where(condition: Operand, a: Operand, b: Operand) -> Operand:
     if any(isinstance(x, np.ndarray) and x.ndim for x in (condition, a, b)):
         return np.frompyfunc(_where, 3, 1)(*map(_boxed, (condition, a, b)))
-    condition, a, b = map(expression, (condition, a, b))
-    first = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, condition, a)
-    second = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, casadi.SX.unary(casadi.OP_NOT, condition), b)
+    test, yes, no = map(expression, (condition, a, b))
+    first = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, test, yes)
+    second = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, casadi.SX.unary(casadi.OP_NOT, test), no)
     return Symbol(casadi.SX.binary(casadi.OP_ADD, first, second))

@@ -1,1 +1,1 @@
-"""Draws figures with matplotlib, which only `run_plot.py` imports."""
+"""Draws figures with matplotlib, which only this package imports, and only to draw."""

@@ -1,9 +1,8 @@
-"""Which colour an observer has: the same in recordings, in plots of a run and in plots of a comparison.
+"""Colours of observers and baselines: the same in recordings, in plots of a run and in plots of a comparison.
 
-`colour("ltv")` is (69, 148, 253), and `hexadecimal(colour("ltv"))` is what matplotlib takes. Names are those of the
-observers; `true`, `gyro` and the baselines of tables (`cmg_mj/results/baselines.py`) are what they are compared
-with. All can be seen on the viewer's dark ground and on white paper, and told apart with each kind of colour blindness:
-a test says how well.
+`colour("ltv")` is (69, 148, 253); matplotlib takes `hexadecimal(colour("ltv"))`. The names are those of observers, of
+the signals `true` and `gyro`, and of the baselines of tables (`cmg_mj/results/baselines.py`). Every colour stands out
+on the viewer's dark ground and on white paper. A test measures how well each kind of colour blindness separates them.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ COLOURS: dict[str, Colour] = {
     "adaptive": (243, 54, 196),
     "homogeneous_adaptive": (231, 180, 33),
 }
-"""The bundled observers. Those that are often among the best are no shades of one colour."""
+"""The bundled observers. Observers that are often among the best are no shades of one colour."""
 
 BASELINE_COLOURS: dict[str, Colour] = {
     "true": (165, 165, 165),
@@ -37,17 +36,17 @@ BASELINE_COLOURS: dict[str, Colour] = {
     "floor_y1": (133, 179, 209),
     "floor_accel": (143, 83, 167),
 }
-"""What observers are compared with."""
+"""The signals that observers are compared with."""
 
 USER_COLOURS: tuple[Colour, ...] = ((96, 84, 120), (51, 213, 119), (219, 6, 76), (216, 77, 151))
-"""Observers that are not bundled: the name decides which."""
+"""Observers of users: the name decides which."""
 
 
 def colour(name: str) -> Colour:
-    """The colour of one observer.
+    """Return the colour of one observer.
 
     Args:
-        name: A bundled observer, a user's own by its dotted path, or one of `BASELINE_COLOURS`.
+        name: A bundled observer, a user's observer by its dotted path, or one of `BASELINE_COLOURS`.
 
     Returns:
         Red, green, blue, 0 to 255; for the same name always the same.
@@ -56,23 +55,23 @@ def colour(name: str) -> Colour:
 
 
 def colours(names: Iterable[str]) -> dict[str, Colour]:
-    """The colours of observers that are shown together.
+    """Choose the colours of observers that one figure shows.
 
     Args:
         names: The observers.
 
     Returns:
-        Name -> colour, in the order given: `colour(name)`, unless a user's own that comes before has that one.
+        Name -> colour, in the order of `names`: `colour(name)`, unless an earlier user's observer has that colour.
     """
     known = COLOURS | BASELINE_COLOURS
-    found: dict[str, Colour] = {}
+    palette: dict[str, Colour] = {}
     for name in names:
         first = zlib.crc32(name.encode()) % len(USER_COLOURS)
-        own = [*USER_COLOURS[first:], *USER_COLOURS[:first]]
-        found.setdefault(name, known.get(name) or next((c for c in own if c not in found.values()), own[0]))
-    return found
+        choices = [*USER_COLOURS[first:], *USER_COLOURS[:first]]
+        palette.setdefault(name, known.get(name) or next((c for c in choices if c not in palette.values()), choices[0]))
+    return palette
 
 
 def hexadecimal(rgb: Colour) -> str:
-    """A colour as `#rrggbb`."""
+    """Write a colour as `#rrggbb`."""
     return "#{:02x}{:02x}{:02x}".format(*rgb)

@@ -1,4 +1,4 @@
-"""A plot as data: what is drawn, with units and names. `plots.py` draws it."""
+"""A figure as data: curves, maps, units and names. `run_plot.draw` draws it."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ class Line:
     Attributes:
         x: Abscissae, (n,).
         y: Ordinates, (n,).
-        label: Its name in the legend; empty for none.
-        style: As matplotlib writes it: `-`, `--`, `.`, `o-`.
-        color: An observer, for the colour that it has everywhere; or the number of a colour of the cycle; None for the
-            next.
+        label: Name in the legend; empty for none.
+        style: Matplotlib's format: `-`, `--`, `.`, `o-`.
+        color: An observer, for its colour in every figure; the number of a colour of the cycle; None for the next one.
         width: Line width [points].
-        spread: Half height of a band around y, (n,), such as a confidence interval's; or its heights below and above y,
+        spread: Half height of a band around y, (n,), such as a confidence interval; or the heights below and above y,
             (2, n).
-        bars: Whether it is drawn as bars instead.
+        bars: Whether vertical bars replace the band.
     """
 
     x: Sequence[float] | np.ndarray
@@ -38,19 +37,19 @@ class Line:
 
 @dataclass(frozen=True)
 class Map:
-    """Which of several is the best, over two quantities.
+    """The best of several candidates, over two quantities.
 
     Attributes:
-        x: Where the cells are, (n_x,), rising.
-        y: The same upward, (n_y,).
-        names: Who might be the best, for the colours.
-        best: The place in `names` of each cell's best, (n_y, n_x); negative for none.
-        sure: Where it is the best beyond chance, (n_y, n_x); elsewhere the cell has a dot.
-        values: The best's, of which contours are drawn, (n_y, n_x); NaN where there is none.
-        levels: Of the contours.
-        boundaries: Name -> what has crossed half beyond a boundary that is drawn, (n_y, n_x).
-        nobody: What a cell without a best is called.
-        boundary: What the boundaries are called.
+        x: Centres of the cells to the right, (n_x,), rising.
+        y: Centres of the cells upward, (n_y,), rising.
+        names: The candidates, for the colours.
+        best: Index in `names` of each cell's best, (n_y, n_x); negative for none.
+        sure: Whether a cell's best is the best beyond chance, (n_y, n_x); the other cells have a dot.
+        values: Value of each cell's best, for contours, (n_y, n_x); NaN where a cell has no best.
+        levels: Levels of the contours.
+        boundaries: Name -> a share, (n_y, n_x); a boundary is drawn where the share crosses one half.
+        nobody: Name of a cell without a best in the legend.
+        boundary: Name of the boundaries in the legend.
     """
 
     x: np.ndarray
@@ -70,17 +69,17 @@ class Panel:
     """One set of axes.
 
     Attributes:
-        y_label: What is drawn upward, with its unit.
-        lines: What is drawn.
-        title: Above the panel, such as `(a) conventional`.
-        x_label: What is drawn to the right, with its unit; the lowest panel's counts for all with the same x.
+        y_label: The ordinate, with its unit.
+        lines: The curves.
+        title: Title above the panel, such as `(a) conventional`.
+        x_label: The abscissa, with its unit; of panels that share x, only the lowest one's is shown.
         x_scale: Linear or logarithmic.
         y_scale: Linear or logarithmic.
-        y_range: Limits; None for what the data need.
+        y_range: Limits of y; None to fit the data.
         shaded: Spans of x to shade, such as pushes.
-        x_ticks: Where to mark x; None for matplotlib's choice.
-        y_ticks: The same of y.
-        map: What is drawn instead of lines.
+        x_ticks: Ticks on x; None for matplotlib's choice.
+        y_ticks: Ticks on y; None for matplotlib's choice.
+        map: A map to draw instead of lines.
     """
 
     y_label: str
@@ -101,12 +100,12 @@ class Picture:
     """Panels one below the other.
 
     Attributes:
-        name: Of the file, without its ending.
-        title: Above all, with the paper's figure number.
-        panels: From top to bottom.
+        name: Name of the file, without its ending.
+        title: Title of the figure, with the paper's figure number.
+        panels: The panels, from top to bottom.
         share_x: Whether all panels have the same abscissa.
-        columns: Panels beside each other.
-        panel_height: Of each [inch].
+        columns: Number of panels beside each other.
+        panel_height: Height of each panel [inch].
     """
 
     name: str

@@ -1,27 +1,31 @@
-"""What keeps a picture of many lines legible: the best few of them, on an axis that those fill."""
+"""Chooses what keeps a figure of many lines legible: the best few lines, the range of an axis, the legend's corner."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
-from typing import Any, Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from cmg_mj.visualization.plots.colours import BASELINE_COLOURS
 
+SummaryValue: TypeAlias = "float | str | Sequence[SummaryValue] | Mapping[str, SummaryValue] | None"
+Summary = Mapping[str, SummaryValue]
+"""The numbers of a run by the names that `--json` prints."""
+
 FEW = 3
-"""This many observers can be followed over each other."""
+"""Number of observers that a reader can follow over each other."""
 
-JUDGED_BY = ("velocity_rms_error_push_rad_s", "velocity_rms_error_rad_s")
-"""Keys of a summary, the first of them that it has: a whole run is mostly stillness."""
+RANKING_KEYS = ("velocity_rms_error_push_rad_s", "velocity_rms_error_rad_s")
+"""Keys that rank observers: the first one that a summary has. Most of a whole run is stillness."""
 
-LEFT_OUT = 0.1
-"""Percentage of the samples at each end of an estimate that its axis need not show."""
+CUT_OFF = 0.1
+"""Percentage of an estimate's samples, at each end of their range, that an axis may cut off."""
 
 REACH = 3.0
-"""An estimate that goes astray stretches its axis by this many times the span of what is true, on each side."""
+"""An estimate stretches its axis by at most this many spans of the true signal, on each side."""
 
 MARGIN = 0.05
 
@@ -30,73 +34,79 @@ LEGEND = (0.35, 0.6)
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
-    """Observers' names as legends and tables have room for them.
+    """Shorten the names of observers for legends and tables.
 
     Args:
-        names: Those that are shown together.
+        names: The observers that one figure or table shows.
 
     Returns:
-        Name -> itself; of a dotted path its class, unless another one's is called the same.
+        Name -> the class of a dotted path, unless two classes have one name; otherwise the name itself.
     """
     short = [name.rpartition(":")[2] or name for name in names]
     return {name: part if short.count(part) == 1 else name for name, part in zip(names, short, strict=True)}
 
 
-def figures_by_observer(observers: Sequence[str], summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """A run's numbers observer by observer.
+def figures_by_observer(observers: Sequence[str], summary: Summary) -> dict[str, Summary]:
+    """Split a run's numbers by observer.
 
     Args:
-        observers: The one in the loop, then those riding along.
-        summary: The run's, with the others' in `open_loop_observers`.
+        observers: The observer in the loop, then the open-loop observers.
+        summary: The run's numbers; those of open-loop observers are in `open_loop_observers`.
 
     Returns:
-        Observer -> its numbers, in that order; empty for one that has none.
+        Observer -> its numbers, in the order of `observers`; empty for an observer without numbers.
     """
     in_loop, *others = observers
-    riding = summary.get("open_loop_observers") or {}
-    return {in_loop: summary, **{name: riding.get(name, {}) for name in others}}
+    open_loop = section(summary, "open_loop_observers")
+    return {in_loop: summary, **{name: section(open_loop, name) for name in others}}
 
 
-def observers_to_draw(summaries: Mapping[str, Mapping[str, Any]], always: Iterable[str] = ()) -> list[str]:
-    """Those worth being shown when there are too many.
+def section(summary: Summary, key: str) -> Summary:
+    """Return a part of a summary that has keys of its own; empty if the summary lacks the part."""
+    value = summary.get(key)
+    return value if isinstance(value, Mapping) else {}
+
+
+def observers_to_draw(summaries: Mapping[str, Summary], always: Iterable[str] = ()) -> list[str]:
+    """Choose the observers to draw when there are too many.
 
     Args:
-        summaries: Of each observer its summary; one that fell has `fell`, and comes last.
-        always: Those shown in any case.
+        summaries: Observer -> its summary. An observer whose summary has `fell` ranks last.
+        always: Observers to draw in any case.
 
     Returns:
-        At most `FEW` names (more only if `always` has more), in the order given: those with the smallest errors. What
-        observers are compared with is not among them, unless there is too little else.
+        At most `FEW` names (more only if `always` has more), in the order of `summaries`: those with the smallest
+        errors. Baselines are among them only if there are too few observers.
     """
     always = list(always)
     rest = sorted((name for name in summaries if name not in always), key=lambda name: _rank(name, summaries[name]))
-    shown = {*always, *rest[: max(0, FEW - len(always))]}
-    return [name for name in summaries if name in shown]
+    chosen = {*always, *rest[: max(0, FEW - len(always))]}
+    return [name for name in summaries if name in chosen]
 
 
-def _rank(name: str, summary: Mapping[str, Any]) -> tuple[bool, bool, float]:
-    error = next((summary[key] for key in JUDGED_BY if summary.get(key) is not None), math.inf)
+def _rank(name: str, summary: Summary) -> tuple[bool, bool, float]:
+    error = next((value for key in RANKING_KEYS if isinstance(value := summary.get(key), (int, float))), math.inf)
     return name in BASELINE_COLOURS, bool(summary.get("fell")), error if math.isfinite(error) else math.inf
 
 
-def axis_range(sure: Sequence[np.ndarray], rather: Sequence[np.ndarray] = ()) -> tuple[float, float] | None:
-    """The range of an axis which one noisy or diverging line cannot take for itself.
+def axis_range(required: Sequence[np.ndarray], optional: Sequence[np.ndarray] = ()) -> tuple[float, float] | None:
+    """Choose the range of an axis so that no noisy or diverging line takes all of it.
 
     Args:
-        sure: What must be seen whole, arrays of any shape. Whatever is not finite is passed over, here as below.
-        rather: What should be seen too, but for its outliers, and as long as it leaves room for the others.
+        required: Arrays of any shape that the axis shows whole. Values that are not finite do not count.
+        optional: Arrays that the axis shows but for outliers, as far as the required ones keep their room.
 
     Returns:
-        Lowest and highest, with a margin; None if there is nothing, or all of it one value.
+        Lowest and highest value, with a margin; None if there is no value, or only one.
     """
-    certain, wanted = (_finite(values) for values in (sure, rather))
-    if not len(certain) and not any(map(len, wanted)):
+    whole, partial = (_finite(arrays) for arrays in (required, optional))
+    if not whole and not partial:
         return None
-    low, high = (min(map(np.min, certain)), max(map(np.max, certain))) if certain else (math.inf, -math.inf)
+    low, high = (min(map(np.min, whole)), max(map(np.max, whole))) if whole else (math.inf, -math.inf)
     span = high - low
     lowest, highest = (low - REACH * span, high + REACH * span) if span > 0.0 else (-math.inf, math.inf)
-    for values in wanted:
-        least, most = np.percentile(values, (LEFT_OUT, 100.0 - LEFT_OUT))
+    for values in partial:
+        least, most = np.percentile(values, (CUT_OFF, 100.0 - CUT_OFF))
         low, high = min(low, max(least, lowest)), max(high, min(most, highest))
     margin = MARGIN * (high - low)
     return (float(low - margin), float(high + margin)) if 0.0 < margin < math.inf else None
@@ -105,14 +115,14 @@ def axis_range(sure: Sequence[np.ndarray], rather: Sequence[np.ndarray] = ()) ->
 def free_corner(
     lines: Sequence[tuple[np.ndarray, np.ndarray]], axis: tuple[float, float] | None
 ) -> tuple[Literal["right", "left"], Literal["top", "bottom"]]:
-    """The corner of a plot in which a legend hides the least: rather a stretch of noise than an excursion.
+    """Find the corner of a plot in which a legend hides the least; noise counts less than an excursion.
 
     Args:
         lines: Abscissae, (n,), and ordinates, (n,) or (n, n_lines).
-        axis: Range of the ordinates; None for what they need.
+        axis: Range of the ordinates; None to fit them.
 
     Returns:
-        Which one.
+        The corner.
     """
     drawn = [(x[:, None] if y.ndim == 2 else x, np.nan_to_num(y, posinf=0.0, neginf=0.0)) for x, y in lines if len(x)]
     axis = axis or axis_range([y for _, y in drawn])
@@ -136,5 +146,5 @@ def free_corner(
 
 
 def _finite(arrays: Sequence[np.ndarray]) -> list[np.ndarray]:
-    kept = [values[np.isfinite(values)] for values in arrays]
-    return [values for values in kept if len(values)]
+    finite = (values[np.isfinite(values)] for values in arrays)
+    return [values for values in finite if len(values)]

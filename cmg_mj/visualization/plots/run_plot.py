@@ -1,10 +1,11 @@
-"""Plots. No other part of the package imports matplotlib."""
+"""Draws figures from their data, and the one-page plot of a run."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,16 +15,22 @@ from cmg_mj.visualization.plots.colours import colour, colours, hexadecimal
 from cmg_mj.visualization.plots.figure_spec import Panel, Picture
 from cmg_mj.visualization.plots.map_plot import draw_map
 from cmg_mj.visualization.plots.readability import (
-    JUDGED_BY,
+    RANKING_KEYS,
+    Summary,
     axis_range,
     figures_by_observer,
     observers_to_draw,
     short_names,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
-def pyplot() -> Any:
-    """Matplotlib's pyplot, drawing into files."""
+
+def pyplot() -> ModuleType:
+    """Import matplotlib's pyplot, which then draws into files."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -32,18 +39,25 @@ def pyplot() -> Any:
     return plt
 
 
+def save_figure(path: Path, figure: Figure, title: str, dpi: int) -> None:
+    """Give a figure its title, write it as PNG, and close it."""
+    figure.suptitle(title, x=0.01, ha="left", parse_math=False)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=dpi, format="png")
+    pyplot().close(figure)
+
+
 def draw(path: Path, picture: Picture) -> None:
-    """Draw a picture.
+    """Draw a figure.
 
     Args:
         path: The PNG to write.
-        picture: What to draw.
+        picture: The figure's data.
     """
-    plt = pyplot()
     columns = picture.columns
     rows = -(-len(picture.panels) // columns)
     size = (9.0 if columns == 1 else 5.5 * columns, 0.8 + picture.panel_height * rows)
-    figure, grid = plt.subplots(
+    figure, grid = pyplot().subplots(
         rows, columns, sharex="col" if picture.share_x else False, figsize=size, layout="constrained", squeeze=False
     )
     for i, axes in enumerate(grid.flat):
@@ -57,26 +71,23 @@ def draw(path: Path, picture: Picture) -> None:
             axes.set_xlabel(panel.x_label)
             axes.tick_params(labelbottom=True)
     figure.align_ylabels()
-    figure.suptitle(picture.title, x=0.01, ha="left", parse_math=False)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=100, format="png")
-    plt.close(figure)
+    save_figure(path, figure, picture.title, dpi=100)
 
 
-def _draw_panel(axes: Any, panel: Panel) -> None:
+def _draw_panel(axes: Axes, panel: Panel) -> None:
     palette = colours(line.color for line in panel.lines if isinstance(line.color, str))
     for line in panel.lines:
         style = {"linewidth": line.width, "label": line.label or None}
         if line.color is not None:
             style["color"] = hexadecimal(palette[line.color]) if isinstance(line.color, str) else f"C{line.color}"
-        (drawn,) = axes.plot(line.x, line.y, line.style, markersize=4, **style)
+        (curve,) = axes.plot(line.x, line.y, line.style, markersize=4, **style)
         if line.spread is not None:
             below, above = np.broadcast_to(line.spread, (2, len(line.y)))
             low, high = np.subtract(line.y, below), np.add(line.y, above)
             if line.bars:
-                axes.vlines(line.x, low, high, color=drawn.get_color(), alpha=0.6, linewidth=line.width)
+                axes.vlines(line.x, low, high, color=curve.get_color(), alpha=0.6, linewidth=line.width)
             else:
-                axes.fill_between(line.x, low, high, color=drawn.get_color(), alpha=0.2, linewidth=0)
+                axes.fill_between(line.x, low, high, color=curve.get_color(), alpha=0.2, linewidth=0)
     for start, end in panel.shaded:
         axes.axvspan(start, end, color="C3", alpha=0.25, linewidth=0, zorder=0)
     axes.set_xscale(panel.x_scale)
@@ -97,50 +108,49 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=4, frameon=False, borderpad=0)
 
 
-def _mark(axis: Any, ticks: Sequence[float] | None) -> None:
+def _mark(axis: Axis, ticks: Sequence[float] | None) -> None:
     if ticks is not None:
         axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
         axis.set_ticks([], minor=True)
 
 
 INK = "0.15"
-"""What is true, on paper."""
+"""Colour of true signals on paper."""
 MEASURED = hexadecimal(colour("gyro"))
 PAGE = (9.0, 12.7)
-"""A page [inch]."""
+"""Width and height of a page [inch]."""
 PANEL_HEIGHT, SMALL_HEIGHT, SMALL_COLUMNS, SMALL_ROWS = 1.8, 1.3, 4, 3
-"""Of the panels, and of the small ones of observers for which there is no room in them."""
+"""Heights of the panels and of the small ones [inch], and the grid of the small ones, one an observer."""
 
 
 def plot_run(
     path: Path,
     trajectory: Trajectory,
     title: str,
-    summary: Mapping[str, Any],
+    summary: Summary,
     *,
     settle_band_deg: float,
     rate_limit_rad_s: float,
 ) -> None:
     """Plot a run on one page: tilt, tilt rate, error of the estimates, gimbal angle, command.
 
-    The observer in the loop and the best of those riding along share the panels; each of the others has a small one.
+    The observer in the loop and the best open-loop observers share the panels. Each other observer has a small panel.
 
     Args:
         path: The PNG to write.
         trajectory: One world.
-        title: Above the plot.
-        summary: The run's numbers, by which the best are found.
-        settle_band_deg: Settled is a tilt within this much of zero [deg].
+        title: Title above the plot.
+        summary: The run's numbers, which rank the observers.
+        settle_band_deg: Largest tilt of a settled rig [deg].
         rate_limit_rad_s: Largest command [rad/s].
     """
-    plt = pyplot()
     summaries = figures_by_observer(trajectory.observers, summary)
     few = observers_to_draw(summaries, always=trajectory.observers[:1])
     others = [name for name in trajectory.observers if name not in few]
     columns = max(SMALL_COLUMNS, -(-len(others) // SMALL_ROWS))
     small = [others[i : i + columns] for i in range(0, len(others), columns)]
     heights = [PANEL_HEIGHT] * 5 + [SMALL_HEIGHT] * len(small)
-    figure = plt.figure(figsize=(PAGE[0], min(PAGE[1], 0.6 + sum(heights))), layout="constrained")
+    figure = pyplot().figure(figsize=(PAGE[0], min(PAGE[1], 0.6 + sum(heights))), layout="constrained")
     grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
     panels = [figure.add_subplot(grid[0, :])]
     panels += [figure.add_subplot(grid[i, :], sharex=panels[0]) for i in range(1, 5)]
@@ -172,13 +182,10 @@ def plot_run(
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), **legend)
     panels[4].set_xlabel("time [s]")
     figure.align_ylabels(panels[:5])
-    figure.suptitle(title, x=0.01, ha="left", parse_math=False)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=110, format="png")
-    plt.close(figure)
+    save_figure(path, figure, title, dpi=110)
 
 
-def _draw_tilt(axes: Any, trajectory: Trajectory, band: float) -> None:
+def _draw_tilt(axes: Axes, trajectory: Trajectory, band: float) -> None:
     t = trajectory["time_s"]
     measured, true = np.degrees(trajectory["y1_rad"]), np.degrees(trajectory["x1_rad"])
     axes.plot(t, measured, color=MEASURED, linewidth=0.6, alpha=0.7, label="measured $y_1$")
@@ -189,28 +196,30 @@ def _draw_tilt(axes: Any, trajectory: Trajectory, band: float) -> None:
 
 
 def _draw_estimates(
-    rates: Any,
-    errors: Any,
+    rates: Axes,
+    errors: Axes,
     trajectory: Trajectory,
     palette: Mapping[str, str],
-    summaries: Mapping[str, Mapping[str, Any]],
+    summaries: Mapping[str, Summary],
 ) -> tuple[float, float] | None:
-    """Tilt rate and error of some observers; the range of the rates."""
+    """Draw tilt rate and error of some observers; return the range of the rates."""
     t, true = trajectory["time_s"], trajectory["x2_rad_s"]
     estimates = {name: trajectory[f"estimate/{name}/x2_rad_s"] for name in palette}
     rates.plot(t, trajectory["fog_rad_s"], color=MEASURED, linewidth=0.6, label="gyro")
     rates.plot(t, true, color=INK, linewidth=1.8, label="true $x_2$")
     labels = short_names(trajectory.observers)
-    judged_by = next((key for key in JUDGED_BY if any(summaries[name].get(key) is not None for name in palette)), "")
-    if judged_by:
-        errors.plot([], [], " ", label="RMS in push windows:" if "push" in judged_by else "RMS:")
+    ranking_key = next(
+        (key for key in RANKING_KEYS if any(summaries[name].get(key) is not None for name in palette)), ""
+    )
+    if ranking_key:
+        errors.plot([], [], " ", label="RMS in push windows:" if "push" in ranking_key else "RMS:")
     for name, color in palette.items():
         label = labels[name].lstrip("_")  # matplotlib hides what begins with an underscore
         style = {"color": color, "linewidth": 0.8}
-        rms = summaries[name].get(judged_by)
+        rms = summaries[name].get(ranking_key)
         rates.plot(t, estimates[name], **style, label=f"{label} $\\hat x_2$")
         errors.plot(
-            t, estimates[name] - true, **style, label=f"{label} {written(judged_by, rms)}" if judged_by else label
+            t, estimates[name] - true, **style, label=f"{label} {written(ranking_key, rms)}" if ranking_key else label
         )
     rates.set_ylabel("tilt rate\n[rad/s]")
     errors.set_ylabel("error $\\hat x_2 - x_2$\n[rad/s]")
@@ -219,9 +228,9 @@ def _draw_estimates(
 
 
 def _draw_small(
-    axes: Any, trajectory: Trajectory, name: str, label: str, color: str, rates: tuple[float, float] | None
+    axes: Axes, trajectory: Trajectory, name: str, label: str, color: str, rates: tuple[float, float] | None
 ) -> None:
-    """One observer's estimate on the axis of the others."""
+    """Draw one observer's estimate on the range of the others."""
     t = trajectory["time_s"]
     axes.plot(t, trajectory[f"estimate/{name}/x2_rad_s"], color=color, linewidth=0.5)
     axes.plot(t, trajectory["x2_rad_s"], color=INK, linewidth=0.8)
@@ -230,7 +239,7 @@ def _draw_small(
         axes.set_ylim(*rates)
 
 
-def _draw_actuators(gimbal: Any, command: Any, trajectory: Trajectory, limit: float) -> None:
+def _draw_actuators(gimbal: Axes, command: Axes, trajectory: Trajectory, limit: float) -> None:
     t, u = trajectory["time_s"], trajectory["u_rad_s"]
     gimbal.plot(t, np.degrees(trajectory["x3_rad"]), color=INK, linewidth=1.3, label="true $x_3$")
     gimbal.set_ylabel("gimbal angle\n[deg]")
@@ -240,14 +249,14 @@ def _draw_actuators(gimbal: Any, command: Any, trajectory: Trajectory, limit: fl
     fit(command, [u], [np.array([limit, -limit])])
 
 
-def _draw_bounds(axes: Any, bound: float, label: str) -> None:
-    for value, named in ((bound, label), (-bound, None)):
-        axes.axhline(value, color="0.5", linewidth=0.8, linestyle="--", label=named)
+def _draw_bounds(axes: Axes, bound: float, label: str) -> None:
+    for value, name in ((bound, label), (-bound, None)):
+        axes.axhline(value, color="0.5", linewidth=0.8, linestyle="--", label=name)
 
 
-def fit(axes: Any, sure: Sequence[np.ndarray], rather: Sequence[np.ndarray]) -> tuple[float, float] | None:
-    """Give an axis the range in which these can be read."""
-    found = axis_range(sure, rather)
-    if found is not None:
-        axes.set_ylim(*found)
-    return found
+def fit(axes: Axes, required: Sequence[np.ndarray], optional: Sequence[np.ndarray]) -> tuple[float, float] | None:
+    """Set the range of the ordinate by `axis_range`, and return it."""
+    limits = axis_range(required, optional)
+    if limits is not None:
+        axes.set_ylim(*limits)
+    return limits

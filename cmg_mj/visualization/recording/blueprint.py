@@ -1,4 +1,4 @@
-"""How a recording opens: which views are where, and which observers are switched on."""
+"""Lays out a recording: the places of the views, and the observers that are switched on."""
 
 from __future__ import annotations
 
@@ -10,9 +10,17 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.visualization.plots.readability import FEW
 from cmg_mj.visualization.recording.run import best_observers, best_runs
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
-from cmg_mj.visualization.recording.signals import Branch
-from cmg_mj.visualization.recording.timeline import TIMELINE
-from cmg_mj.visualization.recording.views import Choice, Plot, overlay, pages, phases, plot, rig
+from cmg_mj.visualization.recording.signals import TIMELINE, Branch
+from cmg_mj.visualization.recording.views import (
+    Choice,
+    Plot,
+    mechanism_view,
+    overlay_view,
+    page_tabs,
+    phase_lanes,
+    plot_view,
+    tabbed_blueprint,
+)
 
 ESTIMATE_PLOTS = (
     Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 2.8),
@@ -20,7 +28,7 @@ ESTIMATE_PLOTS = (
 )
 TILT_PLOTS = (Plot("Tilt [deg]", ("tilt/",), 1.7), *ESTIMATE_PLOTS)
 BIAS_PLOT = Plot("Estimated equilibrium bias [deg]", ("bias/",), 1.3)
-"""Only where an observer estimates it."""
+"""Shown only if an observer estimates the bias."""
 ACTUATOR_PLOTS = (
     Plot("Command, gimbal rate [rad/s]", ("command/",), 3.0),
     Plot("Gimbal angles from upright [deg]", ("gimbal/",), 2.4),
@@ -33,7 +41,7 @@ COMPARED_TILT_PLOTS = (
 )
 COMPARED_ACTUATOR_PLOTS = (
     Plot("Command, gimbal rate [rad/s]", ("command/u",)),
-    Plot("Gimbal angle of {cube} from upright [deg]", ("gimbal/{cube}",)),
+    Plot("Gimbal angle of {module} from upright [deg]", ("gimbal/{module}",)),
     Plot("Integrator [rad s]", ("integrator/x_e",)),
 )
 
@@ -47,86 +55,84 @@ def default_blueprint(plant: Plant, branches: Sequence[Branch], *, live: bool = 
     """Lay out a recording.
 
     Args:
-        plant: The rig.
+        plant: The plant.
         branches: The runs.
-        live: Whether the viewer shows what comes last, and not all of it from the beginning.
+        live: Whether the viewer follows the newest ticks instead of playing from the start.
 
     Returns:
-        A dashboard for one run; for several, one that compares them, and a tab for each. Of more than a few observers
-        the best are switched on, and another tab has all of them.
+        A dashboard for one run; for several, a comparison and a tab for each. Of more than a few observers the best are
+        switched on, and another tab has all of them.
     """
     names = _page_names(branches)
     boards = [_dashboard(branch, names) for branch in branches]
     if len(branches) > 1:
         boards = [*_comparison(plant, branches), *boards]
     elif len(branches[0].run.observers) > FEW:
-        boards.append(_all_riding_along(branches[0]))
-    return rrb.Blueprint(
-        rrb.Tabs(*boards, active_tab=0) if len(boards) > 1 else boards[0],
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following" if live else "playing"),
-        auto_views=False,
-        auto_layout=False,
-    )
+        boards.append(_all_observers(branches[0]))
+    return tabbed_blueprint(boards, TIMELINE, "following" if live else "playing")
 
 
 def _dashboard(branch: Branch, names: Sequence[str]) -> rrb.Container:
-    """Everything about one run."""
+    """Lay out everything about one run."""
     tilt = (*TILT_PLOTS, BIAS_PLOT) if _has_bias(branch) else TILT_PLOTS
-    mechanism = rig(branch, f"Rig (flywheels drawn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed)")
+    mechanism = mechanism_view(branch, f"Rig (flywheels drawn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed)")
     return _columns(
         branch.label,
         [9, 8, 6],
         rrb.Vertical(
-            mechanism, pages(names, "Observers" if branch.run.open_loop_observers else "Summary"), row_shares=[1, 1]
+            mechanism, page_tabs(names, "Observers" if branch.run.open_loop_observers else "Summary"), row_shares=[1, 1]
         ),
-        _below_lanes([branch], tilt, [plot(what, branch, _best_of(what, branch)) for what in tilt]),
-        _stack(ACTUATOR_PLOTS, [plot(what, branch, _best_of(what, branch)) for what in ACTUATOR_PLOTS]),
+        _below_lanes([branch], tilt, _plot_views(tilt, branch)),
+        _stack(ACTUATOR_PLOTS, _plot_views(ACTUATOR_PLOTS, branch)),
     )
 
 
-def _all_riding_along(branch: Branch) -> rrb.Container:
-    """What every observer of a run says, each to be switched on in the legend."""
-    rates = [plot(what, branch, _best_of(what, branch, listed=True)) for what in ESTIMATE_PLOTS]
-    bias = [plot(BIAS_PLOT, branch, _best_of(BIAS_PLOT, branch, listed=True))] if _has_bias(branch) else []
-    return _columns(ALL, [3, 2], rrb.Vertical(*rates), rrb.Vertical(*bias, pages(_page_names([branch]), "Observers")))
+def _all_observers(branch: Branch) -> rrb.Container:
+    """Lay out the estimates of every observer of a run, with all observers in the legend."""
+    rates = _plot_views(ESTIMATE_PLOTS, branch, listed=True)
+    bias = _plot_views([BIAS_PLOT], branch, listed=True) if _has_bias(branch) else []
+    return _columns(
+        ALL, [3, 2], rrb.Vertical(*rates), rrb.Vertical(*bias, page_tabs(_page_names([branch]), "Observers"))
+    )
 
 
 def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]:
-    """The best runs over each other, then, if there are more, all of them."""
+    """Lay out the best runs over each other; then, if there are more, all runs."""
     few = best_runs([branch.run for branch in branches])
-    cube = plant.cubes[0].of_axis
+    module = plant.cubes[0].of_axis
     shown = [branch for branch in branches if branch.run.name in few]
-    tilt = [overlay(what, branches, cube, Choice(few)) for what in COMPARED_TILT_PLOTS]
-    actuators = [overlay(what, branches, cube, Choice(few)) for what in COMPARED_ACTUATOR_PLOTS]
-    rigs = rrb.Tabs(*(rig(branch, branch.label) for branch in shown), active_tab=0)
+    tilt = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_TILT_PLOTS]
+    actuators = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_ACTUATOR_PLOTS]
+    mechanisms = rrb.Tabs(*(mechanism_view(branch, branch.label) for branch in shown), active_tab=0)
     names = _page_names(branches)
     board = _columns(
         "Comparison" if branches[0].run.axis is None else "All axes",
         [9, 8, 6],
-        rrb.Vertical(rigs, pages(names, "Summary"), row_shares=[1, 1]),
+        rrb.Vertical(mechanisms, page_tabs(names, "Summary"), row_shares=[1, 1]),
         _below_lanes(shown, COMPARED_TILT_PLOTS, tilt),
         _stack(COMPARED_ACTUATOR_PLOTS, actuators),
     )
     if len(shown) == len(branches):
         return [board]
-    any_of_them = Choice(few, listed=True)
+    any_run = Choice(few, listed=True)
     lanes = _lanes_height(branches)
-    more = _columns(
+    all_runs = _columns(
         ALL,
         [9, 8, 6],
-        rrb.Vertical(phases(branches), pages(names, "Summary"), row_shares=[lanes, COLUMN - lanes]),
-        rrb.Vertical(*(overlay(what, branches, cube, any_of_them) for what in COMPARED_TILT_PLOTS)),
-        rrb.Vertical(*(overlay(what, branches, cube, any_of_them) for what in COMPARED_ACTUATOR_PLOTS[:2])),
+        rrb.Vertical(phase_lanes(branches), page_tabs(names, "Summary"), row_shares=[lanes, COLUMN - lanes]),
+        rrb.Vertical(*(overlay_view(plot, branches, module, any_run) for plot in COMPARED_TILT_PLOTS)),
+        rrb.Vertical(*(overlay_view(plot, branches, module, any_run) for plot in COMPARED_ACTUATOR_PLOTS[:2])),
     )
-    return [board, more]
+    return [board, all_runs]
 
 
-def _best_of(what: Plot, branch: Branch, *, listed: bool = False) -> Choice:
-    """The best of those that have a line in a plot."""
-    there = {row.observer for path, row in branch.series.items() if path.startswith(what.entities)}
-    return Choice(best_observers(branch.run, there), listed)
+def _plot_views(plots: Sequence[Plot], branch: Branch, *, listed: bool = False) -> list[rrb.View]:
+    """Lay out plots; in each, switch the best observers on that have a line in the plot."""
+    views = []
+    for plot in plots:
+        observers = {row.observer for path, row in branch.series.items() if path.startswith(plot.entities)}
+        views.append(plot_view(plot, branch, Choice(best_observers(branch.run, observers), listed)))
+    return views
 
 
 def _has_bias(branch: Branch) -> bool:
@@ -134,9 +140,9 @@ def _has_bias(branch: Branch) -> bool:
 
 
 def _page_names(branches: Sequence[Branch]) -> list[str]:
-    """The pages there are."""
-    riding = len(branches) == 1 or any(branch.run.open_loop_observers for branch in branches)
-    return ["Summary", *(["Observers"] if riding else []), "Scenario"]
+    """Return the names of the pages."""
+    has_observers = len(branches) == 1 or any(branch.run.open_loop_observers for branch in branches)
+    return ["Summary", *(["Observers"] if has_observers else []), "Scenario"]
 
 
 def _columns(name: str, shares: list[float], *columns: rrb.Container | rrb.View) -> rrb.Container:
@@ -144,15 +150,15 @@ def _columns(name: str, shares: list[float], *columns: rrb.Container | rrb.View)
 
 
 def _stack(plots: Sequence[Plot], views: Sequence[rrb.View]) -> rrb.Container:
-    """Plots below each other."""
-    return rrb.Vertical(*views, row_shares=[what.height for what in plots])
+    """Lay out plots below each other."""
+    return rrb.Vertical(*views, row_shares=[plot.height for plot in plots])
 
 
 def _below_lanes(lanes: Sequence[Branch], plots: Sequence[Plot], views: Sequence[rrb.View]) -> rrb.Container:
-    """Plots below each other, and the lanes of phases above them."""
+    """Lay out plots below each other, and the lanes of phases above them."""
     top = _lanes_height(lanes)
-    share = (COLUMN - top) / sum(what.height for what in plots)
-    return rrb.Vertical(phases(lanes), *views, row_shares=[top, *(what.height * share for what in plots)])
+    share = (COLUMN - top) / sum(plot.height for plot in plots)
+    return rrb.Vertical(phase_lanes(lanes), *views, row_shares=[top, *(plot.height * share for plot in plots)])
 
 
 def _lanes_height(lanes: Sequence[Branch]) -> float:

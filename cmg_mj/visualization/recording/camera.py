@@ -1,4 +1,4 @@
-"""Where a rig is and how large, whatever its size: for the camera, and for what is drawn to its scale."""
+"""Place and size of a rig: for the camera, and for shapes drawn to the rig's scale."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 from cmg_mj.plant.plant import Plant
 
 SHOWN_GROUPS = 3
-"""Geoms and sites of groups 0 to 2 are drawn, as in MuJoCo's own viewers."""
+"""Number of groups of geoms and sites that are drawn, as in MuJoCo's viewers."""
 
 POSES = 25
-"""So many poses of a run are looked at."""
+"""Number of poses of a run that the ball encloses."""
 
 FARTHEST = 2.0
-"""A rig that travels farther than so many of its radii is shown where it starts."""
+"""A rig that travels farther than so many radii is shown at its start."""
 
 CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0
 
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball that holds the rig.
+    """A ball that encloses a rig.
 
     Attributes:
-        centre: (3,) [m].
-        radius: [m].
+        centre: Centre, (3,) [m].
+        radius: Radius [m].
     """
 
     centre: np.ndarray
@@ -35,52 +35,52 @@ class Ball:
 
 
 def is_drawn(group: int, rgba: np.ndarray) -> bool:
-    """Whether MuJoCo would draw it."""
+    """Return whether MuJoCo would draw a geom or site."""
     return group < SHOWN_GROUPS and bool(rgba[3] > 0.0)
 
 
 def geom_rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """A geom's colour: its own, or its material's if it has none of its own."""
-    own, material = model.geom_rgba[geom], model.geom_matid[geom]
-    return model.mat_rgba[material] if material >= 0 and np.all(own == (0.5, 0.5, 0.5, 1.0)) else own
+    """Return a geom's colour, or the colour of its material if the geom has MuJoCo's default."""
+    rgba, material = model.geom_rgba[geom], model.geom_matid[geom]
+    return model.mat_rgba[material] if material >= 0 and np.all(rgba == (0.5, 0.5, 0.5, 1.0)) else rgba
 
 
-def ball(plant: Plant, qpos: np.ndarray) -> Ball:
-    """Find what a camera must see of a rig during a run.
+def enclosing_ball(plant: Plant, qpos: np.ndarray) -> Ball:
+    """Enclose the part of a plant that a camera must see during a run.
 
     Args:
-        plant: The rig.
+        plant: The plant.
         qpos: Joint angles, (n, n_joints) [rad].
 
     Returns:
-        All that is drawn of the moving bodies, and what stands still beside them: floors and walls do not count.
+        A ball around the moving bodies and the fixed geoms beside them, without floors and walls.
     """
     model = plant.drawn_model
     data = mujoco.MjData(model)
     drawn = [i for i in range(model.ngeom) if is_drawn(model.geom_group[i], geom_rgba(model, i))]
     drawn = [i for i in drawn if model.geom_type[i] != int(mujoco.mjtGeom.mjGEOM_PLANE)]
     moving = [i for i in drawn if model.geom_bodyid[i]]
-    still = [i for i in drawn if not model.geom_bodyid[i]]
+    fixed = [i for i in drawn if not model.geom_bodyid[i]]
 
-    def place(angles: np.ndarray) -> list[np.ndarray]:
+    def corners_at(angles: np.ndarray) -> list[np.ndarray]:
         data.qpos[:] = angles
         mujoco.mj_kinematics(model, data)
         return [_corners(model, data, i) for i in moving]
 
-    first = place(plant.new_data().qpos)
+    first = corners_at(plant.new_data().qpos)
     if not first:
         mujoco.mj_comPos(model, data)
         return Ball(data.subtree_com[0].copy(), float(model.stat.extent))
     around_first = _around(first)
-    beside = [corners for corners in (_corners(model, data, i) for i in still) if _is_within(corners, around_first)]
+    beside = [corners for corners in (_corners(model, data, i) for i in fixed) if _is_within(corners, around_first)]
     poses = qpos[np.isfinite(qpos).all(axis=1)]
     poses = poses[np.unique(np.linspace(0, max(len(poses) - 1, 0), POSES).astype(int))] if len(poses) else poses
-    during = _around([*first, *beside, *(corners for angles in poses for corners in place(angles))])
+    during = _around([*first, *beside, *(corners for angles in poses for corners in corners_at(angles))])
     return during if during.radius < FARTHEST * around_first.radius else _around([*first, *beside])
 
 
 def _corners(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
-    """Corners of a geom's box in the world, (8, 3) [m]."""
+    """Return the corners of a geom's box in the world, (8, 3) [m]."""
     centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
     return data.geom_xpos[geom] + (centre + half * CORNERS) @ data.geom_xmat[geom].reshape(3, 3).T
 
@@ -92,5 +92,5 @@ def _around(points: list[np.ndarray]) -> Ball:
 
 
 def _is_within(points: np.ndarray, rig: Ball) -> bool:
-    """Whether something is near enough to a rig to be a part of it."""
+    """Return whether a geom is near enough to a rig to be a part of it."""
     return bool(np.linalg.norm(points - rig.centre, axis=1).max() < FARTHEST * rig.radius)

@@ -1,4 +1,4 @@
-"""A stream to a viewer that the run never waits for: what goes wrong there costs the view alone."""
+"""Streams a run to a viewer; the run never waits for the viewer, and a failure costs the view alone."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ import rerun.blueprint as rrb
 
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.recording.run import Run
-from cmg_mj.visualization.recording.stream import application_of, require_enabled, set_up, strict
+from cmg_mj.visualization.recording.stream import application_name, require_enabled, set_up, strict
 from cmg_mj.visualization.recording.streaming import StreamedRun, StreamHeader
 from cmg_mj.visualization.recording.viewer import parts_of, url_of
 from cmg_mj.visualization.recording.viewer_relay import Relay
 
 TAKES_S = 1.0
-"""So long a viewer may take over a piece before it is asked again."""
+"""Time that a viewer may take over a piece before it is asked again."""
 PATIENCE_S = 5.0
-"""So long the end of a run waits for a viewer that takes nothing."""
+"""Time for which the end of a run waits for a viewer that takes nothing."""
 GONE, STUCK = "it has gone", "it takes no more"
 
 
@@ -32,20 +32,20 @@ class ViewerStream:
     `end` wait for nothing.
 
     Args:
-        url: Of the viewer, which listens: `viewer.url_of`.
-        shown: What is known of the run before its first tick.
+        url: URL of a viewer that listens: `viewer.url_of`.
+        header: The header of the run.
 
     Attributes:
-        lost: Why the viewer has not got all of it, in words; empty if it has.
+        lost: The reason why the viewer has not received all of the run; empty if it has.
 
     Raises:
         InputError: The environment turns rerun off.
     """
 
-    def __init__(self, url: str, shown: StreamHeader) -> None:
+    def __init__(self, url: str, header: StreamHeader) -> None:
         self.lost = ""
         self._url = url
-        self._shown = shown
+        self._header = header
         self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._done = 0
         self._deadline = float("inf")
@@ -68,39 +68,39 @@ class ViewerStream:
             self._strict.__exit__(kind, error, traceback)
 
     def begin(self, empty: Trajectory) -> None:
-        """Show the rig and what the plots will hold.
+        """Show the mechanism and the empty plots.
 
         Args:
             empty: The trajectory before the first tick.
         """
-        # Not in the thread: it sets MuJoCo's control callback, the whole process's, aside for a while.
-        self._growing = StreamedRun(self._shown, empty)
+        # Not in the thread: MuJoCo's control callback, which the whole process shares, is set aside meanwhile.
+        self._run = StreamedRun(self._header, empty)
         self._jobs.put(self._begin)
 
     def add(self, piece: Trajectory) -> None:
         """Show the next ticks."""
-        self._jobs.put(lambda: self._growing.add(self._rec, piece))
+        self._jobs.put(lambda: self._run.add(self._rec, piece))
 
     def end(self, runs: Sequence[Run]) -> None:
-        """Show the last ticks, and what is known only of a run that has ended; of several axes a run an axis."""
-        self._jobs.put(lambda: self._layout(self._growing.end(self._rec, runs), active=False))
+        """Show the last ticks and the results of the finished run; of several axes, a run for each axis."""
+        self._jobs.put(lambda: self._layout(self._run.end(self._rec, runs), active=False))
 
     def _begin(self) -> None:
-        branches = self._growing.branches
+        branches = self._run.branches
         names = [branch.run.name for branch in branches]
-        self._rec = rr.RecordingStream(f"{application_of(names, branches)} live")
+        self._rec = rr.RecordingStream(f"{application_name(names, branches)} live")
         self._rec.connect_grpc(url_of(str(self._relay.port)))
         labels = ", ".join(branch.label for branch in branches)
-        set_up(self._rec, f"{self._shown.title or 'Run'}: {labels}, live")
-        self._layout(self._growing.blueprint(), active=True)
-        self._growing.begin(self._rec)
+        set_up(self._rec, f"{self._header.title or 'Run'}: {labels}, live")
+        self._layout(self._run.blueprint(), active=True)
+        self._run.begin(self._rec)
 
     def _layout(self, blueprint: rrb.Blueprint, *, active: bool) -> None:
-        """The layout; one that is not made active waits for the viewer's Reset, so that nothing moves under a hand."""
+        """Send the layout; an inactive one waits for the viewer's Reset and moves nothing under the user's hand."""
         self._rec.send_blueprint(blueprint, make_active=active, make_default=True)
 
     def _feed(self) -> None:
-        """The thread: one job after the other, each taken by the viewer before the next."""
+        """Run the jobs in the thread; the viewer must take each job before the next."""
         try:
             while (job := self._jobs.get()) is not None:
                 job()
@@ -109,35 +109,35 @@ class ViewerStream:
                     return
                 self._done += 1
             if self._done:
-                self._rec.disconnect()  # returns when the viewer has had the last of it
+                self._rec.disconnect()  # returns when the viewer has received everything
         except Exception as error:  # the run must not care
             self.lost = f"it could not be fed ({' '.join(str(error).split())})"
 
     def _not_taken(self) -> str:
-        """Wait until what was sent is taken; why it is not.
+        """Wait until the viewer has taken everything sent; return the reason if it does not.
 
-        Rerun itself waits without end once it has 100 MB for a viewer that stands still: it never gets so much.
+        Rerun waits without end once it holds 100 MB for a viewer that stands still; it never gets so much here.
         """
         while True:
-            asked = time.monotonic()
+            start = time.monotonic()
             try:
                 self._rec.flush(timeout_sec=TAKES_S)
                 return ""
-            except RuntimeError:  # it is the same for both
-                if time.monotonic() - asked < 0.9 * TAKES_S:
+            except RuntimeError:  # raised both for a viewer that has gone and for one that stands still
+                if time.monotonic() - start < 0.9 * TAKES_S:
                     return GONE
                 if time.monotonic() > self._deadline:
                     return STUCK
 
     def _close(self) -> None:
-        """Let the viewer have what it has not got yet, as long as it takes any."""
+        """Send the viewer the rest, as long as it takes any."""
         self._jobs.put(None)
         while self._thread.is_alive():
             done = self._done
             self._deadline = time.monotonic() + PATIENCE_S
             self._thread.join(PATIENCE_S)
             if self._thread.is_alive() and self._done == done:
-                self._thread.join(2.0 * TAKES_S)  # its deadline has passed: it says why
+                self._thread.join(2.0 * TAKES_S)  # its deadline has passed: it sets the reason
                 break
         if self._thread.is_alive():
             self.lost = STUCK

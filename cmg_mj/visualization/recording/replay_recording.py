@@ -1,4 +1,4 @@
-"""Users' logs with their observers -> .rrd: a board a log, and the same pages for all."""
+"""Writes users' logs with their observers as a rerun recording: a board for each log, and common pages."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 
 import rerun.blueprint as rrb
 
-from cmg_mj.visualization.recording.signals import Lines, Series, log_series, numbered
-from cmg_mj.visualization.recording.stream import application_of, log_page, recorded
-from cmg_mj.visualization.recording.views import Choice, Plot, pages, plot
+from cmg_mj.visualization.recording.signals import Lines, Series, log_series, numbered_parts
+from cmg_mj.visualization.recording.stream import application_name, log_page, recorded
+from cmg_mj.visualization.recording.views import Choice, Plot, page_tabs, plot_view, tabbed_blueprint
 
 TIMELINE = "time"
-"""The log's own."""
+"""Name of the timeline: a log's time is not simulated."""
 MAIN = (
     Plot("Tilt [deg]", ("tilt/",), 1.7),
     Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 2.8),
@@ -30,13 +30,13 @@ PLOTS = (
 
 @dataclass(frozen=True)
 class LogSeries:
-    """All that is recorded of one log.
+    """The recorded series of one log.
 
     Attributes:
-        name: Of the log; no two alike in a recording.
-        series: Its lines, in the folders that `PLOTS` names: angles in degrees, rates in rad/s.
+        name: Name of the log, unique in a recording.
+        series: The series, in the folders that `PLOTS` names: angles in degrees, rates in rad/s.
         observers: Names of all observers.
-        shown: Of the few that are switched on at first.
+        shown: Names of the observers that are switched on at first.
     """
 
     name: str
@@ -46,13 +46,13 @@ class LogSeries:
 
 
 def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping[str, str]) -> None:
-    """Write some logs as one recording; whole or not at all.
+    """Write logs as one recording; whole or not at all.
 
     Args:
         path: The file, `recording.rrd`.
         title: The recording's name.
-        logs: The logs; each has a branch of its own.
-        texts: Title -> Markdown: the pages, the first of them in front.
+        logs: The logs; each has a branch.
+        texts: Title -> Markdown of the pages; the first page is in front.
 
     Raises:
         InputError: The environment turns rerun off.
@@ -61,18 +61,11 @@ def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping
     names = [log.name for log in logs]
     branches = [
         Lines(path=f"/{part}", label=log.name, series={row.path: row for row in log.series}, timeline=TIMELINE)
-        for part, log in zip(numbered(names), logs, strict=True)
+        for part, log in zip(numbered_parts(names), logs, strict=True)
     ]
     boards = [_board(branch, log, list(texts)) for branch, log in zip(branches, logs, strict=True)]
-    blueprint = rrb.Blueprint(
-        rrb.Tabs(*boards, active_tab=0) if len(boards) > 1 else boards[0],
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="paused"),
-        auto_views=False,
-        auto_layout=False,
-    )
-    with recorded(path, title, application_of(names, branches), blueprint) as rec:
+    blueprint = tabbed_blueprint(boards, TIMELINE, "paused")
+    with recorded(path, title, application_name(names, branches), blueprint) as rec:
         for branch in branches:
             log_series(rec, branch)
         for name, text in texts.items():
@@ -80,18 +73,19 @@ def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping
 
 
 def _board(branch: Lines, log: LogSeries, titles: Sequence[str]) -> rrb.Container:
-    """Everything about one log. The others than the few are in the legends, to be switched on."""
-    there = [what for what in PLOTS if any(path.startswith(what.entities) for path in branch.series)]
-    views = []
-    for what in there:
-        among = {row.observer for path, row in branch.series.items() if path.startswith(what.entities)}
-        shown = [name for name in log.shown if name in among] or [name for name in log.observers if name in among]
-        views.append(plot(what, branch, Choice(shown, listed=True)))
-    left = [view for what, view in zip(there, views, strict=True) if what in MAIN]
-    right = [view for what, view in zip(there, views, strict=True) if what not in MAIN]
+    """Lay out everything about one log. The legends have all observers, most of them switched off."""
+    views: dict[Plot, rrb.View] = {}
+    for plot in PLOTS:
+        rows = [row for path, row in branch.series.items() if path.startswith(plot.entities)]
+        if rows:
+            observers = {row.observer for row in rows}
+            shown = [n for n in log.shown if n in observers] or [n for n in log.observers if n in observers]
+            views[plot] = plot_view(plot, branch, Choice(shown, listed=True))
+    left = [view for plot, view in views.items() if plot in MAIN]
+    right = [view for plot, view in views.items() if plot not in MAIN]
     return rrb.Horizontal(
-        rrb.Vertical(*left, row_shares=[what.height for what in MAIN if what in there]),
-        rrb.Vertical(pages(titles, titles[0]), *right, row_shares=[3.5, *[1.0] * len(right)]),
+        rrb.Vertical(*left, row_shares=[plot.height for plot in MAIN if plot in views]),
+        rrb.Vertical(page_tabs(titles, titles[0]), *right, row_shares=[3.5, *[1.0] * len(right)]),
         column_shares=[11, 9],
         name=branch.label,
     )

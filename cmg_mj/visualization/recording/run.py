@@ -1,11 +1,10 @@
-"""One run to be shown, and what is worked out of it before anything is drawn."""
+"""A run to record, and its torques and phases as steps in time."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,63 +12,63 @@ from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import figures_by_observer, observers_to_draw
+from cmg_mj.visualization.plots.readability import Summary, figures_by_observer, observers_to_draw
 
 BALANCING, PUSH, RECOVERING, SETTLED = "balancing", "push", "recovering", "settled"
 ENDINGS = {"fell": "fallen", "stopped": "stopped", "interrupted": "interrupted"}
-"""The phase in which a run that was not done ends, by the kind of its outcome."""
+"""Kind of the outcome of a run that did not reach its end -> the run's last phase."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run to be shown.
+    """A run to record.
 
     Attributes:
-        name: Its branch in the recording, usually the observer in the loop.
+        name: Name of the run's branch in the recording, usually the observer in the loop.
         trajectory: One world's ticks, columns (n_ticks,).
         summary: The run's numbers, by the names that `--json` prints.
-        outcome: How it ended.
-        axis: Which of the rig's axes, if it has several: trajectory and numbers are that axis'.
+        outcome: The outcome.
+        axis: The axis of trajectory and numbers, if the plant has several.
     """
 
     name: str
     trajectory: Trajectory
-    summary: Mapping[str, Any]
+    summary: Summary
     outcome: Outcome
     axis: str | None = None
 
     def pushes_on_axis(self, pushes: Sequence[Push]) -> list[Push]:
-        """Those of the pushes that are about this axis."""
+        """Return the pushes about this axis."""
         return [push for push in pushes if self.axis is None or push.axis == self.axis]
 
     @property
-    def observers(self) -> dict[str, Mapping[str, Any]]:
-        """The observer in the loop, then those riding along, each with its numbers."""
+    def observers(self) -> dict[str, Summary]:
+        """The observer in the loop, then the open-loop observers, each with its numbers."""
         return figures_by_observer(self.trajectory.observers, self.summary)
 
     @property
     def open_loop_observers(self) -> tuple[str, ...]:
-        """Those riding along."""
+        """The open-loop observers."""
         return self.trajectory.observers[1:]
 
 
 def best_observers(run: Run, among: Collection[str] | None = None) -> list[str]:
-    """The one in the loop, and the best of those riding along; only those in `among`, if it is given."""
-    there = {name: of for name, of in run.observers.items() if among is None or name in among}
-    return observers_to_draw(there, always=[name for name in run.trajectory.observers[:1] if name in there])
+    """Choose the observer in the loop and the best open-loop observers; only from `among`, unless it is None."""
+    summaries = {name: summary for name, summary in run.observers.items() if among is None or name in among}
+    return observers_to_draw(summaries, always=[name for name in run.trajectory.observers[:1] if name in summaries])
 
 
 def best_runs(runs: Sequence[Run]) -> list[str]:
-    """Names of the runs in which the estimate was best, of those that stood to the end if there are enough."""
+    """Choose the runs with the best estimates, first from those that reached their end; return their names."""
     return observers_to_draw({run.name: {**run.summary, "fell": run.outcome.kind in ENDINGS} for run in runs})
 
 
 def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, float]]:
-    """The torque on the frame as steps.
+    """Add pushes up to the steps of one torque.
 
     Args:
         pushes: The pushes, which may overlap.
-        end_s: End of the run; what comes later is left out [s].
+        end_s: End of the run; later steps are discarded [s].
 
     Returns:
         (time [s], torque from then on [N m]), in order of time.
@@ -79,10 +78,10 @@ def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, floa
 
 
 def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[tuple[float, str]]:
-    """What the rig is doing, as steps.
+    """Divide a run into phases.
 
-    Before the first push it is `balancing`. After a push (or from the start, if there is none) it is `recovering`
-    until the tilt stays inside the settle band up to the next push or the end; from then on it is `settled`.
+    Before the first push the phase is `balancing`. After a push (or from the start, if there is no push) the phase is
+    `recovering` until the tilt stays inside the settle band up to the next push or the end. Then it is `settled`.
 
     Args:
         run: The run.
@@ -96,11 +95,11 @@ def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[
     steps = [(0.0, BALANCING)] if pushes and min(p.start_s for p in pushes) > 0.0 else []
     starts = sorted(push.start_s for push in pushes)
     steps += [(start, PUSH) for start in starts]
-    for calm in sorted({push.end_s for push in pushes}) if pushes else [0.0]:
-        if any(p.start_s <= calm < p.end_s for p in pushes):
+    for push_end in sorted({push.end_s for push in pushes}) if pushes else [0.0]:
+        if any(p.start_s <= push_end < p.end_s for p in pushes):
             continue  # another push is still on
-        until = min((start for start in starts if start >= calm), default=end)
-        steps += _recovery(run.trajectory, calm, min(until, end), math.radians(settings.settle_band_deg))
+        until = min((start for start in starts if start >= push_end), default=end)
+        steps += _recovery(run.trajectory, push_end, min(until, end), math.radians(settings.settle_band_deg))
     steps = sorted((time, name) for time, name in steps if time < end)
     steps = [step for i, step in enumerate(steps) if i == 0 or step[1] != steps[i - 1][1]]
     if run.outcome.kind in ENDINGS:
@@ -109,7 +108,7 @@ def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[
 
 
 def _recovery(trajectory: Trajectory, start: float, end: float, band: float) -> list[tuple[float, str]]:
-    """Recovering and settled between two pushes."""
+    """Return the steps `recovering` and `settled` between two pushes."""
     time = trajectory["time_s"]
     inside = (time >= start - 1e-9) & (time < end - 1e-9)
     if not inside.any():

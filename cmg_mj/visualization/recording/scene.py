@@ -1,4 +1,4 @@
-"""The moving mechanism: MuJoCo's geoms as static shapes, body poses over time, the push as an arrow."""
+"""Records the moving mechanism: MuJoCo's geoms as static shapes, poses over time, pushes as an arrow."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import rerun as rr
 from cmg_mj.plant.parts import Cube
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.disturbances import Push
-from cmg_mj.visualization.recording.camera import ball
+from cmg_mj.visualization.recording.camera import enclosing_ball
 from cmg_mj.visualization.recording.run import Run, torque_steps
-from cmg_mj.visualization.recording.shapes import shapes
-from cmg_mj.visualization.recording.timeline import TIMELINE, column, instant
+from cmg_mj.visualization.recording.shapes import drawn_shapes
+from cmg_mj.visualization.recording.signals import TIMELINE, instant, time_column
 
 POSE_RATE_HZ = 100.0
-"""Poses are recorded at most this often; the eye needs no more."""
+"""Largest rate at which poses are recorded; the eye needs no more."""
 
 FLYWHEEL_SLOWDOWN = 100.0
 """Flywheels are drawn turning this many times slower.
@@ -29,28 +29,20 @@ the flywheel is the true one; its shapes hang from a child entity, `slowed`, tha
 
 PUSH_COLOR = (213, 94, 0)
 PUSH_LENGTH, PUSH_RADIUS = 0.8, 0.047
-"""Of the strongest push's arrow, in radii of the rig."""
+"""Length and radius of the strongest push's arrow, in radii of the rig."""
 
 
 def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes: Sequence[Push]) -> None:
-    """Record the rig of one run under `<branch>/rig`.
-
-    Args:
-        rec: The recording.
-        branch: The run's branch.
-        plant: The rig.
-        run: The run.
-        pushes: Torques from outside.
-    """
-    radius = size(plant)
+    """Record the mechanism of one run under `<branch>/rig`."""
+    radius = radius_at_start(plant)
     log_shapes(rec, branch, plant, radius)
     log_poses(rec, branch, plant, *pose_samples(plant, run))
-    log_torques(rec, branch, plant, torque_steps(pushes, run.outcome.time_s), strongest(pushes), radius)
+    log_torques(rec, branch, plant, torque_steps(pushes, run.outcome.time_s), largest_torque(pushes), radius)
 
 
-def size(plant: Plant) -> float:
-    """Radius of the rig where it starts, by which arrows and floors go [m]."""
-    return ball(plant, np.empty((0, plant.model.nq))).radius
+def radius_at_start(plant: Plant) -> float:
+    """Return the radius of a plant at its start, the scale of arrows and floors [m]."""
+    return enclosing_ball(plant, np.empty((0, plant.model.nq))).radius
 
 
 def log_poses(rec: rr.RecordingStream, branch: str, plant: Plant, time: np.ndarray, qpos: np.ndarray) -> None:
@@ -59,32 +51,32 @@ def log_poses(rec: rr.RecordingStream, branch: str, plant: Plant, time: np.ndarr
     Args:
         rec: The recording.
         branch: The run's branch.
-        plant: The rig.
-        time: (n,) [s].
+        plant: The plant.
+        time: Times, (n,) [s].
         qpos: Joint angles, (n, n_joints) [rad].
     """
     positions, quaternions = body_poses(plant, qpos)
-    at = column(time)
+    at = time_column(time)
     for body in range(1, plant.model.nbody):
         poses = rr.Transform3D.columns(translation=positions[:, body], quaternion=quaternions[:, body])
         rec.send_columns(body_path(branch, plant, body), [at], poses)
-    for cube in plant.cubes:
-        translation, quaternion = _turned_back(plant, cube, qpos)
+    for module in plant.cubes:
+        translation, quaternion = _turned_back(plant, module, qpos)
         poses = rr.Transform3D.columns(translation=translation, quaternion=quaternion)
-        rec.send_columns(_slowed_path(branch, plant, cube), [at], poses)
+        rec.send_columns(_slowed_path(branch, plant, module), [at], poses)
 
 
 def body_path(branch: str, plant: Plant, body: int) -> str:
-    """Entity of a body: flat under the rig, `cube1/gimbal` as `cube1.gimbal`, for poses are in the world's frame."""
+    """Name a body's entity: `cube1/gimbal` is `cube1.gimbal`, flat under the rig, as poses are in the world's frame."""
     name = plant.model.body(body).name or f"body{body}"
     return f"{branch}/rig/{rr.escape_entity_path_part(name.replace('/', '.'))}"
 
 
 def pose_samples(plant: Plant, run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """The ticks at which poses are recorded; the initial pose, if the run has no tick.
+    """Choose the ticks at which poses are recorded; the initial pose, if the run has no tick.
 
     Args:
-        plant: The rig.
+        plant: The plant.
         run: The run.
 
     Returns:
@@ -95,20 +87,20 @@ def pose_samples(plant: Plant, run: Run) -> tuple[np.ndarray, np.ndarray]:
     if n == 0:
         return np.zeros(1), plant.new_data().qpos[None].copy()
     time = trajectory["time_s"]
-    kept = np.union1d(np.arange(0, n, pose_stride(time[1] - time[0]) if n > 1 else 1), n - 1)
-    return time[kept], trajectory.qpos()[kept]
+    ticks = np.union1d(np.arange(0, n, pose_stride(time[1] - time[0]) if n > 1 else 1), n - 1)
+    return time[ticks], trajectory.qpos()[ticks]
 
 
 def pose_stride(dt: float) -> int:
-    """Of so many ticks, dt [s] apart, one has its poses recorded."""
+    """Return the number of ticks, dt [s] apart, from one recorded pose to the next."""
     return max(1, round(1.0 / (POSE_RATE_HZ * dt)))
 
 
 def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of all bodies in the world, from MuJoCo's forward kinematics.
+    """Compute the poses of all bodies in the world by MuJoCo's forward kinematics.
 
     Args:
-        plant: The rig.
+        plant: The plant.
         qpos: Joint angles, (n, n_joints) [rad].
 
     Returns:
@@ -125,35 +117,35 @@ def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return positions, np.roll(quaternions, -1, axis=-1)
 
 
-def _turned_back(plant: Plant, cube: Cube, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turn, in the flywheel's own frame, from its true angle to the slowed one: translation and quaternion xyzw."""
+def _turned_back(plant: Plant, module: Cube, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the motion, in the flywheel's frame, from its true angle to the slowed one: translation, quaternion."""
     model = plant.model
-    joint = int(model.dof_jntid[cube.flywheel_dof])
+    joint = int(model.dof_jntid[module.flywheel_dof])
     axis, anchor = model.jnt_axis[joint], model.jnt_pos[joint]
-    turn = (qpos[:, cube.flywheel] * (1.0 / FLYWHEEL_SLOWDOWN - 1.0))[:, None]
+    turn = (qpos[:, module.flywheel] * (1.0 / FLYWHEEL_SLOWDOWN - 1.0))[:, None]
     quaternion = np.concatenate([np.sin(turn / 2.0) * axis, np.cos(turn / 2.0)], axis=1)
     along = axis * (axis @ anchor)
     turned = along + np.cos(turn) * (anchor - along) + np.sin(turn) * np.cross(axis, anchor)
     return anchor - turned, quaternion
 
 
-def _slowed_path(branch: str, plant: Plant, cube: Cube) -> str:
-    return f"{body_path(branch, plant, int(plant.model.dof_bodyid[cube.flywheel_dof]))}/slowed"
+def _slowed_path(branch: str, plant: Plant, module: Cube) -> str:
+    return f"{body_path(branch, plant, int(plant.model.dof_bodyid[module.flywheel_dof]))}/slowed"
 
 
 def log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float) -> None:
-    """Record the rig's looks: one static entity a geom and a site, under its body."""
+    """Record the plant's shapes: one static entity for each geom and site, under its body."""
     model = plant.drawn_model
     parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
-    for cube in plant.cubes:
-        parents[int(model.dof_bodyid[cube.flywheel_dof])] = _slowed_path(branch, plant, cube)
-    for body, name, shape in shapes(model, radius):
+    for module in plant.cubes:
+        parents[int(model.dof_bodyid[module.flywheel_dof])] = _slowed_path(branch, plant, module)
+    for body, name, shape in drawn_shapes(model, radius):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
         rec.log(f"{parents[body]}/{path}", shape, static=True)
 
 
-def strongest(pushes: Sequence[Push]) -> float:
-    """The largest torque that ever acts, by which the arrows' lengths go [N m]."""
+def largest_torque(pushes: Sequence[Push]) -> float:
+    """Return the largest torque that ever acts, the scale of the arrows [N m]."""
     return max((abs(torque) for _, torque in torque_steps(pushes, math.inf)), default=0.0)
 
 
@@ -165,15 +157,15 @@ def log_torques(
     largest: float,
     radius: float,
 ) -> None:
-    """An arrow on the frame's upper edge that shows the torque as the force of a hand, while it lasts.
+    """Record an arrow on the frame's upper edge that shows a torque as the force of a hand, while the torque lasts.
 
     Args:
         rec: The recording.
         branch: The run's branch.
-        plant: The rig.
+        plant: The plant.
         steps: (time [s], torque from then on [N m]).
-        largest: What `strongest` gives.
-        radius: Of the rig [m].
+        largest: Result of `largest_torque` [N m].
+        radius: Radius of the plant [m].
     """
     path = f"{body_path(branch, plant, plant.frame)}/push"
     tip, direction = _edge(plant)
@@ -182,20 +174,20 @@ def log_torques(
         if abs(torque) <= 1e-9 * largest:
             rec.log(path, rr.Clear(recursive=False))
             continue
-        vector = direction * (PUSH_LENGTH * radius * torque / largest)
+        force = direction * (PUSH_LENGTH * radius * torque / largest)
         looks = {"radii": [PUSH_RADIUS * radius], "colors": [PUSH_COLOR], "labels": [f"push {torque:+.3g} N m"]}
-        rec.log(path, rr.Arrows3D(vectors=[vector], origins=[tip - vector], **looks))
+        rec.log(path, rr.Arrows3D(vectors=[force], origins=[tip - force], **looks))
     rec.reset_time()
 
 
 def _edge(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
-    """The frame's upper edge on the radial line, and where a positive torque moves it, both in the frame's axes."""
+    """Find the frame's upper edge on the radial line, and its motion under a positive torque, in the frame's axes."""
     model = plant.drawn_model
     axis, anchor = plant.axis.direction, plant.axis.point
     site = model.site_pos[model.sensor(plant.axis.prefix + "accelerometer_outer").objid[0]] - anchor
     radial = site - axis * (axis @ site)
     distance = float(np.linalg.norm(radial))
     radial = radial / distance
-    own = model.geom_bodyid == plant.frame
-    height = max([distance, *((model.geom_pos[own] - anchor) @ radial).tolist()])
+    frame_geoms = model.geom_bodyid == plant.frame
+    height = max([distance, *((model.geom_pos[frame_geoms] - anchor) @ radial).tolist()])
     return anchor + radial * height, np.cross(axis, radial)

@@ -1,9 +1,9 @@
-"""MuJoCo's geoms and sites as rerun's shapes."""
+"""Converts MuJoCo's geoms and sites to rerun's shapes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TypedDict
 
 import mujoco
 import numpy as np
@@ -12,25 +12,40 @@ import rerun as rr
 from cmg_mj.visualization.recording.camera import geom_rgba, is_drawn
 
 INFINITE_PLANE, TILE = 4.0, 0.5
-"""Half the edge of a plane without end, and the edge of its tiles, in radii of the rig."""
+"""Half the edge of an infinite plane, and the edge of its tiles, in radii of the rig."""
 
 MOST_TILES = 200
-"""Along one edge of a plane, however large it is beside the rig."""
+"""Largest number of tiles along one edge of a plane."""
 
 TILE_COLORS = ((150, 156, 164), (132, 138, 147))
 
 _Type = mujoco.mjtGeom
 
+Shape = rr.Capsules3D | rr.Cylinders3D | rr.Boxes3D | rr.Ellipsoids3D | rr.Mesh3D
 
-def shapes(model: mujoco.MjModel, radius: float) -> Iterator[tuple[int, str, Any]]:
-    """Body, name and shape of all that MuJoCo draws.
+
+class Looks(TypedDict):
+    """Colour and orientation of a shape."""
+
+    colors: list[tuple[int, ...]]
+    quaternions: list[np.ndarray]
+
+
+class Solid(Looks):
+    """Colour and orientation of a shape with filled faces."""
+
+    fill_mode: rr.components.FillMode
+
+
+def drawn_shapes(model: mujoco.MjModel, radius: float) -> Iterator[tuple[int, str, Shape]]:
+    """Convert all geoms and sites that MuJoCo draws.
 
     Args:
         model: The model.
-        radius: Of the rig, by which a plane's tiles go [m].
+        radius: Radius of the rig, the scale of a plane's tiles [m].
 
     Yields:
-        The body's number, the name, the shape in the body's frame.
+        The body's index, the name, the shape in the body's frame.
     """
     for i in range(model.ngeom):
         rgba = geom_rgba(model, i)
@@ -55,23 +70,23 @@ def _shape(
     wxyz: np.ndarray,
     rgba: np.ndarray,
     radius: float,
-) -> Any:
-    """MuJoCo's shape as rerun's, in the body's frame."""
+) -> Shape:
+    """Convert one shape, in the body's frame."""
     rotation = _matrix(wxyz)
     color = tuple(round(255.0 * c) for c in rgba.tolist())
-    looks: dict[str, Any] = {"colors": [color], "quaternions": [np.roll(wxyz, -1)]}
-    solid: dict[str, Any] = {"fill_mode": rr.components.FillMode.Solid}
+    looks: Looks = {"colors": [color], "quaternions": [np.roll(wxyz, -1)]}
+    solid: Solid = {**looks, "fill_mode": rr.components.FillMode.Solid}
     if kind == int(_Type.mjGEOM_CAPSULE):
         # MuJoCo's capsule is centred, rerun's stands on its start.
         start = position - rotation[:, 2] * size[1]
-        return rr.Capsules3D(lengths=[2.0 * size[1]], radii=[size[0]], translations=[start], **looks, **solid)
+        return rr.Capsules3D(lengths=[2.0 * size[1]], radii=[size[0]], translations=[start], **solid)
     if kind == int(_Type.mjGEOM_CYLINDER):
-        return rr.Cylinders3D(lengths=[2.0 * size[1]], radii=[size[0]], centers=[position], **looks, **solid)
+        return rr.Cylinders3D(lengths=[2.0 * size[1]], radii=[size[0]], centers=[position], **solid)
     if kind == int(_Type.mjGEOM_BOX):
-        return rr.Boxes3D(half_sizes=[size], centers=[position], **looks, **solid)
+        return rr.Boxes3D(half_sizes=[size], centers=[position], **solid)
     if kind in (int(_Type.mjGEOM_SPHERE), int(_Type.mjGEOM_ELLIPSOID)):
         half_sizes = size if kind == int(_Type.mjGEOM_ELLIPSOID) else np.full(3, size[0])
-        return rr.Ellipsoids3D(half_sizes=[half_sizes], centers=[position], **looks, **solid)
+        return rr.Ellipsoids3D(half_sizes=[half_sizes], centers=[position], **solid)
     if kind == int(_Type.mjGEOM_PLANE):
         return _tiles(size, position, rotation, radius)
     if kind == int(_Type.mjGEOM_MESH) and geom is not None:
@@ -90,8 +105,8 @@ def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _tiles(size: np.ndarray, position: np.ndarray, rotation: np.ndarray, radius: float) -> Any:
-    """A plane as a chequered mesh: lines and textures would fight or blur."""
+def _tiles(size: np.ndarray, position: np.ndarray, rotation: np.ndarray, radius: float) -> rr.Mesh3D:
+    """Convert a plane to a chequered mesh; lines or textures would flicker or blur."""
     half = np.where(size[:2] > 0.0, size[:2], INFINITE_PLANE * radius)
     count = np.clip(np.ceil(2.0 * half / (TILE * radius)), 1, MOST_TILES).astype(int)
     i, j = (index.ravel() for index in np.meshgrid(*map(np.arange, count), indexing="ij"))

@@ -1,4 +1,4 @@
-"""The run as time series: what is plotted, under which name, in which unit and colour."""
+"""The time series of a run: paths, units, colours; and the recording's timeline."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour, colours
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.recording.camera import Ball
 from cmg_mj.visualization.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
-from cmg_mj.visualization.recording.timeline import TIMELINE, column, instant
+
+TIMELINE = "sim_time"
+"""Simulated time from the start of the run."""
 
 LIMIT: Colour = (120, 120, 120)
 CONTROLLER: Colour = (200, 200, 200)
-CUBES: tuple[Colour, ...] = ((225, 205, 165), (125, 150, 185), (160, 120, 90), (110, 160, 140))
-"""Strong colours are the observers'."""
+MODULES: tuple[Colour, ...] = ((225, 205, 165), (125, 150, 185), (160, 120, 90), (110, 160, 140))
+"""Colours of the modules: pale, because strong colours are those of observers."""
 
 PHASES: dict[str, Colour] = {
     BALANCING: (0, 114, 178),
@@ -32,22 +34,22 @@ PHASES: dict[str, Colour] = {
 }
 
 NO_PHASE = ""
-"""Ends the lane."""
+"""State that ends the lane."""
 
 
 @dataclass(frozen=True)
 class Series:
-    """One entity of scalars.
+    """An entity of scalars.
 
     Attributes:
-        path: Below the run's branch.
-        name: In the legend; for several lines the same name.
-        time: (n,) [s].
-        values: (n,) or (n, n_lines), in the unit that the plot's title names.
-        color: Of its lines.
-        width: Of its lines.
-        whole: Whether an axis must show all of it; bounds, measurements and estimates may be cut off.
-        observer: Whose it is; empty if no observer's.
+        path: Path below the run's branch.
+        name: Name in the legend; several lines share the name.
+        time: Times, (n,) [s].
+        values: Values, (n,) or (n, n_lines), in the unit that the plot's title names.
+        color: Colour of the lines.
+        width: Width of the lines.
+        whole: Whether an axis must show the whole series; bounds, measurements and estimates may be cut off.
+        observer: The observer that made the series; empty if none did.
     """
 
     path: str
@@ -62,13 +64,13 @@ class Series:
 
 @dataclass(frozen=True, kw_only=True)
 class Lines:
-    """Time series and their place in the recording.
+    """A group of time series and its place in the recording.
 
     Attributes:
-        path: Where everything of them is found.
-        label: Of what they are, shortened.
-        series: By their path below the branch.
-        timeline: What their time is called.
+        path: Path of the group.
+        label: Shortened name of the run or log.
+        series: Path below the group -> series.
+        timeline: Name of the timeline.
     """
 
     path: str
@@ -83,15 +85,25 @@ class Branch(Lines):
 
     Attributes:
         run: The run.
-        rig: Where the rig is.
+        ball: A ball that encloses the rig.
     """
 
     run: Run
-    rig: Ball
+    ball: Ball
 
 
-def numbered(names: Sequence[str]) -> list[str]:
-    """Parts of entity paths: the viewer sorts by them, so that of several each has its number before its name."""
+def instant(seconds: float) -> np.timedelta64:
+    """Round a time to the nanosecond (rerun would truncate it)."""
+    return np.timedelta64(round(seconds * 1e9), "ns")
+
+
+def time_column(seconds: np.ndarray, timeline: str = TIMELINE) -> rr.TimeColumn:
+    """Make a column of times, (n,) [s]."""
+    return rr.TimeColumn(timeline, duration=np.rint(seconds * 1e9).astype("timedelta64[ns]"))
+
+
+def numbered_parts(names: Sequence[str]) -> list[str]:
+    """Make parts of entity paths; each of several gets a number before its name, because the viewer sorts by path."""
     digits = len(str(len(names)))
     return [
         rr.escape_entity_path_part(f"{i:0{digits}}_{name}" if len(names) > 1 else name)
@@ -99,14 +111,14 @@ def numbered(names: Sequence[str]) -> list[str]:
     ]
 
 
-def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> list[Series]:
-    """All time series of one run.
+def run_series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> list[Series]:
+    """Make all time series of a run.
 
     Args:
         run: The run.
-        plant: The rig.
+        plant: The plant.
         settings: The settle band.
-        rate_limit: Largest gimbal rate [rad/s], if it is known.
+        rate_limit: Largest gimbal rate, if it is known [rad/s].
 
     Returns:
         The series: tilt and gimbal angles in degrees, rates in rad/s, the integrator in rad s.
@@ -122,57 +134,52 @@ def series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float 
         Series("rate/gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False),
     ]
     labels = short_names(t.observers)
-    for part, (name, color) in zip(numbered(t.observers), colours(t.observers).items(), strict=True):
+    for part, (name, color) in zip(numbered_parts(t.observers), colours(t.observers).items(), strict=True):
         rows += _estimates(run, part, name, labels[name], color)
     rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
     if rate_limit is not None:
         rows.append(_bounds("command/limit", "rate limit", time, rate_limit))
-    for i, cube in enumerate(plant.cubes):
-        color = CUBES[i % len(CUBES)]
-        part = rr.escape_entity_path_part(cube.of_axis)
-        angle = t[f"angle/{cube.name}/gimbal_rad"] - cube.gimbal_zero
-        speed = t[f"rate/{cube.name}/flywheel_rad_s"] * np.sign(cube.speed)
-        width = 3.0 if i == 0 and len(plant.cubes) > 1 else 1.5  # the cubes' speeds agree: one must shine through
-        way = "" if cube.speed > 0.0 else " (spins backwards)"
+    for i, module in enumerate(plant.cubes):
+        color = MODULES[i % len(MODULES)]
+        part = rr.escape_entity_path_part(module.of_axis)
+        angle = t[f"angle/{module.name}/gimbal_rad"] - module.gimbal_zero
+        speed = t[f"rate/{module.name}/flywheel_rad_s"] * np.sign(module.speed)
+        width = 3.0 if i == 0 and len(plant.cubes) > 1 else 1.5  # the modules' speeds agree: one must shine through
+        suffix = "" if module.speed > 0.0 else " (spins backwards)"
         rows += [
-            Series(f"gimbal/{part}", cube.name, time, np.degrees(angle), color),
-            Series(f"flywheel/{part}", cube.name + way, time, speed, color, width),
+            Series(f"gimbal/{part}", module.name, time, np.degrees(angle), color),
+            Series(f"flywheel/{part}", module.name + suffix, time, speed, color, width),
         ]
     rows.append(Series("integrator/x_e", "x_e", time, t["x_e_rad_times_s"], CONTROLLER))
     return rows
 
 
 def _estimates(run: Run, part: str, name: str, label: str, color: Colour) -> list[Series]:
-    """What one observer says."""
+    """Make the series of one observer's estimates."""
     t = run.trajectory
     time, rate = t["time_s"], t[f"estimate/{name}/x2_rad_s"]
-    said = {"rate_estimate": rate, "rate_error": rate - t["x2_rad_s"]}
+    estimates = {"rate_estimate": rate, "rate_error": rate - t["x2_rad_s"]}
     if BIAS in t.extra_signals(name):
-        said["bias"] = np.degrees(t[f"estimate/{name}/{BIAS}"])
+        estimates["bias"] = np.degrees(t[f"estimate/{name}/{BIAS}"])
     width = 1.5 if name == t.observers[0] else 1.0
     rows = [
         Series(f"{folder}/{part}", label, time, values, color, width, whole=False, observer=name)
-        for folder, values in said.items()
+        for folder, values in estimates.items()
     ]
-    if "bias" in said and (bias := run.observers[name].get("bias_deg")) is not None:
-        ends = time[[0, -1]] if len(time) > 1 else time
+    if "bias" in estimates and isinstance(bias := run.observers[name].get("bias_deg"), (int, float)):
+        ends = _ends(time)
         rows.append(Series("bias/true", "true", ends, np.full(len(ends), bias), BASELINE_COLOURS["true"], 2.5))
     return rows
 
 
 def log_series(rec: rr.RecordingStream, branch: Lines) -> None:
-    """Record time series, a column each.
-
-    Args:
-        rec: The recording.
-        branch: What they are of.
-    """
+    """Record time series, a column each."""
     log_styles(rec, branch)
     log_values(rec, branch)
 
 
 def log_styles(rec: rr.RecordingStream, branch: Lines) -> None:
-    """How the series are drawn."""
+    """Record the colours, widths and names of the series."""
     for row in branch.series.values():
         n = 1 if row.values.ndim == 1 else row.values.shape[1]
         style = rr.SeriesLines(colors=[row.color] * n, widths=[row.width] * n, names=[row.name] * n)
@@ -180,21 +187,21 @@ def log_styles(rec: rr.RecordingStream, branch: Lines) -> None:
 
 
 def log_values(rec: rr.RecordingStream, branch: Lines) -> None:
-    """The series' values."""
+    """Record the values of the series."""
     for row in branch.series.values():
         if len(row.time):
             scalars = rr.Scalars.columns(scalars=row.values)
-            rec.send_columns(f"{branch.path}/{row.path}", [column(row.time, branch.timeline)], scalars)
+            rec.send_columns(f"{branch.path}/{row.path}", [time_column(row.time, branch.timeline)], scalars)
 
 
 def phase_steps(run: Run, pushes: Sequence[Push], settings: MetricsSettings, until_s: float) -> list[tuple[float, str]]:
-    """What the rig is doing as the steps of a lane, which a run that was not done ends.
+    """Divide a run into the phases of its lane; the lane ends with a run that did not reach its end.
 
     Args:
         run: The run.
         pushes: Torques from outside.
         settings: The settle band.
-        until_s: Until when a fall is shown; at least a little longer than the run, or it could not be seen [s].
+        until_s: Time until which a fall is shown; at least a little after the run, so that it is seen [s].
 
     Returns:
         (time [s], name of the phase from then on), in order of time.
@@ -206,7 +213,7 @@ def phase_steps(run: Run, pushes: Sequence[Push], settings: MetricsSettings, unt
 
 
 def log_lane(rec: rr.RecordingStream, branch: str) -> None:
-    """The lane of phases of a branch, in its colours and still empty."""
+    """Record the colours of a branch's lane of phases."""
     states = rr.StateConfiguration(values=list(PHASES), colors=list(PHASES.values()))
     rec.log(f"{branch}/phase", states, static=True)
 
@@ -220,6 +227,11 @@ def log_phases(rec: rr.RecordingStream, branch: str, steps: Sequence[tuple[float
 
 
 def _bounds(path: str, name: str, time: np.ndarray, bound: float) -> Series:
-    """Two horizontal lines at +-bound."""
-    ends = time[[0, -1]] if len(time) > 1 else time
+    """Make two horizontal lines at +-bound."""
+    ends = _ends(time)
     return Series(path, name, ends, np.tile([bound, -bound], (len(ends), 1)), LIMIT, 1.0, whole=False)
+
+
+def _ends(time: np.ndarray) -> np.ndarray:
+    """Return the first and the last time."""
+    return time[[0, -1]] if len(time) > 1 else time

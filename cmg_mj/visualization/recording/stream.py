@@ -1,4 +1,4 @@
-"""A recording on its way to its file: whole or not at all, and nothing left out in silence."""
+"""Writes a recording to its file, whole or not at all; rerun's warnings become errors."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from cmg_mj.results.trajectory import whole_file
 from cmg_mj.visualization.recording.signals import Lines
 
 LONGEST_LIST = 120
-"""Names of runs, put together, that still fit into an application's name [characters]."""
+"""Longest list of runs in an application's name [characters]."""
 
 
 @contextmanager
 def recorded(path: Path, name: str, application: str, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
-    """Give a recording to log to; write its file at the end.
+    """Open a recording to log to; write its file at the end.
 
     Args:
         path: The file.
-        name: Of the recording.
-        application: What `application_of` gives.
-        blueprint: How it opens.
+        name: Name of the recording.
+        application: Result of `application_name`.
+        blueprint: Layout in which the recording opens.
 
     Yields:
         The recording.
@@ -44,7 +44,7 @@ def recorded(path: Path, name: str, application: str, blueprint: rrb.Blueprint) 
             rec.send_blueprint(blueprint, make_active=False, make_default=True)
             set_up(rec, name)
             yield rec
-        finally:  # of what is left in it, rerun would complain on standard error
+        finally:  # rerun would complain on standard error about data left in memory
             content = memory.drain_as_bytes()
     with whole_file(path) as temporary:
         temporary.write_bytes(content)
@@ -54,23 +54,24 @@ def require_enabled(rec: rr.RecordingStream) -> None:
     """Refuse to record where the environment turns rerun off.
 
     Raises:
-        InputError: It does.
+        InputError: The environment variable RERUN turns rerun off.
     """
     if not rr.is_enabled(rec):
         raise InputError("the environment variable RERUN turns recording off: unset it")
 
 
 def set_up(rec: rr.RecordingStream, name: str) -> None:
-    """Give a recording its name, and simulated time as its only time."""
+    """Name a recording, and make simulated time its only timeline."""
     rec.set_log_time_enabled(False)
     rec.set_log_tick_enabled(False)
     rec.send_recording_name(name)
 
 
-def application_of(names: Sequence[str], branches: Sequence[Lines]) -> str:
-    """The viewer remembers a layout by application: recordings with other branches or lines must not share it.
+def application_name(names: Sequence[str], branches: Sequence[Lines]) -> str:
+    """Name the application of a recording.
 
-    It may have about 180 characters, of which few are punctuation.
+    The viewer remembers a layout by application: recordings with other branches or lines must not share its name.
+    The name may have about 180 characters, few of them punctuation.
     """
     listed = " ".join(names)
     if len(listed) > LONGEST_LIST:
@@ -80,13 +81,13 @@ def application_of(names: Sequence[str], branches: Sequence[Lines]) -> str:
 
 
 def log_page(rec: rr.RecordingStream, path: str, page: str) -> None:
-    """A page of Markdown."""
+    """Record a page of Markdown."""
     rec.log(path, rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN), static=True)
 
 
 @contextmanager
 def strict() -> Iterator[None]:
-    """Let rerun raise where it would only warn."""
+    """Make rerun raise where it would only warn."""
     before = rr.strict_mode()
     rr.set_strict_mode(True)
     try:

@@ -1,75 +1,106 @@
-"""The summary as pages of Markdown, in tables no wider than their view."""
+"""The pages of a recording in Markdown, and the properties by which a catalogue finds it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+
+import rerun as rr
 
 from cmg_mj.results import markdown
 from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, heading, written
 from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.resolve import versions
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import FEW, short_names
+from cmg_mj.visualization.plots.readability import FEW, section, short_names
 from cmg_mj.visualization.recording.run import Run, best_observers, best_runs
+from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
+from cmg_mj.visualization.recording.stream import log_page
 
 ROW_TABLES = (
     ("velocity_rms_error_push_rad_s", "velocity_fit"),
     ("velocity_rms_error_rad_s", "settle_time_s", "tilt_rms_deg"),
     ("velocity_fit_push", "gimbal_peak_deg", "command_rms_rad_s"),
 )
-"""What is shown where each run is a row, table by table: first that by which the best are found."""
+"""Keys of the tables with a row for each run, no wider than their view; the first key ranks the runs."""
+
+OPEN_LOOP_TABLES = (OPEN_LOOP_COLUMNS[:2], OPEN_LOOP_COLUMNS[2:])
+"""Keys of the tables with a row for each observer."""
 
 BOLD = "In bold: those that are switched on in the plots; the legends of the other tab switch on any."
-
-RIDING_TABLES = (OPEN_LOOP_COLUMNS[:2], OPEN_LOOP_COLUMNS[2:])
-"""What there is of an observer that rides along, table by table."""
+NOTES = f"In the 3-D view the flywheels turn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed."
 
 
-def page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: MetricsSettings, notes: str) -> str:
-    """Write the summary.
+def log_results(
+    rec: rr.RecordingStream, runs: Sequence[Run], title: str, pushes: Sequence[Push], settings: MetricsSettings
+) -> None:
+    """Record properties and result pages of finished runs.
+
+    Args:
+        rec: The recording.
+        runs: The runs.
+        title: The experiment's title.
+        pushes: Torques from outside.
+        settings: The settle band.
+    """
+    package_versions = {name: versions()[name] for name in ("cmg_mj", "mujoco")}
+    rec.send_property(
+        "experiment", rr.AnyValues(True, **package_versions, title=title, runs=[run.name for run in runs])
+    )
+    for run in runs:
+        numbers = {key: value for key, value in run.summary.items() if isinstance(value, float)}
+        values = rr.AnyValues(True, **numbers, outcome=run.outcome.kind, time_s=run.outcome.time_s)
+        rec.send_property(rr.escape_entity_path_part(run.name), values)
+    log_page(rec, "summary", summary_page(title, runs, pushes, settings))
+    if observers := observers_page(runs):
+        log_page(rec, "observers", observers)
+
+
+def log_scenario(rec: rr.RecordingStream, toml: str) -> None:
+    """Record the page with the resolved scenario."""
+    log_page(rec, "scenario", f"# Scenario\n\n```toml\n{toml.strip()}\n```\n")
+
+
+def summary_page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: MetricsSettings) -> str:
+    """Write the page of summaries.
 
     Args:
         title: The experiment's title.
         runs: The runs.
         pushes: Torques from outside.
         settings: The settle band.
-        notes: A last paragraph.
 
     Returns:
-        The page.
+        The page in Markdown.
     """
     tables = [_by_column(runs)] if len(runs) <= FEW else _by_row(runs)
     band = f"Settled: the tilt stays within ±{settings.settle_band_deg:g}° to the end."
     reasons = [f"**{run.name}**: {run.outcome.reason}" for run in runs if run.outcome.reason]
-    return _paragraphs(f"# {title or 'Run'}", *tables, _pushes(pushes), band, *reasons, notes)
+    return _paragraphs(f"# {title or 'Run'}", *tables, _pushes(pushes), band, *reasons, NOTES)
 
 
 def observers_page(runs: Sequence[Run]) -> str:
-    """What is estimated in a run, by all that ride along; of several runs, of those with open-loop observers."""
+    """Write the page of all observers of a run; of several runs, of those with open-loop observers."""
     return _paragraphs(*(part for run in runs if len(runs) == 1 or run.open_loop_observers for part in _estimates(run)))
 
 
 def _estimates(run: Run) -> list[str]:
-    """One run's observers, then what they are judged beside, table by table."""
-    references: Mapping[str, Mapping[str, Any]] = run.summary.get("references") or {}
+    """Write tables of one run's observers and, below them, its baselines."""
+    references = section(run.summary, "references")
     names = [*_marked(list(run.observers), best_observers(run)), *references]
-    figures = [*run.observers.values(), *references.values()]
-    said = f"In the run of {run.name}.{' The others ride along.' if len(names) > 1 else ''}"
-    parts = [f"{said} {BOLD}" if len(run.observers) > FEW else said]
-    for keys in RIDING_TABLES:
-        rows = [[written(key, of.get(key)) for key in keys] for of in figures]
-        rows = [(name, *row) for name, row in zip(names, rows, strict=True)]
+    summaries = [*run.observers.values(), *(section(references, name) for name in references)]
+    intro = f"In the run of {run.name}.{' The others are open loop.' if len(names) > 1 else ''}"
+    parts = [f"{intro} {BOLD}" if len(run.observers) > FEW else intro]
+    for keys in OPEN_LOOP_TABLES:
+        rows = [
+            (name, *(written(key, summary.get(key)) for key in keys))
+            for name, summary in zip(names, summaries, strict=True)
+        ]
         parts.append(markdown.table(("", *map(heading, keys)), rows))
     return parts
 
 
-def scenario_page(toml: str) -> str:
-    """The scenario as Markdown."""
-    return f"# Scenario\n\n```toml\n{toml.strip()}\n```\n"
-
-
 def _by_column(runs: Sequence[Run]) -> str:
-    """A table with a column a run."""
+    """Write a table with a column for each run."""
     rows = [("Outcome", *map(_outcome, runs))]
     rows += [
         (heading(key), *(written(key, run.summary.get(key)) for run in runs))
@@ -80,7 +111,7 @@ def _by_column(runs: Sequence[Run]) -> str:
 
 
 def _by_row(runs: Sequence[Run]) -> list[str]:
-    """Tables with a row a run."""
+    """Write tables with a row for each run."""
     first = [_marked([run.name for run in runs], best_runs(runs)), [_outcome(run) for run in runs]]
     tables = []
     for i, keys in enumerate(ROW_TABLES):
@@ -92,7 +123,7 @@ def _by_row(runs: Sequence[Run]) -> list[str]:
 
 
 def _marked(names: Sequence[str], best: Sequence[str]) -> list[str]:
-    """Names, shortened; in bold those that are switched on."""
+    """Shorten names; make those that are switched on bold."""
     return [f"**{short}**" if name in best else short for name, short in short_names(names).items()]
 
 
@@ -103,11 +134,11 @@ def _outcome(run: Run) -> str:
 def _pushes(pushes: Sequence[Push]) -> str:
     if not pushes:
         return "No push."
-    listed = (
+    texts = (
         f"{p.torque_n_m:+g} N m{f' about {p.axis}' if p.axis else ''} for {p.duration_s:g} s at {p.start_s:g} s"
         for p in pushes
     )
-    return "Pushes: " + "; ".join(listed) + "."
+    return "Pushes: " + "; ".join(texts) + "."
 
 
 def _paragraphs(*parts: str) -> str:

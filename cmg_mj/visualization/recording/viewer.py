@@ -1,4 +1,4 @@
-"""The viewer that a run is streamed to: one that is started, or one that is there already."""
+"""Starts a viewer that a run is streamed to, or checks the address of one that runs already."""
 
 from __future__ import annotations
 
@@ -18,53 +18,53 @@ from urllib.parse import urlsplit
 from cmg_mj.errors import InputError
 
 LOOPBACK, PORT = "127.0.0.1", 9876
-"""Nobody else's business: rerun would listen to all interfaces. The port is rerun's own."""
+"""Address of a started viewer: rerun would listen on all interfaces. The port is rerun's default."""
 STARTS_WITHIN_S, STAYS_S = 30.0, 1.0
-"""A viewer that has not come by then will not; one that has come and finds no screen goes within the second time."""
+"""Time in which a viewer starts to listen, and time after which a listening viewer has found its screen."""
 ANSWERS_WITHIN_S = 2.0
 
 _started: list[Viewer] = []
-"""Kept: a viewer stays when the run has ended, and nobody waits for it."""
+"""References to the viewers: a viewer outlives the run, and nobody waits for its end."""
 
 
 @dataclass(frozen=True)
 class Viewer:
-    """A viewer of our own.
+    """A viewer that this process has started.
 
     Attributes:
-        port: Where it listens, on this machine alone.
-        process: It.
-        errors: What it writes to standard error.
+        port: Port on which it listens, on this machine alone.
+        process: The viewer's process.
+        errors: The viewer's standard error.
     """
 
     port: int
-    process: subprocess.Popen
+    process: subprocess.Popen[bytes]
     errors: IO[bytes]
 
     @property
     def url(self) -> str:
-        """Where runs are streamed to."""
+        """The address that runs are streamed to."""
         return url_of(str(self.port))
 
     def complaint(self) -> str:
-        """The last it has said, in its words."""
+        """Return the last line of the viewer's standard error."""
         self.errors.seek(0)
         lines = re.sub(r"\x1b\[[\d;]*m", "", self.errors.read().decode(errors="replace")).split("\n")
-        said = next((line.strip() for line in reversed(lines) if line.strip()), "it says nothing")
-        return re.sub(r"^.*\.rs:\d+[:\d]*\s*", "", said).rstrip(".")  # not where in its sources
+        message = next((line.strip() for line in reversed(lines) if line.strip()), "it says nothing")
+        return re.sub(r"^.*\.rs:\d+[:\d]*\s*", "", message).rstrip(".")  # without the place in rerun's sources
 
 
 def url_of(address: str) -> str:
-    """Where a viewer takes streams.
+    """Complete the address of a viewer.
 
     Args:
-        address: PORT, HOST:PORT, or as rerun writes it, rerun+http://HOST:PORT/proxy.
+        address: PORT, HOST:PORT, or rerun+http://HOST:PORT/proxy.
 
     Returns:
-        The last.
+        The address in the last form.
 
     Raises:
-        InputError: It is none of these.
+        InputError: The address has none of these forms.
     """
     host, port = parts_of(address)
     return f"rerun+http://{f'[{host}]' if ':' in host else host}:{port}/proxy"
@@ -74,7 +74,7 @@ def require_listening(address: str) -> None:
     """Refuse an address that nobody listens on.
 
     Raises:
-        InputError: Nobody does, or it is no address.
+        InputError: Nobody listens, or the address has no valid form.
     """
     host, port = parts_of(address)
     try:
@@ -87,7 +87,7 @@ def require_listening(address: str) -> None:
 
 
 def parts_of(address: str) -> tuple[str, int]:
-    """Host and port of an address that `url_of` takes."""
+    """Split an address that `url_of` takes into host and port."""
     plain = f"{LOOPBACK}:{address}" if address.isdigit() else address
     try:
         split = urlsplit(plain if "://" in plain else f"rerun+http://{plain}")
@@ -102,20 +102,20 @@ def parts_of(address: str) -> tuple[str, int]:
 
 
 def start_viewer(options: Sequence[str] = ()) -> Viewer:
-    """Start a viewer that listens to this machine alone. It stays when this process has ended.
+    """Start a viewer that listens on this machine alone and outlives this process.
 
     Args:
-        options: Of `rerun`, besides.
+        options: More options of `rerun`.
 
     Returns:
         The viewer, which listens.
 
     Raises:
-        InputError: It does not start, for want of a screen for instance.
+        InputError: The viewer does not start, for instance because there is no screen.
     """
     for port in (PORT, 0, 0):
         viewer = _start(_free_port(port), options)
-        if _comes(viewer) and _stays(viewer):
+        if _starts_listening(viewer) and _stays(viewer):
             return viewer
         if viewer.process.poll() is None:
             os.killpg(viewer.process.pid, signal.SIGKILL)
@@ -142,7 +142,7 @@ def _start(port: int, options: Sequence[str]) -> Viewer:
     return viewer
 
 
-def _comes(viewer: Viewer) -> bool:
+def _starts_listening(viewer: Viewer) -> bool:
     until = time.monotonic() + STARTS_WITHIN_S
     while time.monotonic() < until and viewer.process.poll() is None:
         if _is_taken(viewer.port):
@@ -152,7 +152,7 @@ def _comes(viewer: Viewer) -> bool:
 
 
 def _stays(viewer: Viewer) -> bool:
-    """It listens first and opens its window then."""
+    """Return whether a viewer survives the opening of its window, which follows the start of listening."""
     try:
         viewer.process.wait(STAYS_S)
     except subprocess.TimeoutExpired:
@@ -166,11 +166,11 @@ def _is_taken(port: int) -> bool:
         return probe.connect_ex((LOOPBACK, port)) == 0
 
 
-def _free_port(rather: int) -> int:
-    """This port, or another if it is taken."""
+def _free_port(preferred: int) -> int:
+    """Return the preferred port, or another if that one is taken."""
     with socket.socket() as probe:
         try:
-            probe.bind((LOOPBACK, rather))
+            probe.bind((LOOPBACK, preferred))
         except OSError:
             probe.bind((LOOPBACK, 0))
         return probe.getsockname()[1]

@@ -1,16 +1,16 @@
-"""The single views of a recording: plots of one run or of several, the rig, the lanes of phases, the pages."""
+"""The views of a recording: plots of one run or of several, the mechanism, lanes of phases, pages of text."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Literal
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from cmg_mj.visualization.plots.colours import colours
+from cmg_mj.visualization.plots.colours import Colour, colours
 from cmg_mj.visualization.plots.readability import axis_range, free_corner
 from cmg_mj.visualization.recording.run import ENDINGS
 from cmg_mj.visualization.recording.signals import Branch, Lines, Series
@@ -18,16 +18,19 @@ from cmg_mj.visualization.recording.signals import Branch, Lines, Series
 RATE, RATE_ERROR = "rate/true", "rate_error/"
 """An error is drawn to the scale of the rate: it must not look small because its axis is large."""
 
+Override = rr.SeriesLines | rrb.EntityBehavior
+PlayState = Literal["paused", "playing", "following"]
+
 
 @dataclass(frozen=True)
 class Plot:
-    """One plot.
+    """A plot of time series.
 
     Attributes:
-        title: What it shows and in which unit.
+        title: Quantity and unit.
         entities: Paths below the run's branch, folders with their slash.
-        height: Share of its column.
-        least: Least span of its axis, in its unit.
+        height: Share of the column's height.
+        least: Least span of the axis, in the unit of the title.
     """
 
     title: str
@@ -38,132 +41,117 @@ class Plot:
 
 @dataclass(frozen=True)
 class Choice:
-    """Which observers, or runs, are switched on. The axes fit those.
+    """The observers, or runs, that are switched on. The axes fit them.
 
     Attributes:
-        shown: Those.
-        listed: Whether the others stand in the legend too, where a click switches them on. Otherwise they are found
-            with the view's entities.
+        shown: Names of the observers or runs.
+        listed: Whether the legend has the others too, where a click switches them on. Otherwise the list of the view's
+            entities has them.
     """
 
     shown: Collection[str]
     listed: bool = False
 
-    def line(self, name: str, **looks: Any) -> list[Any]:
-        """What to override of a line, by the name of its observer or run: its looks, and whether it is on."""
+    def visibility(self, name: str) -> list[Override]:
+        """Return the overrides that switch the line of an observer or run on or off."""
         on = name in self.shown
-        if self.listed:
-            return [rr.SeriesLines(visible_series=[on], **looks)]
-        return [rrb.EntityBehavior(visible=on), *([rr.SeriesLines(**looks)] if looks else [])]
+        return [rr.SeriesLines(visible_series=[on]) if self.listed else rrb.EntityBehavior(visible=on)]
+
+    def styled_line(self, name: str, color: Colour, label: str) -> list[Override]:
+        """Return the overrides that style the line of a run and switch it on or off."""
+        on = [name in self.shown] if self.listed else None
+        style = rr.SeriesLines(visible_series=on, colors=[color], names=[label], widths=[1.5])
+        return [style] if self.listed else [*self.visibility(name), style]
 
 
 EYE = (1.48, -1.65, 0.63)
-"""From the rig's centre to the camera, in radii of the rig: far enough for all of it in a square view."""
+"""Vector from the rig's centre to the camera, in radii of the rig: a square view holds all of the rig."""
 
 BACKGROUND = (58, 63, 71)
 
 
-def plot(what: Plot, branch: Lines, observers: Choice) -> rrb.View:
-    """A plot of one run, or one log.
-
-    Args:
-        what: The plot.
-        branch: The run or log.
-        observers: The others are there, but switched off.
-
-    Returns:
-        The view.
-    """
-    rows = [row for path, row in branch.series.items() if path.startswith(what.entities)]
-    fitting = [row for row in rows if not row.observer or row.observer in observers.shown]
-    sure = [row.values for row in fitting if row.whole]
-    if RATE_ERROR in what.entities:
-        sure.append(branch.series[RATE].values)
+def plot_view(plot: Plot, branch: Lines, observers: Choice) -> rrb.View:
+    """Lay out a plot of one run or log, with all its observers, some of them switched off."""
+    rows = [row for path, row in branch.series.items() if path.startswith(plot.entities)]
+    visible = [row for row in rows if not row.observer or row.observer in observers.shown]
+    required = [row.values for row in visible if row.whole]
+    if RATE_ERROR in plot.entities:
+        required.append(branch.series[RATE].values)
     return _series_view(
-        what,
+        plot,
         branch.path,
-        [f"{branch.path}/{entity}**" for entity in what.entities],
-        {f"{branch.path}/{row.path}": observers.line(row.observer) for row in rows if row not in fitting},
-        axis_range(sure, [row.values for row in fitting if not row.whole]),
-        fitting,
+        [f"{branch.path}/{entity}**" for entity in plot.entities],
+        {f"{branch.path}/{row.path}": observers.visibility(row.observer) for row in rows if row not in visible},
+        axis_range(required, [row.values for row in visible if not row.whole]),
+        visible,
     )
 
 
-def overlay(what: Plot, branches: Sequence[Branch], cube: str, runs: Choice) -> rrb.View:
-    """The same series of all runs, each in its run's colour.
+def overlay_view(plot: Plot, branches: Sequence[Branch], module: str, runs: Choice) -> rrb.View:
+    """Lay out a plot of the same series of all runs, each in its run's colour.
 
     Args:
-        what: The plot; `{cube}` in it stands for the name of a cube.
+        plot: The plot; `{module}` in title and entities stands for the name of a module.
         branches: The runs.
-        cube: That name.
-        runs: The others are there, but switched off.
+        module: Name of the module.
+        runs: The runs that are switched on.
 
     Returns:
         The view.
     """
     color = colours(branch.run.name for branch in branches)
-    part = rr.escape_entity_path_part(cube)
-    overrides: dict[str, list[Any]] = {}
-    sure: list[np.ndarray] = []
-    rather: list[np.ndarray] = []
-    fitting = []
+    part = rr.escape_entity_path_part(module)
+    overrides: dict[str, list[Override]] = {}
+    required: list[np.ndarray] = []
+    optional: list[np.ndarray] = []
+    visible = []
     for branch in branches:
         name = branch.run.name
-        row = _row(branch, what.entities[0].format(cube=part))
-        looks = {"colors": [color[name]], "names": [branch.label], "widths": [1.5]}
-        overrides[f"{branch.path}/{row.path}"] = runs.line(name, **looks)
+        row = _row(branch, plot.entities[0].format(module=part))
+        overrides[f"{branch.path}/{row.path}"] = runs.styled_line(name, color[name], branch.label)
         stands = branch.run.outcome.kind not in ENDINGS
         if name in runs.shown:
-            fitting.append(row)
-            (sure if row.whole and stands else rather).append(row.values)
-            if RATE_ERROR in what.entities and stands:
-                sure.append(branch.series[RATE].values)
-    what = replace(what, title=what.title.format(cube=cube))
-    return _series_view(what, "/", list(overrides), overrides, axis_range(sure, rather), fitting)
+            visible.append(row)
+            (required if row.whole and stands else optional).append(row.values)
+            if RATE_ERROR in plot.entities and stands:
+                required.append(branch.series[RATE].values)
+    plot = replace(plot, title=plot.title.format(module=module))
+    return _series_view(plot, "/", list(overrides), overrides, axis_range(required, optional), visible)
 
 
 def _row(branch: Branch, entity: str) -> Series:
-    """A series; of a folder, that of the observer in the loop."""
-    in_loop = branch.run.trajectory.observers[0]
-    found = (row for path, row in branch.series.items() if path.startswith(entity) and row.observer in ("", in_loop))
-    return next(found)
+    """Find a series; in a folder, the series of the observer in the loop."""
+    observers = ("", branch.run.trajectory.observers[0])
+    return next(row for path, row in branch.series.items() if path.startswith(entity) and row.observer in observers)
 
 
 def _series_view(
-    what: Plot,
+    plot: Plot,
     origin: str,
     contents: list[str],
-    overrides: Mapping[Any, list[Any]],
+    overrides: Mapping[str, list[Override]],
     axis: tuple[float, float] | None,
-    shown: Sequence[Series],
+    visible: Sequence[Series],
 ) -> rrb.View:
     if axis is not None:
-        more = max(0.0, what.least - (axis[1] - axis[0])) / 2.0
+        more = max(0.0, plot.least - (axis[1] - axis[0])) / 2.0
         axis = (axis[0] - more, axis[1] + more)
-    corner = "".join(word.capitalize() for word in free_corner([(row.time, row.values) for row in shown], axis))
+    corner = "".join(word.capitalize() for word in free_corner([(row.time, row.values) for row in visible], axis))
     return rrb.TimeSeriesView(
         origin=origin,
         contents=contents,
-        name=what.title,
-        overrides=overrides,
+        name=plot.title,
+        overrides={**overrides},
         axis_x=_time_axis(),
         axis_y=rrb.ScalarAxis(range=axis) if axis else None,
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.auto(corner), visible=True),
     )
 
 
-def rig(branch: Branch, name: str) -> rrb.View:
-    """The moving mechanism, all of it in view.
-
-    Args:
-        branch: The run.
-        name: The view's title.
-
-    Returns:
-        The view.
-    """
-    centre = branch.rig.centre
-    eye = centre + branch.rig.radius * np.array(EYE)
+def mechanism_view(branch: Branch, name: str) -> rrb.View:
+    """Lay out the moving mechanism, all of it in view."""
+    centre = branch.ball.centre
+    eye = centre + branch.ball.radius * np.array(EYE)
     return rrb.Spatial3DView(
         origin=f"{branch.path}/rig",
         name=name,
@@ -173,16 +161,28 @@ def rig(branch: Branch, name: str) -> rrb.View:
     )
 
 
-def phases(branches: Iterable[Branch]) -> rrb.View:
-    """A lane of phases a run."""
+def phase_lanes(branches: Iterable[Branch]) -> rrb.View:
+    """Lay out a lane of phases for each run."""
     contents = [f"{branch.path}/phase" for branch in branches]
     return rrb.StateTimelineView(origin="/", contents=contents, name="Phase", time_view=_time_axis())
 
 
-def pages(names: Sequence[str], active: str) -> rrb.Container:
-    """Pages of text, one of them in front: `Summary` is `/summary`."""
+def page_tabs(names: Sequence[str], active: str) -> rrb.Container:
+    """Lay out pages of text, one of them in front; the page `Summary` is the entity `/summary`."""
     views = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in names]
     return rrb.Tabs(*views, active_tab=list(names).index(active))
+
+
+def tabbed_blueprint(boards: Sequence[rrb.Container], timeline: str, play_state: PlayState) -> rrb.Blueprint:
+    """Lay out a recording as tabs of boards, or as a single board, with the panels hidden."""
+    return rrb.Blueprint(
+        rrb.Tabs(*boards, active_tab=0) if len(boards) > 1 else boards[0],
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.TimePanel(state="collapsed", timeline=timeline, play_state=play_state),
+        auto_views=False,
+        auto_layout=False,
+    )
 
 
 def _time_axis() -> rrb.TimeAxis:

@@ -1,8 +1,20 @@
-"""A scenario in MuJoCo Studio, its controller running: looked at, pushed, switched and scrubbed through while it runs.
+"""Runs a scenario in MuJoCo Studio: shown, pushed, changed and scrubbed in time while its controller runs.
 
-`live.py` is all of it but Studio: the rig, its controller, what a user changes. `memory.py` brings the controller back
-to an earlier moment, `pushes.py` has the torques from outside, `seen.py` the rig with what is only seen, `choices.py`
-what can be changed. The rest knows Studio: `said.py` what its two threads tell each other, `stepping.py` the
-simulation's thread with `pace.py`, `panel.py` the viewer's, `viewers.py` which viewer there is (`probe.py` tries one),
-`opened.py` all of it together. Nothing else imports mujoco.studio; what is in here is imported when it is used.
+Independent of Studio:
+
+- `live.py`: the plant, its controller, and the user's changes
+- `history.py`: the controller at an earlier moment
+- `user_push.py`: torques from outside
+- `drawn_plant.py`: the model with its visual geoms
+- `settings.py`: the settings that can be changed
+
+Dependent on Studio:
+
+- `messages.py`: messages between the simulation's thread and the viewer's
+- `stepping.py`, `pace.py`: the simulation's thread
+- `panel.py`: the viewer's thread
+- `viewers.py`, `probe.py`: choice and trial of a viewer
+- `open.py`: all together
+
+Nothing else imports mujoco.studio. Import these modules only to open a session.
 """

@@ -1,50 +1,71 @@
-"""The rig with all that is only seen, and the physics of the rig without: what Studio draws and steps."""
+"""A plant for Studio: the model with its visual geoms, and the physical numbers of the model without them."""
 
 from __future__ import annotations
 
 import copy
 
 import mujoco
-import numpy as np
 
 from cmg_mj.plant.plant import Plant
 
-_OF_WHAT_IS_SEEN = ("_", "name", "geom", "mesh", "mat", "tex", "skin", "bvh", "body_geom", "body_bvh", "light", "cam")
-"""What arrays are called that hold geoms and what hangs on their number."""
+PHYSICS_ARRAYS = (
+    "actuator_acc0",
+    "actuator_biasprm",
+    "actuator_gainprm",
+    "body_inertia",
+    "body_invweight0",
+    "body_ipos",
+    "body_iquat",
+    "body_mass",
+    "body_sameframe",
+    "body_simple",
+    "body_subtreemass",
+    "dof_M0",
+    "dof_armature",
+    "dof_damping",
+    "dof_frictionloss",
+    "dof_invweight0",
+    "dof_length",
+    "dof_simplenum",
+    "key_ctrl",
+    "key_qvel",
+    "site_pos",
+    "site_sameframe",
+    "tendon_invweight0",
+)
+"""Arrays of a model that `plant.variations` changes or `mj_setConst` derives from them; none is indexed by geoms."""
 
-MUJOCO_LOOKS_ALONG = (90.0, -45.0)
-LOOKED_AT_ALONG = (125.0, -20.0)
-"""Where the camera looks at first, azimuth and elevation, unless the model file says it [deg]."""
+MUJOCO_VIEW = (90.0, -45.0)
+STUDIO_VIEW = (125.0, -20.0)
+"""Azimuth and elevation of the first view, unless the model file gives another than MuJoCo's default [deg]."""
 
 
 def drawn_plant(plant: Plant) -> Plant:
-    """The same rig on a model of its own, which has what is only seen as well.
+    """Copy a plant onto a model of its own that has the visual geoms as well.
 
     Args:
-        plant: The rig.
+        plant: The plant.
 
     Returns:
-        A rig whose steps are those of the first, bit for bit.
+        A plant whose steps equal those of the first bit for bit.
     """
     other = copy.copy(plant)
     other.model = copy.copy(plant.drawn_model)
     other.model.opt = plant.model.opt
     view = other.model.vis.global_
-    if (view.azimuth, view.elevation) == MUJOCO_LOOKS_ALONG:
-        view.azimuth, view.elevation = LOOKED_AT_ALONG
+    if (view.azimuth, view.elevation) == MUJOCO_VIEW:
+        view.azimuth, view.elevation = STUDIO_VIEW
     copy_physics_numbers(other.model, plant.model)
     return other
 
 
-def copy_physics_numbers(model: mujoco.MjModel, of: mujoco.MjModel) -> None:
-    """Have a model with more geoms step as another of the same rig does: every physical number is the other's.
+def copy_physics_numbers(model: mujoco.MjModel, reference: mujoco.MjModel) -> None:
+    """Make a model with more geoms step as another model of the same plant does.
 
     Args:
-        model: What is changed.
-        of: The rig with its scenario's variations, without what is only seen.
+        model: The model to change.
+        reference: The plant with its scenario's variations, without visual geoms.
     """
-    model.stat.meaninertia = of.stat.meaninertia  # scales the constraint solver's tolerance
-    for name in dir(of):
-        theirs = None if name.startswith(_OF_WHAT_IS_SEEN) else getattr(of, name)
-        if isinstance(theirs, np.ndarray) and theirs.shape == (ours := getattr(model, name)).shape:
-            ours[:] = theirs
+    model.stat.meaninertia = reference.stat.meaninertia  # scales the constraint solver's tolerance
+    for name in PHYSICS_ARRAYS:
+        getattr(model, name)[:] = getattr(reference, name)

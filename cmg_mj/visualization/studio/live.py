@@ -1,11 +1,11 @@
-"""A scenario's rig and controller in somebody else's loop, changed and pushed while they run; without Studio."""
+"""Runs a scenario's plant and controller in another loop, such as Studio's, changed and pushed during the run."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,15 +18,15 @@ from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.studio.drawn_plant import copy_physics_numbers, drawn_plant
 from cmg_mj.visualization.studio.history import ControllerHistory, adopt
-from cmg_mj.visualization.studio.settings import fields_of
+from cmg_mj.visualization.studio.settings import FieldValues, changed_fields
 from cmg_mj.visualization.studio.user_push import Pushes
 
-KEPT_TICKS = 2400
-"""Of what is plotted: 12 s at 200 Hz."""
+PLOTTED_TICKS = 2400
+"""Number of plotted ticks: 12 s at 200 Hz."""
 
 
 class PlottedTick(NamedTuple):
-    """A control tick as it is plotted, of one axis: x1, its true and its estimated rate, u."""
+    """A control tick of one axis in the plots: x1, the true and the estimated rate, u, the push."""
 
     time_s: float
     tilt_deg: float
@@ -37,20 +37,20 @@ class PlottedTick(NamedTuple):
 
 
 class StudioSession:
-    """A scenario that is stepped by whoever owns its data. As long as nobody interferes, it is the runner's trajectory.
+    """A scenario that the owner of its data steps. Without interference its trajectory is the runner's.
 
     Args:
         experiment: The scenario.
 
     Attributes:
-        base: The scenario as it was opened.
-        now: The scenario as it has been changed since.
-        plant: Its rig, on a model that has what is only seen as well.
+        base: The scenario at the start.
+        now: The scenario with the user's changes.
+        plant: The plant, on a model that has visual geoms as well.
         pushes: The torques from outside.
-        stopped: Why the controller no longer controls; empty while it does. The gimbals then stand.
-        diverged: Whether that is because the physics has no numbers any more.
-        note: What the last change or jump came to, if it is worth a line.
-        ticks: The last ones, to be plotted: of each axis.
+        stopped: The reason why the controller has stopped and the gimbals stand; empty while it runs.
+        diverged: Whether the controller has stopped because the physics diverged.
+        note: Result of the last change or jump, if the user should know.
+        ticks: The last ticks of each axis, for the plots.
     """
 
     def __init__(self, experiment: Experiment) -> None:
@@ -61,24 +61,24 @@ class StudioSession:
         self._lines = [axis.line for axis in self.plant.axes]
         scenario = experiment.scenario
         self.pushes = Pushes(scenario.push, scenario.swing, self.plant.axis_names, self.timestep)
-        self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=KEPT_TICKS)
+        self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
         self._begin(0)
 
     @property
     def model(self) -> mujoco.MjModel:
-        """What is stepped and seen."""
+        """The model that is stepped and shown."""
         return self.plant.model
 
     # --- time ----------------------------------------------------------------------------------------------
 
     def new_data(self) -> mujoco.MjData:
-        """Data at the scenario's initial state, from which the run begins."""
+        """Make data at the scenario's initial state, and begin the run there."""
         data = mujoco.MjData(self.model)
         self.start(data)
         return data
 
     def start(self, data: mujoco.MjData) -> None:
-        """Put the rig at the scenario's initial state, wheels at speed, and begin the run; what was changed stays."""
+        """Put the plant at the scenario's initial state, and begin the run; the user's changes stay."""
         initial = self.now.plant.new_data()
         everything = int(mujoco.mjtState.mjSTATE_INTEGRATION)
         mujoco.mj_copyState(self.now.plant.model, initial, data, everything)
@@ -87,7 +87,7 @@ class StudioSession:
         self.begin(data)
 
     def begin(self, data: mujoco.MjData) -> None:
-        """Begin a run at the state in which the rig is, with a fresh controller."""
+        """Begin a run at the present state, with a fresh controller."""
         step = self._step_of(data)
         self.pushes.forget(step)
         self.note = ""
@@ -96,23 +96,23 @@ class StudioSession:
 
     def _begin(self, step: int) -> None:
         self.controller: AnyController = self.now.controller()
-        self.memory = ControllerHistory(self.now, step)
+        self.history = ControllerHistory(self.now, step)
         self.stopped = ""
         self.diverged = False
         self._stopped_at = 0
         self._next = step
-        """The step that comes next, unless somebody else has a hand in it."""
+        """The next step, unless someone moves the state in time."""
 
     def _step_of(self, data: mujoco.MjData) -> int:
         return round(data.time / self.timestep)
 
     def step(self, data: mujoco.MjData) -> bool:
-        """One physics step, before which the controller takes the samples and the decision that are due.
+        """Advance one physics step, before which the controller takes due samples and decisions.
 
-        Nothing of what an observer or the physics does raises from here.
+        No failure of an observer or of the physics raises from here.
 
         Args:
-            data: The rig's.
+            data: The plant's data.
 
         Returns:
             Whether there was a control tick.
@@ -140,14 +140,14 @@ class StudioSession:
             self._stop(data, step, str(error))
             return False
         if step % self.controller.steps_per_sample == 0:
-            self.memory.show(step, data)
+            self.history.add_sample(step, data)
         if ticked:
             axes = range(len(torques))
-            self.ticks.append(tuple(self._shown(data, axis, torques[axis]) for axis in axes))
+            self.ticks.append(tuple(self._plotted_tick(data, axis, torques[axis]) for axis in axes))
         return ticked
 
-    def _shown(self, data: mujoco.MjData, axis: int, torque: float) -> PlottedTick:
-        """The last tick of an axis."""
+    def _plotted_tick(self, data: mujoco.MjData, axis: int, torque: float) -> PlottedTick:
+        """Return the last tick of an axis."""
         line, tick = self.plant.axes[axis].line, self.controller.parts[axis].tick
         assert tick is not None
         x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
@@ -159,21 +159,21 @@ class StudioSession:
             data.ctrl[axis.servos] = 0.0
 
     def sync_to_time(self, data: mujoco.MjData) -> int:
-        """Bring the controller to where the state is, should somebody have moved it in time; the step it is at.
+        """Restore the controller of the state's time, if someone has moved the state; return the step.
 
-        History holds states only. The controller, all that was changed, and the pushes by hand become what they were.
+        Studio's history has states only. Controller, settings and the user's pushes become those of that time.
         """
         step = self._step_of(data)
         if step == self._next:
             return step
         self._next = step
-        self.ticks = deque((tick for tick in self.ticks if tick[0].time_s < data.time - 1e-9), KEPT_TICKS)
+        self.ticks = deque((tick for tick in self.ticks if tick[0].time_s < data.time - 1e-9), PLOTTED_TICKS)
         if self.stopped and step > self._stopped_at:
             return step  # it does not control at that moment either
         self.pushes.forget(step)
-        if self.memory.has(step):
+        if self.history.has(step):
             try:
-                self.controller, was = self.memory.back_to(step)
+                self.controller, was = self.history.back_to(step)
                 self._apply_settings(was)
                 self.stopped, self.note, self.diverged = "", "", False
                 return step
@@ -185,28 +185,28 @@ class StudioSession:
         return step
 
     def settings_at(self, data: mujoco.MjData) -> tuple[Experiment, str]:
-        """The scenario, and why the controller does not control, as they were where the state is; looked at only."""
+        """Return the scenario and the reason of a stop at the state's time, and change nothing."""
         step = self._step_of(data)
         if step == self._next:
             return self.now, self.stopped
         stopped = self.stopped if step > self._stopped_at else ""
-        return self.memory.told(step) if self.memory.has(step) else self.now, stopped
+        return self.history.experiment_at(step) if self.history.has(step) else self.now, stopped
 
     # --- what a user changes -------------------------------------------------------------------------------
 
-    def choose(self, data: mujoco.MjData, values: Mapping[str, Any]) -> None:
-        """Change settings of the scenario while it runs, on all axes; `note` says what was refused.
+    def choose(self, data: mujoco.MjData, values: FieldValues) -> None:
+        """Change settings of the scenario on all axes; `note` has the reason of a refusal.
 
-        A new observer starts from the next sample. A controller that was stopped starts afresh.
+        A new observer starts from the next sample. A stopped controller starts afresh.
 
         Args:
-            data: The rig's.
-            values: By field, named as with `--set`: the observer, the law, `controller.feedback`, the accelerometers'
-                noise, e.
+            data: The plant's data.
+            values: Field, named as with `--set` -> value: the observer, the law, `controller.feedback`, the
+                accelerometers' noise, e.
         """
         step = self.sync_to_time(data)
         try:
-            fields = fields_of(self.base, self.now, values)
+            fields = changed_fields(self.base, self.now, values)
             if self.now.scenario.plant.timestep_s is None:
                 fields["plant.timestep_s"] = self.timestep  # the one it runs with
             new = self.now.with_settings(fields)
@@ -220,27 +220,27 @@ class StudioSession:
         self._apply_settings(new)
         if self.stopped:
             self.restart_controller(data)
-        elif self.memory.whole:
-            self.memory.tell(new, afresh=False)
+        elif self.history.whole:
+            self.history.add_change(new, afresh=False)
         assert step == self._next
 
     def _apply_settings(self, experiment: Experiment) -> None:
-        """Go on as this experiment's; the rig changes in place, so that whoever holds its model goes on too."""
-        before, after = ([own.scenario.plant for own in each.parts] for each in (self.now, experiment))
+        """Continue with an experiment; the model changes in place, because others hold it too."""
+        before, after = ([part.scenario.plant for part in parts] for parts in (self.now.parts, experiment.parts))
         if after != before:
             copy_physics_numbers(self.model, experiment.plant.model)
         self.now = experiment
 
     def restart_controller(self, data: mujoco.MjData) -> None:
-        """Start the controller afresh at the present state, as after an observer that failed."""
+        """Start the controller afresh at the present state, for instance after the failure of an observer."""
         step = self.sync_to_time(data)
         self.stopped = self.note = ""
         self.controller = self.now.controller()
-        if self.memory.whole:
-            self.memory.tell(self.now, afresh=True)
+        if self.history.whole:
+            self.history.add_change(self.now, afresh=True)
         else:
-            self.memory = ControllerHistory(self.now, step)
+            self.history = ControllerHistory(self.now, step)
 
     def push(self, data: mujoco.MjData, torque: float, duration_s: float, axis: int = 0) -> None:
-        """Push from now on: torque [N m] about a tilt axis, given by its place, for so long [s]."""
+        """Push from now on: torque about a tilt axis by its index [N m], duration [s]."""
         self.pushes.add(self.sync_to_time(data), torque, duration_s, axis)

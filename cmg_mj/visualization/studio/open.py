@@ -1,4 +1,4 @@
-"""A scenario opened in Studio, until its viewer is closed."""
+"""Opens a scenario in Studio until its viewer is closed."""
 
 from __future__ import annotations
 
@@ -9,36 +9,36 @@ from mujoco.studio import app, messages, sim_history, viewer_handle, viewer_prot
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.studio.panel import Panel
+from cmg_mj.visualization.studio.panel import StudioPanel
 from cmg_mj.visualization.studio.stepping import Stepping
-from cmg_mj.visualization.studio.viewers import NATIVE, WEB, ViewerFailed, check_graphics, launched
+from cmg_mj.visualization.studio.viewers import NATIVE, WEB, ViewerFailed, check_graphics, launch
 
 HISTORY_S = 10.0
 
 
 def open_in_studio(
-    opened: Callable[[str], Experiment], title: str, gfx: str = WEB, port: int = 0, browser: bool = False
+    load: Callable[[str], Experiment], title: str, gfx: str = WEB, port: int = 0, browser: bool = False
 ) -> None:
-    """Open a scenario, its controller running, and stay until the viewer is closed or Ctrl-C.
+    """Open a scenario with its controller, and return when the viewer is closed or at Ctrl-C.
 
     Args:
-        opened: Makes the scenario ready, at first and whenever the user reloads it: see `Stepping`.
-        title: Of the window.
+        load: Prepares the scenario, at first and whenever the user reloads it: see `Stepping`.
+        title: Title of the window.
         gfx: `web`, `native`, or one of Studio's graphics modes.
-        port: Of the web view, on loopback; 0 for the first free one from 8080 on.
+        port: Port of the web view, on loopback; 0 for the first free one from 8080 on.
         browser: Whether to open the web view in a browser, if there is a screen.
 
     Raises:
-        InputError: The graphics cannot be had, the port is taken, or the viewer fails.
+        InputError: The graphics are not available, the port is in use, or the viewer fails.
     """
     check_graphics(gfx)
     mode = "" if gfx == NATIVE else gfx
     config = viewer_protocol.ViewerConfig(title=title, gfx=mode, http_port=port, open_browser=browser)
     studio = app.App(app.Config(show_inspector=False))  # where the panel is; Shift+Tab shows it
-    plugins = [studio, Panel(), Stepping(opened), sim_history.SimHistory(min_seconds=HISTORY_S)]
+    plugins = [studio, StudioPanel(), Stepping(load), sim_history.SimHistory(min_seconds=HISTORY_S)]
     with quiet():
         try:
-            with launched(config, plugins) as handle:
+            with launch(config, plugins) as handle:
                 handle.dispatch(messages.LoadModelEvent())
                 viewer_handle.run_sim_loop(handle)
         except ViewerFailed as error:

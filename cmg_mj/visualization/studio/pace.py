@@ -1,24 +1,24 @@
-"""How far the simulation should be by the clock: real time, or a share of it."""
+"""Paces the simulation by a clock: in real time, or at a share of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 MOST_BEHIND_S = 0.1
-"""What a simulation falls behind beyond this is given up: it does not run to catch up [s]."""
+"""Largest delay that the simulation catches up; it discards more [s]."""
 MEASURED_OVER_S = 0.5
-"""[s]"""
+"""Interval over which the speed is measured [s]."""
 
 
 class StepScheduler:
-    """Simulated time against a clock.
+    """Schedules physics steps by a clock.
 
     Args:
-        clock: Seconds that pass [s].
+        clock: Returns the time [s].
 
     Attributes:
-        speed: Simulated seconds in a hundred of the clock's: 100 is real time.
-        measured: The speed that is kept, or -1 if none has been measured.
+        speed: Speed of simulated time [% of real time].
+        measured: The measured speed, or -1 if none has been measured [% of real time].
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -27,13 +27,13 @@ class StepScheduler:
         self.begin(0.0)
 
     def begin(self, time: float) -> None:
-        """Pace from a simulated time on, which is now [s]."""
+        """Start pacing now, at a simulated time [s]."""
         self._from = (self._clock(), time)
         self._measured_from = self._from
         self.measured = -1.0
 
     def steps_due(self, time: float, timestep: float) -> int:
-        """How many physics steps are due [s]."""
+        """Return the number of physics steps due at a simulated time [s]."""
         now = self._clock()
         since, start = self._from
         behind = start + (now - since) * self.speed / 100.0 - time

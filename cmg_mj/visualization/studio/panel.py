@@ -1,9 +1,8 @@
-"""The panel in Studio's viewer: what is chosen, pushed and plotted. It runs on the viewer's thread."""
+"""The panel in Studio's viewer, on the viewer's thread: choices, pushes and plots."""
 
 from __future__ import annotations
 
 import logging
-from typing import Any
 
 import numpy as np
 from mujoco.studio import messages, plugin
@@ -11,7 +10,7 @@ from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
 from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
-from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER
+from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, FieldValues, Settings
 
 TITLE = "Gyroscopic balance"
 PLOTTED_S = 6.0
@@ -21,15 +20,15 @@ FEEDBACKS = {"observer": "the observer's", "fog": "the gyro's", "truth": "the tr
 logger = logging.getLogger(__name__)
 
 
-class Panel(plugin.ViewerPlugin):
-    """A window with everything that can be changed while the rig runs, and plots.
+class StudioPanel(plugin.ViewerPlugin):
+    """A window with all settings that a user can change, and plots.
 
     Attributes:
-        standing: Where things stand, as the simulation has said last.
+        state: The last state of the session that the simulation sent.
     """
 
     def __init__(self) -> None:
-        self.standing = SessionState()
+        self.state = SessionState()
         self._curves: dict[str, list[float]] = {}
         self._torque, self._duration = 1.0, 0.1
         self._typed: dict[str, float] = {}
@@ -37,9 +36,9 @@ class Panel(plugin.ViewerPlugin):
         self._broken = False
 
     @messages.handler
-    def on_standing(self, event: SessionState) -> None:
-        """Prepare what is drawn until the next one."""
-        self.standing = event
+    def on_state(self, event: SessionState) -> None:
+        """Prepare the curves that are drawn until the next state."""
+        self.state = event
         recent = event.ticks[event.ticks[:, 0] > event.time_s - PLOTTED_S]
         recent = recent[:: max(1, len(recent) // 1200)]
         names = ("time", "tilt", "rate", "estimate", "command", "push")
@@ -47,7 +46,7 @@ class Panel(plugin.ViewerPlugin):
 
     @messages.handler
     def on_build_gui(self, _: messages.BuildGuiEvent) -> None:
-        """Draw it. What goes wrong here ends the panel, not the viewer."""
+        """Draw the panel. A failure here ends the panel, not the viewer."""
         if self._broken:
             return
         try:
@@ -75,7 +74,7 @@ class Panel(plugin.ViewerPlugin):
             imgui.End()
 
     def _build(self) -> None:
-        now = self.standing
+        now = self.state
         imgui.TextWrapped(now.title)
         imgui.TextUnformatted(f"t = {now.time_s:.3f} s")
         if now.stopped:
@@ -84,33 +83,33 @@ class Panel(plugin.ViewerPlugin):
                 self._send(RestartController())
         if now.note:
             imgui.TextWrapped(now.note)
-        if now.settings:
+        if now.settings is not None:
             several = len(now.axes) > 1
             if several:
-                axis = _chosen("axis shown and pushed", now.axis, {name: name for name in now.axes})
+                axis = _new_choice("axis shown and pushed", now.axis, {name: name for name in now.axes})
                 if axis is not None:
                     self._send(ShowAxis(axis))
             imgui.SeparatorText("Controller, on all axes" if several else "Controller")
-            self._build_choices(now)
+            self._build_choices(now, now.settings)
             imgui.SeparatorText("Disturbances")
-            self._build_disturbances(now)
+            self._build_disturbances(now, now.settings)
             imgui.SeparatorText(f"The last {PLOTTED_S:g} s")
             self._build_plots(now)
 
-    def _build_choices(self, now: SessionState) -> None:
-        observer = _chosen("observer", now.settings[OBSERVER], {name: name for name in now.observers})
+    def _build_choices(self, now: SessionState, settings: Settings) -> None:
+        observer = _new_choice("observer", settings[OBSERVER], {name: name for name in now.observers})
         if observer is not None:
             self._choose({OBSERVER: observer})
-        law = _chosen("law", now.law, {name: name for name in now.laws})
+        law = _new_choice("law", now.law, {name: name for name in now.laws})
         if law is not None:
             self._choose(now.laws[law])
         if now.gains:
             imgui.TextUnformatted("K_e = " + ", ".join(f"{gain:.3g}" for gain in now.gains))
-        feedback = _chosen("rate fed back", now.settings[FEEDBACK], FEEDBACKS)
+        feedback = _new_choice("rate fed back", settings[FEEDBACK], FEEDBACKS)
         if feedback is not None:
             self._choose({FEEDBACK: feedback})
 
-    def _build_disturbances(self, now: SessionState) -> None:
+    def _build_disturbances(self, now: SessionState, settings: Settings) -> None:
         _, self._torque = imgui.InputDouble("torque [N m]", self._torque, 0.1, 1.0, "%.2f")
         _, self._duration = imgui.InputDouble("duration [s]", self._duration, 0.05, 0.5, "%.3f")
         for label, sign in (("Push +", 1.0), ("Push -", -1.0)):
@@ -119,11 +118,11 @@ class Panel(plugin.ViewerPlugin):
             imgui.SameLine()
         imgui.NewLine()
         on_all = ", all axes" if len(now.axes) > 1 else ""
-        self._build_number(f"e{on_all} [deg]", BIAS, now.settings[BIAS], 0.1)
-        self._build_number(f"noise{on_all} [ug/rtHz]", NOISE, now.settings[NOISE], 100.0)
+        self._build_number(f"e{on_all} [deg]", BIAS, settings[BIAS], 0.1)
+        self._build_number(f"noise{on_all} [ug/rtHz]", NOISE, settings[NOISE], 100.0)
 
     def _build_number(self, label: str, field: str, value: float, step: float) -> None:
-        """A number that counts once it has been typed to the end."""
+        """Draw a number, which is sent when the user has finished typing."""
         changed, typed = imgui.InputDouble(label, self._typed.get(field, value), step, 10.0 * step, "%.4g")
         if changed:
             self._typed[field] = typed
@@ -149,16 +148,16 @@ class Panel(plugin.ViewerPlugin):
                         implot.PlotLine(label, self._curves["time"], self._curves[name])
                 implot.EndPlot()
 
-    def _choose(self, values: dict[str, Any]) -> None:
+    def _choose(self, values: FieldValues) -> None:
         self._send(ChangeSettings(values))
 
     def _send(self, message: messages.Message) -> None:
         self.viewer.send_to_sim(message)
 
 
-def _chosen(label: str, now: str, options: dict[str, str]) -> str | None:
-    """A list to choose from: what has been chosen just now, if anything."""
+def _new_choice(label: str, now: str, options: dict[str, str]) -> str | None:
+    """Draw a list; return the user's new choice, if there is one."""
     names = list(options)
-    place = names.index(now) if now in names else -1
-    changed, place = imgui.Combo(label, place, list(options.values()))
-    return names[place] if changed and 0 <= place < len(names) else None
+    index = names.index(now) if now in names else -1
+    changed, index = imgui.Combo(label, index, list(options.values()))
+    return names[index] if changed and 0 <= index < len(names) else None

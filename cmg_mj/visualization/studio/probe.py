@@ -1,4 +1,4 @@
-"""A window of Studio's for two frames, in a process of its own: graphics that cannot be had end the process.
+"""Opens a window of Studio's for two frames, in a separate process: graphics that fail end the process.
 
 python -m cmg_mj.visualization.studio.probe MODE
 """
@@ -12,7 +12,7 @@ from mujoco.studio import launch_thread, messages, native_viewer, viewer_protoco
 
 
 def main(mode: str) -> None:
-    """Draw, and end before anything is taken down."""
+    """Draw two frames, and exit before the window is torn down."""
     endpoint, _ = launch_thread.make_thread_endpoints()
     viewer = native_viewer.NativeViewer(viewer_protocol.ViewerConfig(gfx=mode, width=64, height=64), endpoint)
     for _ in range(2):

@@ -1,30 +1,47 @@
-"""What can be changed of a scenario while it runs: its fields, and what they can be."""
+"""The settings of a scenario that a user can change during a session, and their choices."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Final, TypeAlias, TypedDict
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.scenario.loading import axis_fields
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment
 
-OBSERVER, FEEDBACK = "observer.kind", "controller.feedback"
-BIAS, NOISE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz"
+FieldValue: TypeAlias = "float | str | Sequence[FieldValue] | Mapping[str, FieldValue] | None"
+FieldValues = Mapping[str, FieldValue]
+Fields = dict[str, FieldValue]
+"""Field, named as with `--set` -> value."""
+
+OBSERVER: Final = "observer.kind"
+FEEDBACK: Final = "controller.feedback"
+BIAS: Final = "plant.equilibrium_bias_deg"
+NOISE: Final = "sensors.accelerometer.noise_density_ug_rthz"
 LAW = "controller"
-"""All of the law but what is no law's."""
+"""The section of the law, without the fields that stay whatever the law."""
+Settings = TypedDict(
+    "Settings",
+    {
+        "observer.kind": str,
+        "controller.feedback": str,
+        "plant.equilibrium_bias_deg": float,
+        "sensors.accelerometer.noise_density_ug_rthz": float,
+    },
+)
+"""Values of the settings in the panel."""
 NO_LAWS = ("feedback", "compensate_turning")
 """Fields of [controller] that stay whatever the law."""
 STUDIO_LAW_FIELDS = ("rate_limit_rad_s", "angle_source", "bias_trim_s")
-"""Fields of [controller] that every law has as the scenario has them."""
+"""Fields of [controller] that every law takes from the scenario."""
 
 WEIGHTS = {"state_cost": [1.0, 1.0, 1.0, 1.0], "input_cost": 1.0}
-"""Of the gains that are solved for, where the scenario has no weights of its own."""
+"""Weights for the gains of the LQR, if the scenario has none."""
 
 
-def settings_of(scenario: Scenario) -> dict[str, Any]:
-    """What can be changed, as it is."""
+def current_settings(scenario: Scenario) -> Settings:
+    """Return the values of the settings."""
     return {
         OBSERVER: scenario.observer.kind,
         FEEDBACK: scenario.controller.feedback,
@@ -33,93 +50,100 @@ def settings_of(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def observers_of(base: Experiment) -> tuple[str, ...]:
-    """The observers that come with the bench, and the scenario's if it has another."""
-    return tuple(dict.fromkeys([*OBSERVERS, *(own.scenario.observer.kind for own in base.parts)]))
+def choosable_observers(base: Experiment) -> tuple[str, ...]:
+    """List the bundled observers, and the scenario's."""
+    return tuple(dict.fromkeys([*OBSERVERS, *(part.scenario.observer.kind for part in base.parts)]))
 
 
-def law_settings(scenario: Scenario) -> dict[str, Any]:
-    """Its section [controller], but for what is no law's."""
+def law_settings(scenario: Scenario) -> Fields:
+    """Return the section [controller] without the fields that stay whatever the law."""
     return scenario.controller.model_dump(mode="json", exclude_none=True, exclude=set(NO_LAWS))
 
 
-def laws_of(base: Experiment) -> dict[str, dict[str, Any]]:
-    """The laws that can be chosen: name -> the settings that make them, on every axis."""
+def choosable_laws(base: Experiment) -> dict[str, Fields]:
+    """List the laws to choose from: name -> fields, on every axis."""
     scenario = base.scenario
-    own = law_settings(scenario)
-    common = {name: own[name] for name in ("rate_hz", *STUDIO_LAW_FIELDS)}
-    made: dict[str, dict[str, Any]] = {
+    scenario_law = law_settings(scenario)
+    common = {name: scenario_law[name] for name in ("rate_hz", *STUDIO_LAW_FIELDS)}
+    bundled: dict[str, Fields] = {
         "Table 2": {**common, "kind": "state_feedback"},
-        "LQR": {**common, "kind": "state_feedback", "lqr": own.get("lqr", WEIGHTS)},
+        "LQR": {**common, "kind": "state_feedback", "lqr": scenario_law.get("lqr", WEIGHTS)},
         "LQG": {**common, "kind": "lqg"},
     }
-    of_axes = _laws_of_axes(scenario)
-    kept = {axis: {name: law[name] for name in STUDIO_LAW_FIELDS if name in law} for axis, law in of_axes.items()}
-    laws = {name: {LAW: settings, **kept} for name, settings in made.items()}
-    scenarios = {LAW: own, **of_axes}
-    if scenarios not in laws.values():
-        laws["the scenario's"] = scenarios
+    axis_laws = _axis_laws(scenario)
+    common_of_axes = {
+        axis: {name: law[name] for name in STUDIO_LAW_FIELDS if name in law} for axis, law in axis_laws.items()
+    }
+    laws: dict[str, Fields] = {name: {LAW: law, **common_of_axes} for name, law in bundled.items()}
+    fields: Fields = {LAW: scenario_law, **axis_laws}
+    if fields not in laws.values():
+        laws["the scenario's"] = fields
     return laws
 
 
-def law_of(base: Experiment, now: Experiment) -> str:
-    """Which of the laws it has."""
-    settings = {LAW: law_settings(now.scenario), **_laws_of_axes(now.scenario)}
-    return next((name for name, made in laws_of(base).items() if made == settings), "")
+def current_law(base: Experiment, now: Experiment) -> str:
+    """Name the law in use; empty if it is none of the choosable laws."""
+    fields = {LAW: law_settings(now.scenario), **_axis_laws(now.scenario)}
+    return next((name for name, law in choosable_laws(base).items() if law == fields), "")
 
 
-def _laws_of_axes(scenario: Scenario) -> dict[str, dict[str, Any]]:
-    """What axes have of a law of their own, by field."""
+def _axis_laws(scenario: Scenario) -> dict[str, Fields]:
+    """Return the fields of the law that axes set themselves."""
     return {
         f"axes.{axis}.{LAW}": {name: value for name, value in section.items() if name not in NO_LAWS}
-        for axis, section in ((axis, axis_fields(own).get(LAW, {})) for axis, own in scenario.axes.items())
+        for axis, section in ((axis, axis_fields(settings).get(LAW, {})) for axis, settings in scenario.axes.items())
     }
 
 
-def fields_of(base: Experiment, now: Experiment, values: Mapping[str, Any]) -> dict[str, Any]:
-    """A choice for all axes as `Experiment.with_settings` takes it.
+def changed_fields(base: Experiment, now: Experiment, values: FieldValues) -> Fields:
+    """Convert a choice for all axes to fields for `Experiment.with_settings`.
 
     Args:
-        base: The scenario as it was opened: an observer that it has, on an axis too, has its parameters from there.
-        now: The scenario as it is.
-        values: What is chosen, by field.
+        base: The scenario at the start, from which an observer of the scenario or of an axis takes its parameters.
+        now: The scenario with the user's changes.
+        values: Field -> chosen value.
 
     Returns:
-        Values by field. What axes have of their own in the place of a chosen field is gone from [axes.NAME], the rest
-        of it stays.
+        Field -> value. Sections [axes.NAME] lose the chosen fields and keep the others.
     """
-    fields = dict(values)
+    fields: Fields = dict(values)
     kind = fields.pop(OBSERVER, None)
     if kind is not None:
-        own = base.scenario.observer
-        fields["observer"] = {"kind": kind, **(own.parameters if kind == own.kind else {})}
+        observer = base.scenario.observer
+        fields["observer"] = {"kind": kind, **(observer.parameters if kind == observer.kind else {})}
     if LAW in fields:
         stays = now.scenario.controller.model_dump(mode="json", include=set(NO_LAWS))
-        fields[LAW] = {**fields[LAW], **stays}
+        fields[LAW] = {**_section(fields, LAW), **stays}
         for axis in now.scenario.axes:
             fields.pop(f"axes.{axis}.{LAW}", None)
-    before = {axis: axis_fields(own) for axis, own in now.scenario.axes.items()}
-    axes = {axis: _of_axis(base, axis, own, values) for axis, own in before.items()}
+    before = {axis: axis_fields(settings) for axis, settings in now.scenario.axes.items()}
+    axes = {axis: _axis_section(base, axis, section, values) for axis, section in before.items()}
     return {"axes": axes, **fields} if axes != before else fields
 
 
-def _of_axis(base: Experiment, axis: str, own: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """What an axis has of its own once something is chosen for all."""
-    left = dict(own)
+def _axis_section(base: Experiment, axis: str, before: FieldValues, values: FieldValues) -> Fields:
+    """Return the section [axes.NAME] after a choice for all axes."""
+    rest: Fields = dict(before)
     for name in values:
-        left = _without(left, name.split("."))
+        rest = _without(rest, name.split("."))
     if OBSERVER in values:
-        (of_base,) = (part.scenario.observer for part in base.parts if part.plant.axis.name == axis)
+        (observer,) = (part.scenario.observer for part in base.parts if part.plant.axis.name == axis)
         section = axis_fields(base.scenario.axes[axis]).get("observer", {})
-        left["observer"] = section if of_base.kind == values[OBSERVER] else {}
+        rest["observer"] = section if observer.kind == values[OBSERVER] else {}
     if LAW in values:
-        stays = {name: value for name, value in own.get(LAW, {}).items() if name in NO_LAWS}
-        left[LAW] = {**values.get(f"axes.{axis}.{LAW}", {}), **stays}
-    return {name: section for name, section in left.items() if section}
+        stays = {name: value for name, value in _section(before, LAW).items() if name in NO_LAWS}
+        rest[LAW] = {**_section(values, f"axes.{axis}.{LAW}"), **stays}
+    return {name: section for name, section in rest.items() if section}
 
 
-def _without(sections: Mapping[str, Any], path: list[str]) -> dict[str, Any]:
-    """Sections without a field, however deep it lies."""
+def _section(fields: FieldValues, name: str) -> FieldValues:
+    """Return a field that is a section; empty if there is none."""
+    value = fields.get(name)
+    return value if isinstance(value, Mapping) else {}
+
+
+def _without(sections: FieldValues, path: list[str]) -> Fields:
+    """Remove a field from nested sections."""
     first, *rest = path
     if not rest:
         return {name: value for name, value in sections.items() if name != first}

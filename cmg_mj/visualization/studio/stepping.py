@@ -1,4 +1,4 @@
-"""Studio's simulation thread: it loads the scenario's rig, ticks its controller, and hears what the panel wants."""
+"""Studio's simulation thread: loads the scenario, steps plant and controller, handles the panel's messages."""
 
 from __future__ import annotations
 
@@ -18,42 +18,43 @@ from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.studio.live import StudioSession
 from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
 from cmg_mj.visualization.studio.pace import StepScheduler
-from cmg_mj.visualization.studio.settings import law_of, laws_of, observers_of, settings_of
+from cmg_mj.visualization.studio.settings import choosable_laws, choosable_observers, current_law, current_settings
 
 AFTER_STUDIO = 0
-"""Priority of a handler that Studio's own comes before."""
-SAID_EVERY_S = 1.0 / 30.0
+"""Priority of a handler after Studio's."""
+STATE_INTERVAL_S = 1.0 / 30.0
+"""Interval between two states for the panel [s]."""
 REST_S = 0.002
-"""Between two looks at what is due: without it the viewer's thread would starve."""
+"""Pause between two checks for due steps, without which the viewer's thread would starve [s]."""
 
 logger = logging.getLogger(__name__)
 
 
 class Stepping(plugin.SimPlugin):
-    """Steps the rig in Studio's `StepControl`'s place, at the clock's pace.
+    """Steps the plant in place of Studio's `StepControl`, at a clock's pace.
 
     Args:
-        opened: Makes the scenario ready: of a path that was dropped on the viewer, or of none for the scenario's own.
-        clock: What it keeps pace with [s].
-        sleep: Takes a rest [s].
+        load: Prepares the scenario with a model that was dropped on the viewer; for an empty path, with its own.
+        clock: Returns the time [s].
+        sleep: Pauses the thread [s].
 
     Attributes:
-        live: The scenario as it runs.
+        live: The session.
     """
 
     def __init__(
         self,
-        opened: Callable[[str], Experiment],
+        load: Callable[[str], Experiment],
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._opened = opened
+        self._load = load
         self._clock = clock
         self._sleep = sleep
         self._pace = StepScheduler(clock)
         self._pause = sim.PauseState.UNPAUSED
         self._single_steps = 0
-        self._said = -1.0
+        self._state_sent_at = -1.0
         self._complaint = ""
         self._axis = ""
         self.live: StudioSession | None = None
@@ -62,9 +63,9 @@ class Stepping(plugin.SimPlugin):
 
     @messages.handler
     def on_load_model(self, event: messages.LoadModelEvent) -> bool:
-        """Load the scenario's rig, or load it again; a model file dropped on the viewer takes the rig's place."""
+        """Load the scenario, or load it again; a model file dropped on the viewer replaces the scenario's."""
         try:
-            live = StudioSession(self._opened(event.path))
+            live = StudioSession(self._load(event.path))
         except InputError as error:
             self._complain(str(error))
             return True
@@ -77,7 +78,7 @@ class Stepping(plugin.SimPlugin):
 
     @messages.handler(priority=AFTER_STUDIO)
     def on_reset(self, event: messages.ResetEvent) -> None:
-        """Begin again: at the scenario's initial state, or at the keyframe that the user has picked."""
+        """Begin again at the scenario's initial state, or at the user's keyframe."""
         live, data = self.live, self.handle.data
         if live is None or data is None:
             return
@@ -89,7 +90,7 @@ class Stepping(plugin.SimPlugin):
 
     @messages.handler
     def on_step(self, event: messages.StepEvent) -> bool:
-        """As many physics steps as are due by the clock."""
+        """Advance the physics steps that are due."""
         live, data = self.live, event.data
         if live is None:
             self._sleep(REST_S)
@@ -106,14 +107,14 @@ class Stepping(plugin.SimPlugin):
         for _ in range(due):
             live.step(data)
             if live.diverged:
-                self._pause = sim.PauseState.NORMAL_PAUSED  # nothing is left to be seen
+                self._pause = sim.PauseState.NORMAL_PAUSED  # there is nothing more to show
                 break
         if self._state() != before:
             self.handle.send_to_viewer(self._state())
         now = self._clock()
-        if not 0.0 <= now - self._said < SAID_EVERY_S:
-            self._said = now
-            self.handle.send_to_viewer(self.standing())
+        if not 0.0 <= now - self._state_sent_at < STATE_INTERVAL_S:
+            self._state_sent_at = now
+            self.handle.send_to_viewer(self.session_state())
         self._sleep(REST_S)
         return True
 
@@ -127,7 +128,7 @@ class Stepping(plugin.SimPlugin):
 
     @messages.handler
     def on_step_control(self, event: messages.StepControlSnapshot) -> bool:
-        """The user pauses, goes on, or sets the speed."""
+        """Handle the user's pause, resumption, or speed."""
         self._pause, self._pace.speed = event.pause_state, event.speed
         if self.handle.data is not None:
             self._pace.begin(self.handle.data.time)
@@ -137,14 +138,14 @@ class Stepping(plugin.SimPlugin):
 
     @messages.handler
     def on_pause(self, event: messages.RequestPauseEvent) -> bool:
-        """Something else in Studio, such as its history, pauses."""
+        """Handle a pause by another part of Studio, such as its history."""
         self._pause = event.pause_state
         self.handle.send_to_viewer(self._state())
         return True
 
     @messages.handler
     def on_single_step(self, _: messages.SingleStepEvent) -> bool:
-        """One physics step while it is paused."""
+        """Request a physics step during a pause."""
         self._single_steps += self._pause != sim.PauseState.UNPAUSED
         return True
 
@@ -159,49 +160,49 @@ class Stepping(plugin.SimPlugin):
 
     @messages.handler
     def on_push(self, event: PushRequest) -> None:
-        """Push."""
+        """Push about the axis shown."""
         if self.live is not None and self.handle.data is not None:
-            self.live.push(self.handle.data, event.torque_n_m, event.duration_s, self._shown(self.live))
+            self.live.push(self.handle.data, event.torque_n_m, event.duration_s, self._axis_index(self.live))
 
     @messages.handler
     def on_show_axis(self, event: ShowAxis) -> None:
-        """Show another axis, and push about it from now on."""
+        """Show and push another axis from now on."""
         self._axis = event.axis
 
-    def _shown(self, live: StudioSession) -> int:
-        """The place of the axis that is shown: of the one that was chosen, if the rig has it, or else the first."""
+    def _axis_index(self, live: StudioSession) -> int:
+        """Return the index of the axis shown: the user's choice, or the first if the plant lacks the choice."""
         names = live.plant.axis_names
         return names.index(self._axis) if self._axis in names else 0
 
     @messages.handler
     def on_start_again(self, _: RestartController) -> None:
-        """Start a controller that has stopped."""
+        """Restart a controller that has stopped."""
         if self.live is not None and self.handle.data is not None:
             self.live.restart_controller(self.handle.data)
 
-    def _complain(self, what: str) -> None:
-        self._complaint = what
-        logger.warning("%s", what)
+    def _complain(self, message: str) -> None:
+        self._complaint = message
+        logger.warning("%s", message)
 
-    def standing(self) -> SessionState:
-        """Where things stand, for the panel."""
+    def session_state(self) -> SessionState:
+        """Describe the session for the panel."""
         live, data = self.live, self.handle.data
         if live is None or data is None:
             return SessionState(note=self._complaint)
         now, stopped = live.settings_at(data)
-        axis = self._shown(live)
-        own = now.parts[axis]
+        axis = self._axis_index(live)
+        part = now.parts[axis]
         ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 6)
         return SessionState(
             title=now.scenario.title,
             time_s=data.time,
             axes=tuple(live.plant.axis_names),
             axis=live.plant.axis_names[axis],
-            settings=settings_of(own.scenario),
-            observers=observers_of(live.base),
-            gains=tuple(getattr(own.law, "gains", ())),
-            laws=laws_of(live.base),
-            law=law_of(live.base, now),
+            settings=current_settings(part.scenario),
+            observers=choosable_observers(live.base),
+            gains=tuple(getattr(part.law, "gains", ())),
+            laws=choosable_laws(live.base),
+            law=current_law(live.base, now),
             stopped=stopped,
             note=self._complaint or live.note,
             ticks=ticks,

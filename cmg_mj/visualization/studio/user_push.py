@@ -1,4 +1,4 @@
-"""The torques from outside: those of the scenario, and those that a user adds while it runs."""
+"""Adds up the torques from outside: the scenario's, and the user's during a session."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from cmg_mj.scenario.disturbances import Push, Swing, add_swing_torques
 from cmg_mj.sensors.timing import whole_steps
 
-Held = tuple[int, int, float, int]
-"""First step, step after the last one, torque [N m], place of the axis; of one that the rig does not have, -1."""
+PushSteps = tuple[int, int, float, int]
+"""First step, step after the last, torque [N m], index of the axis; -1 for an axis that the plant lacks."""
 
 
 class Pushes:
@@ -17,7 +17,7 @@ class Pushes:
 
     Args:
         scenario: The scenario's pushes.
-        swings: Its torques that swing.
+        swings: The scenario's swinging torques.
         axes: Names of the axes.
         timestep: Physics step [s].
     """
@@ -25,12 +25,12 @@ class Pushes:
     def __init__(self, scenario: Sequence[Push], swings: Sequence[Swing], axes: Sequence[str], timestep: float) -> None:
         self._timestep = timestep
         self._swings, self._axes = swings, axes
-        places = {name: place for place, name in enumerate(axes)}
-        self._of_scenario: list[Held] = [
-            (self._steps(p.start_s), self._steps(p.end_s), p.torque_n_m, places.get(p.axis or axes[0], -1))
+        indices = {name: index for index, name in enumerate(axes)}
+        self._scenario_pushes: list[PushSteps] = [
+            (self._steps(p.start_s), self._steps(p.end_s), p.torque_n_m, indices.get(p.axis or axes[0], -1))
             for p in scenario
         ]
-        self._by_hand: list[Held] = []
+        self._user_pushes: list[PushSteps] = []
         self._add_up()
 
     def _steps(self, seconds: float) -> int:
@@ -42,46 +42,46 @@ class Pushes:
         Args:
             step: The step.
             torque: [N m].
-            duration_s: How long, to the next whole step and at least one [s].
-            axis: The place of the axis.
+            duration_s: Duration, rounded to whole steps and at least one [s].
+            axis: Index of the axis.
         """
-        self._by_hand.append((step, step + max(1, round(duration_s / self._timestep)), torque, axis))
+        self._user_pushes.append((step, step + max(1, round(duration_s / self._timestep)), torque, axis))
         self._add_up()
 
     def forget(self, step: int) -> None:
-        """Of those by hand, keep what began before a step: time has gone back to it."""
-        self._by_hand = [push for push in self._by_hand if push[0] < step]
+        """Discard the user's pushes from a step on: time has gone back to it."""
+        self._user_pushes = [push for push in self._user_pushes if push[0] < step]
         self._add_up()
 
     def _add_up(self) -> None:
         changes: dict[int, list[float]] = {}
-        for start, end, torque, axis in [*self._of_scenario, *self._by_hand]:
+        for start, end, torque, axis in [*self._scenario_pushes, *self._user_pushes]:
             for step, change in ((start, torque), (end, -torque)):
-                changed = changes.setdefault(step, [0.0] * len(self._axes))
+                at_step = changes.setdefault(step, [0.0] * len(self._axes))
                 if axis >= 0:
-                    changed[axis] += change
+                    at_step[axis] += change
         self._edges = sorted(changes)
         sums = [0.0] * len(self._axes)
         self._torques = [sums]
         for step in self._edges:
             sums = [torque + change for torque, change in zip(sums, changes[step], strict=True)]
-            self._torques.append([torque if abs(torque) > 1e-12 else 0.0 for torque in sums])  # pushes over are none
+            self._torques.append([torque if abs(torque) > 1e-12 else 0.0 for torque in sums])  # no remainders
 
-    def at(self, step: int, beat: int) -> Sequence[float]:
-        """The torques during a physics step.
+    def at(self, step: int, steps_per_sample: int) -> Sequence[float]:
+        """Return the torques during a physics step.
 
         Args:
             step: The step.
-            beat: Physics steps between the moments at which the runner looks, and holds what swings.
+            steps_per_sample: Physics steps in a sample interval, during which a swinging torque is constant.
 
         Returns:
-            One an axis [N m].
+            A torque for each axis [N m].
         """
-        place = bisect_right(self._edges, step)
-        held = self._torques[place]
+        index = bisect_right(self._edges, step)
+        pushes = self._torques[index]
         if not self._swings:
-            return held
-        start = step // beat * beat
-        end = start + beat
-        start, end = max([start, *self._edges[:place][-1:]]), min([end, *self._edges[place : place + 1]])
-        return add_swing_torques(held, self._swings, self._axes, (start + 0.5 * (end - start)) * self._timestep)
+            return pushes
+        start = step // steps_per_sample * steps_per_sample
+        end = start + steps_per_sample
+        start, end = max([start, *self._edges[:index][-1:]]), min([end, *self._edges[index : index + 1]])
+        return add_swing_torques(pushes, self._swings, self._axes, (start + 0.5 * (end - start)) * self._timestep)

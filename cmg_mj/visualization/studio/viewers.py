@@ -1,4 +1,4 @@
-"""Which viewer there is: the browser's, on loopback alone, or a window."""
+"""Starts Studio's viewer: a browser's, on loopback alone, or a window."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from cmg_mj.errors import InputError
 LOOPBACK = "127.0.0.1"
 WEB, NATIVE = "web", "native"
 PATIENCE_S = 60.0
-"""With which a window's first frames are waited for [s]."""
+"""Longest wait for a window's first frames [s]."""
 
 
 class ViewerFailed(Exception):
-    """The viewer's thread has ended with an exception."""
+    """An exception that ended the viewer's thread."""
 
 
 class LoopbackViewer(web_viewer.WebViewer):
-    """The web viewer for this machine's browsers alone. Studio's own listens on every network interface, to anybody."""
+    """A web viewer for browsers on this machine alone; Studio's listens on every network interface."""
 
     @property
     def _host(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -29,17 +29,17 @@ class LoopbackViewer(web_viewer.WebViewer):
 
     @_host.setter
     def _host(self, _: str) -> None:
-        """Studio names all interfaces here."""
+        """Ignore the address that Studio sets, that of all interfaces."""
 
 
 def check_graphics(gfx: str) -> None:
-    """Refuse graphics that cannot be had, which end the process otherwise, before there is a viewer.
+    """Reject graphics that are not available, before they end the process.
 
     Args:
         gfx: `web`, `native`, or one of Studio's graphics modes.
 
     Raises:
-        InputError: They cannot be had here.
+        InputError: The graphics are not available.
     """
     if gfx == WEB:
         return
@@ -50,7 +50,7 @@ def check_graphics(gfx: str) -> None:
         )
     mode = "" if gfx == NATIVE else gfx
     try:
-        tried = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-m", "cmg_mj.visualization.studio.probe", mode],
             capture_output=True,
             text=True,
@@ -59,36 +59,36 @@ def check_graphics(gfx: str) -> None:
     except subprocess.TimeoutExpired:
         why = f"no frame in {PATIENCE_S:g} s"
     else:
-        if tried.returncode == 0:
+        if process.returncode == 0:
             return
-        lines = [line.strip() for line in tried.stderr.splitlines() if _says_why(line)]
-        why = lines[-1] if lines else f"a window ends the process, status {tried.returncode}"
+        lines = [line.strip() for line in process.stderr.splitlines() if _names_a_failure(line)]
+        why = lines[-1] if lines else f"a window ends the process, status {process.returncode}"
     raise InputError(f"--gfx {gfx}: MuJoCo Studio cannot draw with it here ({why}); take --gfx {WEB}")
 
 
-def _says_why(line: str) -> bool:
+def _names_a_failure(line: str) -> bool:
     return "rror" in line or "ailed" in line
 
 
-def launched(config: viewer_protocol.ViewerConfig, plugins: Sequence[plugin.Plugin]) -> viewer_handle.ViewerHandle:
-    """Start a viewer in a thread of its own.
+def launch(config: viewer_protocol.ViewerConfig, plugins: Sequence[plugin.Plugin]) -> viewer_handle.ViewerHandle:
+    """Start a viewer in a thread.
 
     Args:
-        config: Its window and graphics.
-        plugins: What runs on both threads.
+        config: Window and graphics.
+        plugins: Plugins of both threads.
 
     Returns:
-        The simulation's handle on it, which raises `ViewerFailed` should the viewer.
+        The simulation's handle on the viewer, which raises `ViewerFailed` if the viewer fails.
     """
-    of_viewer, of_simulation = plugin.split_plugins(plugins)
+    viewer_plugins, sim_plugins = plugin.split_plugins(plugins)
 
     def view(endpoint: endpoints.ViewerEndpoint) -> None:
         try:
             if config.gfx == WEB:
-                viewer_protocol.run_viewer_loop(LoopbackViewer(config, endpoint, plugins=of_viewer))
+                viewer_protocol.run_viewer_loop(LoopbackViewer(config, endpoint, plugins=viewer_plugins))
             else:
-                launch_native.run_native_viewer(config, endpoint, plugins=of_viewer)
+                launch_native.run_native_viewer(config, endpoint, plugins=viewer_plugins)
         except Exception as error:
             raise ViewerFailed(f"{type(error).__name__}: {error}") from error
 
-    return launch_thread.launch_thread(view, sim_plugins=of_simulation)
+    return launch_thread.launch_thread(view, sim_plugins=sim_plugins)

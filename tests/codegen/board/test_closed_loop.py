@@ -140,7 +140,7 @@ def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
     assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
 
 
-def test_open_loop_observers_ride_along_on_the_host() -> None:
+def test_open_loop_observers_run_on_the_host() -> None:
     experiment = short("linear", "open_loop_observers=['ltv']")
     host, board = experiment.run(), experiment.run(driver="board")
     key = "velocity_rms_error_rad_s"
@@ -195,7 +195,7 @@ def test_a_run_on_the_board_says_so_and_reruns_to_the_same_numbers() -> None:
     assert len(list(Path("runs").iterdir())) == 2  # the same run again goes to the same folder
 
 
-COMPANION = """
+OPEN_LOOP_OBSERVER = """
 import signal
 from cmg_mj import Estimate
 
@@ -214,7 +214,7 @@ class Presses:
 
 @pytest.mark.usefixtures("elsewhere", "ctrl_c")
 def test_ctrl_c_ends_the_board_too() -> None:
-    Path("pressing.py").write_text(COMPANION)
+    Path("pressing.py").write_text(OPEN_LOOP_OBSERVER)
     others = children()
     said = cmg_mj(
         *["run", "push_recovery", "--driver", "board", "--out", "here"],

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cmg_mj.codegen.board import Board
-from cmg_mj.codegen.board.cost import cost_markdown, cost_of, cost_table
+from cmg_mj.codegen.board.cost import CostFigures, ObserverCost, cost_markdown, cost_of, cost_table
 from cmg_mj.codegen.board.deploy import exported
 from cmg_mj.codegen.board.tools import available
 from cmg_mj.papers.aranovskiy2020 import on_the_board
@@ -27,7 +27,8 @@ def test_what_they_cost() -> None:
         assert 100 <= row["flash_bytes"] <= 20_000
     # Of the observer tilt, rate and last sample; integrator, last command, and whether it has started.
     assert linear["state_bytes"] == 6 * 4
-    figures = {"figures": [{"observer": "linear"} | linear]}
+    rows: list[ObserverCost] = [{"observer": "linear", **linear}]
+    figures: CostFigures = {"processor": "", "clock_mhz": 216.0, "cycles_an_instruction": 1.0, "figures": rows}
     assert cost_markdown(figures).splitlines()[2].startswith("| linear")
     assert cost_table(figures).row_count == 1
 

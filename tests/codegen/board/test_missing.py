@@ -47,7 +47,7 @@ def test_it_is_said_what_to_install(
 
 @pytest.mark.skipif(bool(missing()), reason=f"not installed: {', '.join(missing())}")
 def test_without_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmg_mj.codegen.export.find_spec", lambda name: None)
+    monkeypatch.setattr("cmg_mj.codegen.export.save.find_spec", lambda name: None)
     said = cmg_mj("run", "push_recovery", "--driver", "board")
     assert said.complaint == 'export: casadi is not installed: python -m pip install "cmg_mj[export]"'
     assert not Path("runs").exists()
@@ -62,7 +62,7 @@ def test_a_program_that_is_none(tmp_path: Path, program: str, monkeypatch: pytes
     monkeypatch.setattr("cmg_mj.codegen.board.tools.missing", list)
     monkeypatch.setattr("cmg_mj.codegen.board.image.COMPILER", str(broken) if program == COMPILER else COMPILER)
     monkeypatch.setattr("cmg_mj.codegen.board.qemu.EMULATOR", str(broken) if program == EMULATOR else EMULATOR)
-    monkeypatch.setattr("cmg_mj.codegen.board.qemu._ends_with_us", list)
+    monkeypatch.setattr("cmg_mj.codegen.board.qemu._parent_death_prefix", list)
     words = f"{broken} cannot be run: Exec format error"
     assert words in cmg_mj("run", "push_recovery", "--driver", "board").complaint
     assert not Path("runs").exists()

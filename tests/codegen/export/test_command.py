@@ -211,7 +211,7 @@ def test_without_casadi_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     def lost(name: str, *others: Any) -> Any:
         return None if name == "casadi" else genuine(name, *others)
 
-    monkeypatch.setattr("cmg_mj.codegen.export.find_spec", lost)
+    monkeypatch.setattr("cmg_mj.codegen.export.save.find_spec", lost)
     with pytest.raises(InputError, match=r'casadi is not installed: python -m pip install "cmg_mj\[export\]"'):
         check_installed()
     assert 'pip install "cmg_mj[export]"' in cmg_mj("export", "linear", "--out", "board").complaint

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.codegen.export.pytree import form, numbers, rebuilt
+from cmg_mj.codegen.export.pytree import form, numbers, rebuild
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Measurement
 from tests.codegen.export import own
@@ -22,7 +22,7 @@ from cmg_mj.codegen.export.symbol import Symbol  # isort: skip
 from cmg_mj.codegen.export.trace import _as_written  # isort: skip
 from cmg_mj.codegen.export.names import name_of  # isort: skip
 from cmg_mj.codegen.export.c_identifiers import identifiers  # isort: skip
-from cmg_mj.codegen.export.pipeline import code  # isort: skip
+from cmg_mj.codegen.export.pipeline import generate_code  # isort: skip
 
 
 def symbol(name: str = "x") -> Any:
@@ -59,7 +59,7 @@ def test_casadi_is_left_as_it_was(name: str) -> None:
     for before in (True, False):
         casadi.GlobalOptions.setSimplificationOnTheFly(before)
         try:
-            code(controller(f"tests.codegen.export.own:{name}"), "double")
+            generate_code(controller(f"tests.codegen.export.own:{name}"), "double")
         except InputError:
             assert name == "Branches"
         assert casadi.GlobalOptions.getSimplificationOnTheFly() is before
@@ -70,7 +70,7 @@ def test_a_state_is_taken_apart_and_put_together() -> None:
     state = own.Elaborate(0.005, None).init(Measurement(0.1, 0.2, 0.3))
     found = list(numbers(state))
     assert [leaf.value for leaf in found] == [0, False, 0.1, 0.0, 0.0, 0.1, 0.2, 0.3, 0.0]
-    again = rebuilt(state, iter(range(9)))
+    again = rebuild(state, iter(range(9)))
     assert form(again) == form(state)
     assert (again.last.acceleration, again.parts["π"].other, again.label) == (7, [3, 4], "a constant")
     assert form(state._replace(label="another")) != form(state)
@@ -78,7 +78,7 @@ def test_a_state_is_taken_apart_and_put_together() -> None:
 
 def test_names_in_c() -> None:
     paths = [("x", "1"), ("x_1",), ("double",), ("0",), ("π", "a"), (), ("__x",), ("x", "1"), ("速度",), ("this",)]
-    names = identifiers(paths, taken=("value",))
+    names = identifiers(paths, reserved=("value",))
     assert names == ["x_1", "x_1_2", "double_", "s0", "pi_a", "value_", "s__x", "x_1_3", "value__2", "this_"]
 
 

@@ -11,6 +11,7 @@ from cmg_mj.visualization.plots.readability import (
     FEW,
     MARGIN,
     REACH,
+    SummaryValue,
     axis_range,
     free_corner,
     observers_to_draw,
@@ -70,7 +71,7 @@ def test_no_range_where_there_is_none(nothing: list[np.ndarray]) -> None:
     assert axis_range(nothing) is None
 
 
-def summary(error: float | None, *, push: float | None = None, fell: bool = False) -> dict[str, object]:
+def summary(error: float | None, *, push: float | None = None, fell: bool = False) -> dict[str, SummaryValue]:
     return {"velocity_rms_error_rad_s": error, "velocity_rms_error_push_rad_s": push, "fell": fell}
 
 
@@ -99,7 +100,7 @@ def test_the_push_decides_where_it_is_known() -> None:
 def test_what_observers_are_compared_with_is_not_among_the_best() -> None:
     summaries = {name: summary(i / 10.0) for i, name in enumerate(("zero", "mems_gyro", "a", "b", "c", "d"))}
     assert observers_to_draw(summaries) == ["a", "b", "c"]
-    assert len(observers_to_draw(dict.fromkeys(("zero", "mems_gyro", "a"), summary(0.1)))) == FEW
+    assert len(observers_to_draw({name: summary(0.1) for name in ("zero", "mems_gyro", "a")})) == FEW
 
 
 TIME = np.linspace(0.0, 10.0, 1001)

@@ -22,8 +22,8 @@ BAND, LIMIT = 1.0, 4.7
 
 
 @pytest.fixture(scope="module")
-def ridden() -> tuple[Trajectory, dict[str, Any]]:
-    """A short run in which every observer rides along."""
+def all_observers() -> tuple[Trajectory, dict[str, Any]]:
+    """A short run with every observer."""
     short = ("duration_s=0.6", "push.0.start_s=0.2")
     result = prepare(load_scenario("observer_tuning", short)).run()
     assert result.trajectory is not None
@@ -55,9 +55,9 @@ def labels(axes: Any) -> list[str]:
 
 
 def test_eleven_lines_on_one_page(
-    ridden: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
 ) -> None:
-    trajectory, summary = ridden
+    trajectory, summary = all_observers
     figure = plotted(tmp_path, trajectory, summary, figures)
     width, height = figure.get_size_inches()
     assert width <= PAGE[0]
@@ -83,9 +83,9 @@ def test_eleven_lines_on_one_page(
 
 
 def test_an_estimate_that_goes_astray_takes_no_axis(
-    ridden: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
 ) -> None:
-    trajectory, summary = ridden
+    trajectory, summary = all_observers
     columns = dict(trajectory.columns)
     astray = columns["x2_rad_s"].copy()
     astray[50:] = [*[1e300, -np.inf], *[np.nan] * (len(trajectory) - 52)]
@@ -104,9 +104,9 @@ def test_an_estimate_that_goes_astray_takes_no_axis(
 
 
 def test_long_names_do_not_narrow_the_panels(
-    ridden: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
 ) -> None:
-    trajectory, summary = ridden
+    trajectory, summary = all_observers
     longest = sorted(OBSERVERS, key=len)[-3:]
     figures_of = summary["open_loop_observers"] | {"homogeneous": summary}
     open_loop_observers = {name: dict.fromkeys(figures_of[name], 0.0) for name in longest[1:]}
@@ -125,8 +125,11 @@ def test_a_picture_has_the_observers_colours(tmp_path: Path, figures: list[matpl
 
 @pytest.mark.parametrize("ticks", [0, 1, 2])
 def test_a_run_of_no_length(
-    ridden: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure], ticks: int
+    all_observers: tuple[Trajectory, dict[str, Any]],
+    tmp_path: Path,
+    figures: list[matplotlib.figure.Figure],
+    ticks: int,
 ) -> None:
-    trajectory, _ = ridden
+    trajectory, _ = all_observers
     columns = {name: values[:ticks] for name, values in trajectory.columns.items()}
     plotted(tmp_path, replace(trajectory, columns=columns), {}, figures)

@@ -22,10 +22,10 @@ from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.compare.comparison import prepare_comparison
 from cmg_mj.studies.save import summary_of
 from cmg_mj.visualization.recording import Run, write_recording
-from cmg_mj.visualization.recording.camera import FARTHEST, ball
+from cmg_mj.visualization.recording.camera import FARTHEST, enclosing_ball
 from cmg_mj.visualization.recording.run import best_observers, best_runs
-from cmg_mj.visualization.recording.signals import numbered
-from cmg_mj.visualization.recording.summary import ROW_TABLES, page
+from cmg_mj.visualization.recording.signals import numbered_parts
+from cmg_mj.visualization.recording.summary import ROW_TABLES, summary_page
 from cmg_mj.visualization.recording.views import EYE
 
 SHORT = ("duration_s=0.6", "push.0.start_s=0.2")
@@ -42,7 +42,7 @@ class View:
         contents: The entities asked for.
         hidden: Entities that are switched off, out of the legend.
         grey: Entities that are switched off in the legend.
-        listed: Entities whose line is overridden in the legend, whether on or off.
+        listed: Entities whose line is overall_observers in the legend, whether on or off.
         axis: Range of y.
         eye: Position and target of the camera.
     """
@@ -67,17 +67,17 @@ def views(path: Path) -> list[View]:
         view, below = found.setdefault(matched[1], View()), matched[2]
         batch = chunk.to_record_batch()
         values: dict[str, Any] = {name: batch.column(name).to_pylist()[0] for name in batch.schema.names if ":" in name}
-        overridden = re.sub(r"^ViewContents/overrides(/.*?)/visualizers.*", r"\1", below)
+        overall_observers = re.sub(r"^ViewContents/overrides(/.*?)/visualizers.*", r"\1", below)
         if "ViewBlueprint:display_name" in values:
             (view.name,) = values["ViewBlueprint:display_name"]
         if "ViewContents:query" in values:
             view.contents = values["ViewContents:query"]
         if values.get("EntityBehavior:visible") == [False]:
-            view.hidden.add(overridden)
+            view.hidden.add(overall_observers)
         if "SeriesLines:visible_series" in values:
-            view.listed.add(overridden)
+            view.listed.add(overall_observers)
             if values["SeriesLines:visible_series"] == [False]:
-                view.grey.add(overridden)
+                view.grey.add(overall_observers)
         if "ScalarAxis:range" in values:
             (view.axis,) = values["ScalarAxis:range"]
         for name in ("position", "look_target"):
@@ -103,8 +103,8 @@ def write(path: Path, experiment: Experiment, runs: Sequence[Run]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def ridden() -> tuple[Experiment, Run]:
-    """Every observer rides along."""
+def all_observers() -> tuple[Experiment, Run]:
+    """A run with every observer."""
     experiment = prepare(load_scenario("observer_tuning", SHORT))
     return experiment, recorded(experiment)
 
@@ -119,8 +119,8 @@ def compared() -> tuple[Experiment, list[Run]]:
 # --- many observers ------------------------------------------------------------------------------------------
 
 
-def test_the_best_of_those_riding_along_are_on(ridden: tuple[Experiment, Run], tmp_path: Path) -> None:
-    experiment, run = ridden
+def test_the_best_open_loop_observers_are_on(all_observers: tuple[Experiment, Run], tmp_path: Path) -> None:
+    experiment, run = all_observers
     found = views(write(tmp_path / "it.rrd", experiment, [run]))
     few = best_observers(run)
     assert few[0] == "homogeneous"
@@ -154,7 +154,7 @@ def test_the_best_runs_are_on(compared: tuple[Experiment, list[Run]], tmp_path: 
         assert {entity.split("/")[1] for entity in second.listed - second.grey} == on
     lanes = {len(view.contents) for view in named(found, "Phase")}
     assert lanes == {1, len(few), len(runs)}
-    text = page("", runs, experiment.scenario.push, experiment.scenario.metrics, "")
+    text = summary_page("", runs, experiment.scenario.push, experiment.scenario.metrics)
     names = [line.split("|")[1].strip().strip("*") for line in text.splitlines() if line.startswith("| ")]
     assert [name for name in names if name] == [run.name for run in runs] * len(ROW_TABLES)
 
@@ -162,7 +162,7 @@ def test_the_best_runs_are_on(compared: tuple[Experiment, list[Run]], tmp_path: 
 def test_tables_fit_their_view(compared: tuple[Experiment, list[Run]]) -> None:
     """As wide as those that were looked at, in a window of 1400 pixels."""
     experiment, runs = compared
-    text = page("", runs, experiment.scenario.push, experiment.scenario.metrics, "")
+    text = summary_page("", runs, experiment.scenario.push, experiment.scenario.metrics)
     tables = [part.splitlines() for part in text.split("\n\n") if part.startswith("|")]
     assert len(tables) == len(ROW_TABLES)
     for lines in tables:
@@ -170,8 +170,8 @@ def test_tables_fit_their_view(compared: tuple[Experiment, list[Run]]) -> None:
         assert np.max(widths, axis=0).sum() <= 76
 
 
-def test_a_noisy_observer_takes_no_axis(ridden: tuple[Experiment, Run], tmp_path: Path) -> None:
-    experiment, run = ridden
+def test_a_noisy_observer_takes_no_axis(all_observers: tuple[Experiment, Run], tmp_path: Path) -> None:
+    experiment, run = all_observers
     noisy = run.trajectory["estimate/finite_difference/x2_rad_s"]
     for view in named(views(write(tmp_path / "it.rrd", experiment, [run])), "Tilt rate [rad/s]"):
         assert view.axis is not None
@@ -196,10 +196,10 @@ def test_a_fall_takes_no_axis_from_those_that_stand(compared: tuple[Experiment, 
 
 def test_numbers_put_paths_into_the_order_given() -> None:
     names = [f"observer_{letter}" for letter in "zyxwvutsrqp"]
-    parts = numbered(names)
+    parts = numbered_parts(names)
     assert parts == sorted(parts)
-    assert numbered(["alone"]) == ["alone"]
-    assert numbered(["b", "a"]) == ["1_b", "2_a"]
+    assert numbered_parts(["alone"]) == ["alone"]
+    assert numbered_parts(["b", "a"]) == ["1_b", "2_a"]
 
 
 # --- the camera ----------------------------------------------------------------------------------------------
@@ -237,7 +237,7 @@ def test_a_rig_is_framed_whole(
     model = moved(copy.copy(plant.drawn_model), scale, np.array(by, float))
     monkeypatch.setitem(plant.__dict__, "drawn_model", model)
     qpos = plant.new_data().qpos[None]
-    rig = ball(plant, qpos)
+    rig = enclosing_ball(plant, qpos)
     points = corners(model, qpos[0])
     eye = rig.centre + rig.radius * np.array(EYE)
     gaze = (rig.centre - eye) / np.linalg.norm(rig.centre - eye)
@@ -252,9 +252,10 @@ def test_a_rig_is_framed_where_it_goes() -> None:
     start = plant.new_data().qpos
     fallen = start.copy()
     fallen[plant.tilt] += math.radians(60.0)
-    seen = ball(plant, np.stack([start, fallen]))
+    seen = enclosing_ball(plant, np.stack([start, fallen]))
     for qpos in (start, fallen):
         distance = np.linalg.norm(corners(plant.drawn_model, qpos) - seen.centre, axis=1)
         assert distance.max() <= seen.radius * (1.0 + 1e-9)
-    assert ball(plant, np.full((3, len(start)), math.nan)).radius == ball(plant, start[None]).radius
-    assert ball(plant, start[None]).radius < seen.radius < FARTHEST * ball(plant, start[None]).radius
+    at_start = enclosing_ball(plant, start[None]).radius
+    assert enclosing_ball(plant, np.full((3, len(start)), math.nan)).radius == at_start
+    assert at_start < seen.radius < FARTHEST * at_start

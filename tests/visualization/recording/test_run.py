@@ -24,14 +24,12 @@ from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import Scenario, load_scenario
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.visualization import recording
-from cmg_mj.visualization.recording import Run, write_recording
+from cmg_mj.visualization.recording import Run, save, write_recording
 from cmg_mj.visualization.recording.run import phases, torque_steps
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN, POSE_RATE_HZ
-from cmg_mj.visualization.recording.shapes import shapes
+from cmg_mj.visualization.recording.shapes import drawn_shapes
+from cmg_mj.visualization.recording.signals import instant, time_column
 from cmg_mj.visualization.recording.summary import ROW_TABLES
-from cmg_mj.visualization.recording.timeline import column as time_column
-from cmg_mj.visualization.recording.timeline import instant
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1", 'open_loop_observers=["linear"]')
 NANOSECONDS = 1e9
@@ -169,7 +167,7 @@ def test_an_observer_keeps_its_colour(path: Path) -> None:
 
 
 def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
-    """In degrees, in the loop and riding along; the summary has its figures."""
+    """In degrees, in the loop and open loop; the summary has its figures."""
     of = prepare(
         scenario("observer.kind=adaptive", "open_loop_observers=['homogeneous_adaptive']", "metrics.bias_from_s=0.1")
     )
@@ -199,9 +197,9 @@ def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
     assert ["", heading("tilt_rms_deg"), written("tilt_rms_deg", run.summary["tilt_rms_deg"]), ""] in rows
     assert ["", "Outcome", "done at 0.5 s", ""] in rows
     (observers,) = static(path, "/observers", "TextDocument:text")
-    riding = [[cell.strip() for cell in line.split("|")][1] for line in observers.splitlines() if "|" in line]
+    names = [[cell.strip() for cell in line.split("|")][1] for line in observers.splitlines() if "|" in line]
     rows = ["**homogeneous**", "**linear**", *REFERENCES]
-    assert [name for name in riding if name and not name.startswith(":-")] == 2 * rows  # two tables, for their width
+    assert [name for name in names if name and not name.startswith(":-")] == 2 * rows  # two tables, for their width
     assert 'kind = "made up"' in static(path, "/scenario", "TextDocument:text")[0]
     assert static(path, "/__properties", "RecordingInfo:name") == ["A title: homogeneous"]
     assert len(RrdReader(path).blueprints()) == 1
@@ -303,13 +301,20 @@ SHAPES = """
 
 def test_other_robots_shapes() -> None:
     model = mujoco.MjModel.from_xml_string(SHAPES)
-    drawn = {name: shape for _, name, shape in shapes(model, 0.25)}
+    drawn = {name: shape for _, name, shape in drawn_shapes(model, 0.25)}
     assert drawn.keys() == {"ball", "egg", "sheet", "wedge", "geom4"}
     assert isinstance(drawn["ball"], rr.Ellipsoids3D)
-    assert drawn["egg"].half_sizes.as_arrow_array().to_pylist() == [pytest.approx([0.1, 0.2, 0.3])]
-    sheet = np.array(drawn["sheet"].vertex_positions.as_arrow_array().to_pylist())
+    egg, plane, mesh = drawn["egg"], drawn["sheet"], drawn["wedge"]
+    assert isinstance(egg, rr.Ellipsoids3D)
+    assert egg.half_sizes is not None
+    assert isinstance(plane, rr.Mesh3D)
+    assert plane.vertex_positions is not None
+    assert isinstance(mesh, rr.Mesh3D)
+    assert mesh.vertex_positions is not None
+    assert egg.half_sizes.as_arrow_array().to_pylist() == [pytest.approx([0.1, 0.2, 0.3])]
+    sheet = np.array(plane.vertex_positions.as_arrow_array().to_pylist())
     assert np.ptp(sheet, axis=0) == pytest.approx([2.0, 0.0, 1.0], abs=1e-6)
-    wedge = np.array(drawn["wedge"].vertex_positions.as_arrow_array().to_pylist())
+    wedge = np.array(mesh.vertex_positions.as_arrow_array().to_pylist())
     corners = [[1, 0, 0], [1, 0.1, 0], [0.9, 0, 0], [1, 0, 0.1]]
     assert {tuple(v) for v in np.round(wedge, 5) + 0.0} == {tuple(map(float, corner)) for corner in corners}
 
@@ -405,7 +410,9 @@ def test_settled_when_the_summary_says(experiment: Experiment) -> None:
     run = recorded(prepare(scenario("duration_s=3.0")))
     push_end = max(push.end_s for push in experiment.scenario.push)
     settled = [time for time, name in phases(run, experiment.scenario.push, MetricsSettings()) if name == "settled"]
-    assert settled == [pytest.approx(push_end + run.summary["settle_time_s"])]
+    settle_time = run.summary["settle_time_s"]
+    assert isinstance(settle_time, float)
+    assert settled == [pytest.approx(push_end + settle_time)]
 
 
 # --- the file ------------------------------------------------------------------------------------------------
@@ -536,7 +543,7 @@ def test_an_interrupted_recording_leaves_nothing(
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(recording, "log_phases", interrupt)
+    monkeypatch.setattr(save, "log_phases", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write(tmp_path / "recording.rrd", experiment, [run])
     assert list(tmp_path.iterdir()) == []

@@ -22,6 +22,7 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.studio.live import StudioSession
 from cmg_mj.visualization.studio.messages import SessionState
+from cmg_mj.visualization.studio.settings import Settings
 from cmg_mj.visualization.studio.stepping import Stepping
 
 SIGNALS = ("x2_rad_s", "y1_rad", "y2_rad", "fog_rad_s", "u_rad_s", "x_e_rad_times_s", "push_n_m")
@@ -110,12 +111,17 @@ class Session:
         said = [*self.viewer.get_sim_events(), *self.viewer.get_sim_snapshots()]
         return [message for message in said if isinstance(message, kind)]
 
-    def standing(self) -> SessionState:
-        """What the panel is told next."""
+    def session_state(self) -> SessionState:
+        """The next state that the panel receives."""
         self.heard(SessionState)
         self.now += 1.0 / 29.0
         self.handle.sync()
         return self.heard(SessionState)[-1]
+
+    def settings(self) -> Settings:
+        settings = self.session_state().settings
+        assert settings is not None
+        return settings
 
     def scrub(self, index: int) -> None:
         """Go so many frames back in history."""

@@ -16,7 +16,7 @@ from cmg_mj import load_scenario, prepare
 from cmg_mj.inputs.bundled import folder
 from cmg_mj.observers import OBSERVERS, Estimate
 from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController
-from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, laws_of
+from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws
 from tests.visualization.studio.session import Session, session
 from tests.visualization.studio.test_session import of_runner, same
 
@@ -93,7 +93,7 @@ def test_every_observer_takes_over_without_a_bump() -> None:
             same(rows[: 124 + 20], undisturbed)
             alone = i == list(OBSERVERS).index("homogeneous")
             assert np.array_equal(rows[:, U], undisturbed[: len(rows), U]) == alone, kind
-            assert studio.standing().settings[OBSERVER] == kind
+            assert studio.settings()[OBSERVER] == kind
 
 
 def test_the_scenarios_observer_has_its_parameters_again() -> None:
@@ -107,19 +107,20 @@ def test_the_scenarios_observer_has_its_parameters_again() -> None:
 
 def test_gains_and_feedback() -> None:
     with session() as studio:
-        laws = laws_of(studio.live.base)
+        laws = choosable_laws(studio.live.base)
         studio.send(ChangeSettings(laws["LQR"]), ChangeSettings({FEEDBACK: "truth"}))
         studio.run(1.0)
-        said = studio.standing()
+        said = studio.session_state()
+        assert said.settings is not None
         assert (said.law, said.settings[FEEDBACK]) == ("LQR", "truth")
         same(studio.rows, of_runner("controller.lqr.state_cost=[1,1,1,1]", "controller.feedback=truth"))
         studio.send(ChangeSettings(laws["Table 2"]))
-        assert studio.standing().gains == (35.0, 4.0, -1.0, 0.3)
+        assert studio.session_state().gains == (35.0, 4.0, -1.0, 0.3)
         studio.run(4.0)
         studio.send(ChangeSettings(laws["LQG"]))
-        assert "lqg takes nothing of the observer" in studio.standing().note
+        assert "lqg takes nothing of the observer" in studio.session_state().note
         studio.send(ChangeSettings({FEEDBACK: "observer"}), ChangeSettings(laws["LQG"]))
-        said = studio.standing()
+        said = studio.session_state()
         assert (said.law, said.note) == ("LQG", "")
         assert np.isfinite(studio.rows[-1, U + 1])
         before = studio.rows[-2:, U + 1]
@@ -153,7 +154,7 @@ def test_what_is_refused_changes_nothing_and_is_said() -> None:
             ({"controller.rate_hz": 100.0}, "stays 200 Hz"),
         ):
             studio.send(ChangeSettings(values))
-            assert said in studio.standing().note
+            assert said in studio.session_state().note
         studio.run(1.0)
         same(studio.rows, of_runner("duration_s=2.5"))
 
@@ -165,10 +166,10 @@ def test_studios_physics_settings_cannot_change_the_step() -> None:
         opt.timestep = 0.001
         studio.send(messages.MjOptionSnapshot(opt=opt))
         assert studio.live.model.opt.timestep == 0.005
-        assert "the physics step stays 0.005 s" in studio.standing().note
+        assert "the physics step stays 0.005 s" in studio.session_state().note
         assert [said.opt.timestep for said in studio.heard(messages.MjOptionSnapshot)][-1:] in ([], [0.005])
         studio.send(messages.StepControlSnapshot(noise_scale=0.1))
-        assert "noise on the controls is not applied" in studio.standing().note
+        assert "noise on the controls is not applied" in studio.session_state().note
 
 
 # --- what goes wrong ---------------------------------------------------------------------------------------
@@ -201,7 +202,7 @@ def failed(studio: Session) -> None:
 def test_an_observer_that_raises_stops_the_controller_and_nothing_else() -> None:
     with session() as studio:
         failed(studio)
-        said = studio.standing()
+        said = studio.session_state()
         assert said.stopped == "observer Fragile raised KeyError: 'gone' at t = 2.505 s"
         assert studio.data.time == pytest.approx(3.5, abs=0.05)
         assert np.all(studio.data.ctrl[studio.live.plant.axis.servos] == 0.0)
@@ -213,7 +214,7 @@ def test_history_goes_back_to_before_an_observer_failed() -> None:
         failed(studio)
         rows = studio.rows
         studio.scrub(-160)  # 1.9 s
-        assert studio.standing().stopped == ""
+        assert studio.session_state().stopped == ""
         del studio.stepping.rows[:]
         studio.send(ChangeSettings({OBSERVER: "homogeneous"}))
         studio.pause(False)
@@ -232,7 +233,7 @@ def test_a_stopped_controller_starts_again_with_another_observer() -> None:
         studio.run(0.02)
         assert studio.live.stopped
         studio.send(ChangeSettings({OBSERVER: "linear"}))
-        assert studio.standing().stopped == ""
+        assert studio.session_state().stopped == ""
         studio.run(1.0)
         assert not studio.live.stopped
         assert studio.rows[-1, TIME] > 3.4
@@ -251,10 +252,10 @@ def test_a_fall_is_said_and_reset_stands_up_again() -> None:
     with session("push.0.start_s=0.5") as studio:
         studio.send(PushRequest(30.0, 0.5))
         studio.run(3.0)
-        assert studio.standing().stopped.startswith("the rig fell at t = 0.")
+        assert studio.session_state().stopped.startswith("the rig fell at t = 0.")
         studio.send(RestartController())
         studio.run(0.5)
-        assert "fell" in studio.standing().stopped
+        assert "fell" in studio.session_state().stopped
         studio.send(messages.ResetEvent(key=-1))
         studio.stepping.rows.clear()
         studio.run(1.0)
@@ -292,7 +293,7 @@ def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> N
     with studio.handle:
         studio.run(0.5)
         studio.send(messages.LoadModelEvent(path=str(tmp_path / "none.xml")))
-        assert "no such file" in studio.standing().note
+        assert "no such file" in studio.session_state().note
         studio.run(0.5)
         assert studio.data.time > 1.0
         studio.stepping.rows.clear()
@@ -303,5 +304,5 @@ def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> N
         assert not np.array_equal(expected, of_runner())
         other.write_text("<mujoco/>", encoding="utf-8")
         studio.send(messages.LoadModelEvent(path=str(other)))
-        assert "joint" in studio.standing().note
+        assert "joint" in studio.session_state().note
         assert studio.data.time > 3.0

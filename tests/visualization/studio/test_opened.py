@@ -77,11 +77,11 @@ import sys, time
 from mujoco.studio import app, messages, sim_history, viewer_protocol
 from cmg_mj import load_scenario, prepare
 from cmg_mj.visualization.studio import viewers
-from cmg_mj.visualization.studio.panel import Panel
+from cmg_mj.visualization.studio.panel import StudioPanel
 from cmg_mj.visualization.studio.stepping import Stepping
 opened = prepare(load_scenario("push_recovery"))
-plugins = [app.App(), Panel(), Stepping(lambda path: opened), sim_history.SimHistory()]
-with viewers.launched(viewer_protocol.ViewerConfig(gfx="web", http_port=int(sys.argv[1])), plugins) as handle:
+plugins = [app.App(), StudioPanel(), Stepping(lambda path: opened), sim_history.SimHistory()]
+with viewers.launch(viewer_protocol.ViewerConfig(gfx="web", http_port=int(sys.argv[1])), plugins) as handle:
     handle.dispatch(messages.LoadModelEvent())
     start = time.monotonic()
     while time.monotonic() - start < 1.0:

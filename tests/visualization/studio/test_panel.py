@@ -12,7 +12,7 @@ from mujoco.studio.implot import implot
 
 from cmg_mj.visualization.studio import panel as module
 from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
-from cmg_mj.visualization.studio.panel import Panel
+from cmg_mj.visualization.studio.panel import StudioPanel
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, LAW, OBSERVER
 from tests.visualization.studio.session import session
 
@@ -24,7 +24,7 @@ class Screen:
 
     def __init__(self) -> None:
         self.sent: list[messages.Message] = []
-        self.panel = Panel()
+        self.panel = StudioPanel()
         vars(self.panel)["_viewer"] = self
 
     def send_to_sim(self, message: messages.Message) -> None:
@@ -55,7 +55,7 @@ def screen() -> Iterator[Screen]:
 def standing() -> SessionState:
     with session() as studio:
         studio.run(3.0)
-        return studio.standing()
+        return studio.session_state()
 
 
 def pressed(label: str) -> Callable[..., bool]:
@@ -76,7 +76,7 @@ def test_it_is_drawn_from_the_first_frame_on(
     monkeypatch.setattr(module.implot, "PlotLine", lambda label, xs, ys: lines.update({label: len(xs)}))
     screen.frame()
     assert lines == {}
-    screen.panel.on_standing(standing)
+    screen.panel.on_state(standing)
     for _ in range(3):
         screen.frame()
     assert not screen.panel._broken
@@ -102,7 +102,7 @@ def test_what_is_pressed_is_sent(
     does: Any,
     sends: messages.Message,
 ) -> None:
-    screen.panel.on_standing(standing)
+    screen.panel.on_state(standing)
     screen.frame()
     monkeypatch.setattr(module.imgui, widget, does)
     screen.frame()
@@ -118,12 +118,12 @@ def test_of_several_axes_one_is_chosen(screen: Screen, standing: SessionState, m
         return combo(label, place, options)
 
     monkeypatch.setattr(module.imgui, "Combo", listed)
-    screen.panel.on_standing(standing)
+    screen.panel.on_state(standing)
     screen.frame()
     assert lists == ["observer", "law", "rate fed back"]
     with session(scenario="two_axes") as studio:
         studio.run(0.5)
-        screen.panel.on_standing(studio.standing())
+        screen.panel.on_state(studio.session_state())
     screen.frame()
     assert lists[3:] == ["axis shown and pushed", *lists[:3]]
     monkeypatch.setattr(module.imgui, "Combo", picked("axis shown and pushed", "pitch"))
@@ -135,7 +135,7 @@ def test_of_several_axes_one_is_chosen(screen: Screen, standing: SessionState, m
 def test_a_number_counts_once_it_is_typed_to_the_end(
     screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    screen.panel.on_standing(standing)
+    screen.panel.on_state(standing)
     done = {"now": False}
     typed = iter([1.0, 1.2, 1.25])
     current = {"label": ""}
@@ -162,7 +162,7 @@ def test_a_stopped_controller_is_said_and_can_be_started(screen: Screen, monkeyp
     said: list[str] = []
     monkeypatch.setattr(module.imgui, "TextWrapped", said.append)
     monkeypatch.setattr(module.imgui, "Button", pressed("Start it again"))
-    screen.panel.on_standing(SessionState(title="x", stopped="observer Mine raised KeyError: 'gone' at t = 2 s"))
+    screen.panel.on_state(SessionState(title="x", stopped="observer Mine raised KeyError: 'gone' at t = 2 s"))
     screen.frame()
     assert "The controller has stopped: observer Mine raised KeyError: 'gone' at t = 2 s" in said
     assert screen.sent == [RestartController()]
@@ -171,8 +171,9 @@ def test_a_stopped_controller_is_said_and_can_be_started(screen: Screen, monkeyp
 def test_what_goes_wrong_in_the_panel_ends_the_panel_alone(
     screen: Screen, standing: SessionState, caplog: pytest.LogCaptureFixture
 ) -> None:
-    screen.panel.on_standing(SessionState(settings={"observer.kind": "linear"}))  # incomplete
+    incomplete: Any = {"observer.kind": "linear"}
+    screen.panel.on_state(SessionState(settings=incomplete))
     screen.frame()
     assert "the panel has failed and is gone" in caplog.text
-    screen.panel.on_standing(standing)
+    screen.panel.on_state(standing)
     screen.frame()

@@ -111,7 +111,7 @@ def test_reset_to_a_keyframe_is_that_keyframe() -> None:
 def test_reload_begins_as_the_file_is_now() -> None:
     settings = ["observer.kind=linear"]
     with session() as studio:
-        studio.stepping._opened = lambda path: prepare(load_scenario("push_recovery", settings))
+        studio.stepping._load = lambda path: prepare(load_scenario("push_recovery", settings))
         studio.run(1.0)
         studio.send(ChangeSettings({NOISE: 0.0}))
         studio.stepping.rows.clear()
@@ -120,7 +120,7 @@ def test_reload_begins_as_the_file_is_now() -> None:
         same(studio.rows, of_runner("duration_s=3.0", *settings))
         settings[0] = "observer.kind=no_such"
         studio.send(messages.LoadModelEvent(path=""))
-        assert "no such observer" in studio.standing().note
+        assert "no such observer" in studio.session_state().note
         before = studio.data.time
         studio.run(0.5)
         assert studio.data.time == pytest.approx(before + 0.5)
@@ -134,7 +134,7 @@ def test_history_brings_the_controller_back(back: int) -> None:
         studio.scrub(back)
         time = studio.data.time
         assert time == pytest.approx(max(0.01, 3.0 + 0.01 * back), abs=0.011)  # one step in two is kept
-        assert len(studio.standing().ticks) == round(time / 0.005)
+        assert len(studio.session_state().ticks) == round(time / 0.005)
         studio.pause(False)
         rows = len([row for row in studio.rows if row[0] < time - 1e-9])
         del studio.stepping.rows[rows:]
@@ -174,13 +174,13 @@ def test_history_brings_back_what_was_chosen() -> None:
         studio.run(1.0, every_s=0.004)
         rows = studio.rows
         studio.scrub(-50)  # 2.5 s
-        assert studio.standing().settings[FEEDBACK] == "truth"
+        assert studio.settings()[FEEDBACK] == "truth"
         studio.scrub(-125)  # 1.75 s
         time = studio.data.time
-        settings = studio.standing().settings
+        settings = studio.settings()
         assert (settings[OBSERVER], settings[FEEDBACK]) == ("adaptive", "observer")
         studio.scrub(-50)
-        assert studio.standing().settings[FEEDBACK] == "truth"  # and forward again: nothing is forgotten by looking
+        assert studio.settings()[FEEDBACK] == "truth"  # and forward again: nothing is forgotten by looking
         studio.scrub(-125)
         del studio.stepping.rows[:]
         studio.pause(False)
@@ -199,5 +199,5 @@ def test_what_is_no_longer_remembered_starts_afresh_and_says_so(monkeypatch: pyt
         studio.scrub(-50)
         studio.pause(False)
         studio.run(1.0)
-        assert "nothing is remembered of t = 1.5" in studio.standing().note
+        assert "nothing is remembered of t = 1.5" in studio.session_state().note
         assert studio.live.stopped == ""

@@ -9,7 +9,7 @@ from mujoco.studio import messages
 from cmg_mj import load_scenario, prepare
 from cmg_mj.observers import Estimate
 from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, ShowAxis
-from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, law_of, laws_of
+from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws, current_law
 from tests.visualization.studio.session import SIGNALS, Session, as_rows, session
 from tests.visualization.studio.test_session import of_runner, same
 
@@ -50,7 +50,8 @@ def test_a_push_by_button_is_about_the_axis_that_is_shown() -> None:
     with session("push=[]", scenario="two_axes") as studio:
         studio.run(1.0)
         studio.send(ShowAxis("pitch"), PushRequest(-0.8, 0.2))
-        said = studio.standing()
+        said = studio.session_state()
+        assert said.settings is not None
         assert (said.axes, said.axis, said.settings[BIAS]) == (("roll", "pitch"), "pitch", -0.3)
         studio.run(1.0)
         rows = studio.rows
@@ -58,10 +59,10 @@ def test_a_push_by_button_is_about_the_axis_that_is_shown() -> None:
         same(rows[: len(expected)], expected)
         assert np.count_nonzero(rows[:, PUSH + PITCH]) == 40
         assert np.count_nonzero(rows[:, PUSH + ROLL]) == 0
-        ticks = studio.standing().ticks
+        ticks = studio.session_state().ticks
         np.testing.assert_array_equal(ticks[: len(rows), 2], rows[: len(ticks), RATE + PITCH])
         studio.send(ShowAxis("roll"), PushRequest(0.8, 0.2))  # what was plotted of it is there
-        np.testing.assert_array_equal(studio.standing().ticks[: len(rows), 2], rows[:, RATE + ROLL])
+        np.testing.assert_array_equal(studio.session_state().ticks[: len(rows), 2], rows[:, RATE + ROLL])
         studio.run(0.5)
         assert np.count_nonzero(studio.rows[:, PUSH + PITCH]) == 40
         assert np.count_nonzero(studio.rows[:, PUSH + ROLL]) == 40
@@ -70,13 +71,13 @@ def test_a_push_by_button_is_about_the_axis_that_is_shown() -> None:
 def test_the_axis_shown_stays_through_a_reload_as_long_as_there_is_one() -> None:
     settings: list[str] = []
     studio = Session(lambda path: prepare(load_scenario("two_axes", settings)))
-    assert studio.standing().axis == "roll"
+    assert studio.session_state().axis == "roll"
     with studio.handle:
         studio.send(ShowAxis("pitch"), messages.LoadModelEvent())
-        assert studio.standing().axis == "pitch"
+        assert studio.session_state().axis == "pitch"
         settings.append('plant.locked_axes=["pitch"]')
         studio.send(messages.LoadModelEvent())
-        assert (studio.standing().axes, studio.standing().axis) == (("roll",), "roll")
+        assert (studio.session_state().axes, studio.session_state().axis) == (("roll",), "roll")
 
 
 @pytest.mark.parametrize("back", [-1, -60, -161])
@@ -103,13 +104,13 @@ def test_what_is_chosen_is_chosen_on_all_axes_and_history_brings_it_back() -> No
         live = studio.live
         studio.run(1.0, every_s=0.004)
         rows = len(studio.rows)
-        studio.send(ChangeSettings({OBSERVER: "linear"}), ChangeSettings(laws_of(live.base)["LQR"]))
+        studio.send(ChangeSettings({OBSERVER: "linear"}), ChangeSettings(choosable_laws(live.base)["LQR"]))
         parts = live.now.parts
         assert [part.scenario.observer.kind for part in parts] == ["linear", "linear"]
         assert [part.scenario.controller.lqr is not None for part in parts] == [True, True]
         assert [part.scenario.controller.feedback for part in parts] == ["observer", "truth"]
         assert [type(part.observer).__name__ for part in live.controller.parts] == ["LinearDifferentiator"] * 2
-        assert studio.standing().law == "LQR"
+        assert studio.session_state().law == "LQR"
         studio.run(1.0, every_s=0.004)
         assert len(studio.rows) > rows
         studio.send(ChangeSettings({FEEDBACK: "fog"}), ChangeSettings({BIAS: 0.5}), ChangeSettings({NOISE: 0.0}))
@@ -135,7 +136,9 @@ def test_what_is_chosen_is_chosen_on_all_axes_and_history_brings_it_back() -> No
         again, then = studio.rows, before[(before[:, 0] > time - 1e-9) & (before[:, 0] < 2.0 - 1e-9)]
         assert len(then) > 100
         np.testing.assert_array_equal(again[: len(then)], then[: len(again)])
-        studio.send(ChangeSettings({OBSERVER: "homogeneous"}), ChangeSettings(laws_of(live.base)["the scenario's"]))
+        studio.send(
+            ChangeSettings({OBSERVER: "homogeneous"}), ChangeSettings(choosable_laws(live.base)["the scenario's"])
+        )
         assert [part.scenario.observer.parameters for part in live.now.parts] == [{"k1": 50.0}, {"k1": 40.0}]
         assert live.now.scenario.controller.gains == "scaled"
         assert live.now.scenario.axes["pitch"].plant.equilibrium_bias_deg == -0.3
@@ -145,10 +148,10 @@ def test_what_is_chosen_is_chosen_on_all_axes_and_history_brings_it_back() -> No
 def test_a_law_is_the_runners_on_both_axes_from_the_start() -> None:
     settings = ("axes.pitch.controller.lqr.state_cost=[2,1,1,1]", "axes.pitch.controller.rate_limit_rad_s=3.0")
     with session(*settings, scenario="two_axes") as studio:
-        laws = laws_of(studio.live.base)
-        assert law_of(studio.live.base, studio.live.now) == "the scenario's"
+        laws = choosable_laws(studio.live.base)
+        assert current_law(studio.live.base, studio.live.now) == "the scenario's"
         studio.send(ChangeSettings(laws["LQR"]), ChangeSettings({FEEDBACK: "truth"}))
-        assert law_of(studio.live.base, studio.live.now) == "LQR"
+        assert current_law(studio.live.base, studio.live.now) == "LQR"
         studio.run(1.0)
         base = prepare(load_scenario("two_axes", ["axes.pitch.controller.rate_limit_rad_s=3.0", "push=[]"]))
         law = {"lqr": {"state_cost": [1, 1, 1, 1]}, "feedback": "truth"}
@@ -166,7 +169,7 @@ def test_what_is_refused_changes_no_axis() -> None:
             ({"controller.rate_hz": 100.0}, "stays 200 Hz"),
         ):
             studio.send(ChangeSettings(values))
-            assert said in studio.standing().note
+            assert said in studio.session_state().note
         studio.run(0.5)
         same(studio.rows, runner("duration_s=2.0", "push=[]"))
 
@@ -178,7 +181,7 @@ def test_a_fall_about_the_second_axis_is_a_fall() -> None:
         pushed = 'push=[{start_s=0.0, duration_s=0.5, torque_n_m=30.0, axis="pitch"}]'
         outcome = prepare(load_scenario("two_axes", [pushed])).run().outcomes[0]
         assert outcome.kind == "fell"
-        assert studio.standing().stopped.startswith(f"the rig fell at t = {outcome.time_s:g} s")
+        assert studio.session_state().stopped.startswith(f"the rig fell at t = {outcome.time_s:g} s")
         for axis in studio.live.plant.axes:
             assert np.all(studio.data.ctrl[axis.servos] == 0.0)
         studio.send(messages.ResetEvent(key=-1))
@@ -209,11 +212,11 @@ def test_an_axis_whose_observer_fails_stops_all_and_history_goes_back_to_before_
     )
     with session(*fragile, scenario="two_axes") as studio:
         studio.run(0.8, every_s=0.004)
-        assert studio.standing().stopped == "observer Fragile raised KeyError: 'gone' at t = 0.505 s"
+        assert studio.session_state().stopped == "observer Fragile raised KeyError: 'gone' at t = 0.505 s"
         for axis in studio.live.plant.axes:
             assert np.all(studio.data.ctrl[axis.servos] == 0.0)
         studio.scrub(-60)  # 0.2 s
-        assert studio.standing().stopped == ""
+        assert studio.session_state().stopped == ""
         time = studio.data.time
         del studio.stepping.rows[len([row for row in studio.rows if row[0] < time - 1e-9]) :]
         studio.pause(False)
@@ -226,5 +229,5 @@ def test_an_axis_whose_observer_fails_stops_all_and_history_goes_back_to_before_
 
 def test_a_rig_of_one_axis_is_shown_without_a_choice() -> None:
     with session() as studio:
-        said = studio.standing()
+        said = studio.session_state()
         assert (said.axes, said.axis) == (("",), "")
