@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from cmg_mj.cli import boards, logs, mount, scenarios, studies, studio, sweeps
+from cmg_mj.cli import bench, boards, logs, mount, reproduce, scenarios, studio, sweeps, tune
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
 from cmg_mj.errors import InputError, RunStopped
 
@@ -73,9 +73,10 @@ for command in (
     scenarios.check,
     studio.studio,
     sweeps.sweep,
-    studies.bench,
-    studies.reproduce,
-    studies.tune,
+    bench.bench,
+    reproduce.reproduce,
+    tune.tune,
+    tune.tune_log,
     logs.replay,
     boards.export,
     mount.mount,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import refuse_given
+from cmg_mj.cli.arguments import refuse_unused
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def live_run(
         InputError: There is no viewer, or the options do not go together.
     """
     if not live and connect is None:
-        refuse_given(["pace"], "goes with --live or --connect; without a viewer a run goes as fast as it can")
+        refuse_unused(["pace"], "goes with --live or --connect; without a viewer a run goes as fast as it can")
         return None
     if live and connect is not None:
         raise InputError("--live starts a viewer, --connect takes one that runs already: give one of them")

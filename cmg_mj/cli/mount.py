@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cmg_mj.plant.mounting.held_joints import Hold
 
 
-@click.command(short_help="Mount a scissored pair on your own robot: MJCF in, plant and scenario out.")
+@click.command(short_help="Mount a scissored pair on your own robot, with a scenario.")
 @click.argument("robot", metavar="ROBOT.xml")
 @click.option("--body", required=True, metavar="NAME", help="Body that carries the pair and its sensors.")
 @click.option(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import MOST_WORLDS, RunArguments, check_observer, names_of, run_options
+from cmg_mj.cli.arguments import MOST_WORLDS, RunArguments, check_observer, names_of, run_options, with_observer
 from cmg_mj.cli.live import live_options, live_run
 from cmg_mj.cli.terminal import (
     INTERRUPTED,
@@ -34,7 +34,7 @@ LAST_WORLD = 2**63 - 1
 
 
 @click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
-@click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
+@with_observer
 @run_options
 @click.option(
     "--driver",

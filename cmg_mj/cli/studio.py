@@ -7,30 +7,24 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import RunArguments, check_observer
+from cmg_mj.cli.arguments import RunArguments, check_observer, with_observer, with_seed, with_settings
 from cmg_mj.cli.terminal import note_hints, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.simulation.experiment import Experiment
 
-GRAPHICS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_software")
+VIEWERS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_software")
 
 
 @click.command(short_help="Open a scenario in MuJoCo Studio, its controller running.")
 @click.argument("scenario")
-@click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
+@with_observer
+@with_settings
+@with_seed
 @click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="FIELD=VALUE",
-    help="Replace a field of the scenario, such as plant.initial_tilt_deg=2.0; may be given again.",
-)
-@click.option("--seed", type=click.IntRange(0, 2**128 - 1), metavar="N", help="Seed of the sensors' noise.")
-@click.option(
-    "--gfx",
-    type=click.Choice(GRAPHICS),
+    "--viewer",
+    type=click.Choice(VIEWERS),
     default="web",
     show_default=True,
     help="web: in a browser, for this machine alone. native and the others: in a window (Python 3.12 or newer).",
@@ -49,7 +43,7 @@ def studio(
     observer: str | None,
     settings: tuple[str, ...],
     seed: int | None,
-    gfx: str,
+    viewer: str,
     port: int,
     browser: bool,
 ) -> None:
@@ -77,4 +71,4 @@ def studio(
         raise InputError("this MuJoCo comes without Studio: install the wheel from PyPI, python -m pip install mujoco")
     from cmg_mj.visualization.studio.open import open_in_studio
 
-    open_in_studio(opened, first.scenario.title or scenario, gfx, port, browser)
+    open_in_studio(opened, first.scenario.title or scenario, viewer, port, browser)

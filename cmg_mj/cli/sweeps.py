@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 )
 @click.option("--sobol", type=click.IntRange(1), metavar="N", help="A design for Sobol indices, N a power of two.")
 @click.option("--order", metavar="NAMES", help="Observers, the best first: count how often that holds.")
-@click.option("--plan", is_flag=True, help="Say what it would take, and run nothing.")
+@click.option("--dry-run", is_flag=True, help="Print the number of trials, time and memory, and run nothing.")
 @click.option(
     "--cluster",
     metavar="ADDRESS",
@@ -54,7 +54,7 @@ def sweep(
     sample: int | None,
     sobol: int | None,
     order: str | None,
-    plan: bool,
+    dry_run: bool,
     cluster: str | None,
     yes: bool,
 ) -> None:
@@ -76,14 +76,14 @@ def sweep(
         local_workers(cluster)
     study = _study(arguments, varied, observers, worlds, sample, sobol, order)
     check_values(study)
-    if plan:
+    if dry_run:
         takes = estimate_cost(study)
         show(takes, _plan_text(takes), arguments.as_json)
         return
     if study.trials > MOST_TRIALS and not yes:
         raise InputError(
             f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; beyond {MOST_TRIALS} say "
-            "--yes (--plan says what it would take)"
+            "--yes (--dry-run prints the time and memory)"
         )
     place = Path("runs") / f"sweep-{Path(arguments.name).stem}" if arguments.out is None else output_path(arguments.out)
     with _runner(cluster) as run:

@@ -84,7 +84,7 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
 
 
 def bench_table(figures: dict[str, Any]) -> Table:
-    """The table that `cmg-mj bench` prints."""
+    """The table that `cmg-mj bench loop` prints."""
     load = figures["load_before"]
     busy = "" if load is None else f", {load:.1f} processes wanted one before"
     table = Table(

@@ -1,4 +1,4 @@
-"""`--plan`: what it says, and what it does without."""
+"""`--dry-run`: what it says, and what it does without."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_ctrl_c_before_the_first_tick(monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plan, "compute", interrupted)
-    said = cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--plan")
+    said = cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run")
     assert (said.status, said.out, said.err) == (130, "", "cmg-mj: interrupted\n")
 
 
@@ -33,7 +33,7 @@ def test_ctrl_c_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plan, "compute", interrupted)
-    assert cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--plan").status == 130
+    assert cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run").status == 130
 
 
 @pytest.mark.parametrize(
