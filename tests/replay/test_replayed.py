@@ -209,7 +209,7 @@ def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
     one = log(tmp_path)
     with pytest.raises(InputError, match="linear has no such parameter"):
         replay_log(one, ["linear"], parameters={"linear": {"tou": 0.1}})
-    with pytest.raises(InputError, match="nothing is left to be judged"):
+    with pytest.raises(InputError, match="nothing is left to score"):
         replay_log(one, settle_s=20.0)
     with pytest.raises(InputError, match="no observer can take part: ltv needs a model"):
         replay_log(one, ["ltv"])
