@@ -61,7 +61,7 @@ def test_help_names_every_command_in_a_whole_line() -> None:
     said = cmg_mj("--help")
     assert (said.status, said.err) == (0, "")
     listed = said.out.partition("Commands:\n")[2]
-    assert re.findall(r"^  (\w+)  +[A-Z][^\n]*[a-z]\.$", listed, re.MULTILINE) == COMMANDS
+    assert re.findall(r"^  ([\w-]+)  +[A-Z][^\n]*[a-z]\.$", listed, re.MULTILINE) == COMMANDS
     assert "..." not in said.out.replace("[ARGS]...", "")
     assert "\n    cmg-mj run push_recovery\n" in said.out  # examples keep their lines
     assert "\b" not in said.out

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cmg_mj.cli.sweeps import _plan_text
+from cmg_mj.cli.sweeps import _cost_text
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps import plan, study
 from cmg_mj.studies.sweeps.axes import parse_axis
@@ -42,7 +42,7 @@ def test_ctrl_c_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_how_long_in_words(minutes: float, words: str) -> None:
     counts = {"points": 1, "observers": 1, "worlds": 1, "trials": 1, "chunks": 1}
-    assert words in _plan_text({**counts, "minutes": minutes, "memory_mb": 230.0})
+    assert words in _cost_text({**counts, "minutes": minutes, "memory_mb": 230.0})
 
 
 @pytest.mark.parametrize(
