@@ -56,7 +56,7 @@ def export(
 
     \b
     Writes a folder:
-      NAME.h, NAME.c      init, step: the observer; update: the controller, from sensors to gimbal rate
+      NAME.h, NAME.c      init, step: the observer; update: the controller, sensors to gimbal rate
       NAME_example.c      program that compares the C code with the test vector
       NAME_test_vector.h  test vector
 
