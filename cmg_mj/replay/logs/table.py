@@ -247,7 +247,7 @@ def _numbers(
             values[i] = np.nan if cell is None or cell in MISSING else float(cell.replace(",", ".") if comma else cell)
         except ValueError:
             expected = "a number or a date" if dated is not None else "a number"
-            raise InputError(f"{path}: row {i + 1}, column {name!r}: {shown(cell)} is not {expected}") from None
+            raise InputError(f"{path}: row {i + 1}, column {name!r}: {shown(str(cell))} is not {expected}") from None
     return np.where(np.isfinite(values), values, np.nan)
 
 
