@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from cmg_mj.replay.log_replay import ReplayResult as ReplayResult
     from cmg_mj.replay.log_replay import replay_log as replay_log
     from cmg_mj.replay.logs import Log as Log
+    from cmg_mj.replay.logs import ReadOptions as ReadOptions
     from cmg_mj.replay.logs import read_log as read_log
     from cmg_mj.results.result import Outcome as Outcome
     from cmg_mj.results.result import Result as Result
@@ -62,7 +63,7 @@ NAMES_OF_MODULES = {
     "plant.mounting": ("MountedRobot", "mount"),
     "plant.plant": ("Plant", "load_plant"),
     "replay.log_replay": ("ReplayResult", "replay_log"),
-    "replay.logs": ("Log", "read_log"),
+    "replay.logs": ("Log", "ReadOptions", "read_log"),
     "results.result": ("Outcome", "Result"),
     "results.trajectory": ("Trajectory",),
     "scenario.disturbances": ("Push",),

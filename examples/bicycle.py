@@ -4,11 +4,11 @@ import tempfile
 from pathlib import Path
 
 import cmg_mj
-from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.mount_files import write_scenario
 
 ROBOT = Path(__file__).parent / "robots" / "bicycle.xml"
 
-mounted = cmg_mj.mount(ROBOT, body="frame", axis="x", at=(0.0, 0.0, 0.3))
+mounted = cmg_mj.mount(ROBOT, body="frame", axis="x", position=(0.0, 0.0, 0.3))
 with tempfile.TemporaryDirectory() as folder:
     model = mounted.save(Path(folder) / "balanced.xml")
     standing = write_scenario(model, ROBOT, "gyro_free").with_settings({"push": [], "duration_s": 10.0})

@@ -9,17 +9,17 @@ from pathlib import Path
 import gymnasium
 
 import cmg_mj
-from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.push_limits.prospects import prospects
 
 ROBOT = Path(gymnasium.__path__[0]) / "envs" / "mujoco" / "assets" / "inverted_pendulum.xml"
 
-mounted = cmg_mj.mount(ROBOT, body="pole", axis="hinge", free=["slider"])
+mounted = cmg_mj.mount(ROBOT, body="pole", axis="hinge", release=["slider"])
 with tempfile.TemporaryDirectory() as folder:
     model = mounted.save(Path(folder) / "balanced.xml")
     can = prospects(write_scenario(model, ROBOT, "homogeneous"))
     experiment = write_scenario(model, ROBOT, "homogeneous", can)
-print(f"falls with {can.ceiling.pole:.2f} 1/s; any controller recovers at most {can.ceiling.tilt:.3f} rad")
+print(f"falls with {can.limit.pole:.2f} 1/s; any controller recovers at most {can.limit.tilt:.3f} rad")
 for share in (0.6, 1.8):
     push = {"push.0.torque_n_m": share * can.push_margin.median_impulse / 0.1}
     stood = experiment.with_settings(push).run_many(5, keep_trajectory=False).stood.sum()

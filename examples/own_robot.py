@@ -9,7 +9,7 @@ from pathlib import Path
 import mujoco
 
 import cmg_mj
-from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.push_limits.prospects import prospects
 
 LEG = """

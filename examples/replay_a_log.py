@@ -8,7 +8,7 @@ import cmg_mj
 
 csv = Path(__file__).parent / "data" / "stepper_encoder_gyro.csv"
 columns = {"time": "time_s", "tilt": "encoder_rad", "rate": "gyr_y_rad_s"}
-log = cmg_mj.read_log(csv, columns, delay_s=0.012)  # the gyro comes that much late
+log = cmg_mj.read_log(csv, cmg_mj.ReadOptions(columns, delay_s=0.012))  # the gyro comes that much late
 replayed = cmg_mj.replay_log(log, ["linear", "super_twisting", "homogeneous"])
 
 for name, figures in replayed.summaries.items():

@@ -1,4 +1,4 @@
-"""The commands. What they need is imported when they run, so that --help is quick and Ctrl-C is heard at once."""
+"""The commands. Each imports its modules when it runs, so that --help is quick and Ctrl-C works at once."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from typing import Any
 
 import click
 
-from cmg_mj.cli import boards, logs, mount, scenarios, studies, studio, sweeps
+from cmg_mj.cli import bench, boards, logs, mount, reproduce, scenarios, studio, sweeps, tune
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
 from cmg_mj.errors import InputError, RunStopped
 
-HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, real sensors, velocity observers.
+ExitStatus = str | int | None
+"""As `sys.exit` takes it."""
+HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, realistic sensors, velocity observers.
 
-A scenario is named by a bundled one's name (cmg-mj list scenarios) or by the path of a TOML file.
+A scenario is a bundled one's name (cmg-mj list scenarios) or the path of a TOML file.
 
 \b
   cmg-mj run push_recovery
@@ -25,25 +27,27 @@ A scenario is named by a bundled one's name (cmg-mj list scenarios) or by the pa
   cmg-mj compare push_recovery --observers all
   rerun runs/push_recovery-homogeneous-0/recording.rrd
 
-Ctrl-C ends a run early and keeps what was recorded; a second one ends it at once.
+Ctrl-C ends a run early and keeps its results; a second one ends it at once.
 
-Exit status: 0 done (a fall is a result), 2 the input is wrong or a run could not go on, 130 interrupted.
+Exit status: 0 done (also if the plant fell), 2 wrong input or a run that could not continue, 130 interrupted.
 """
 
 
 class Commands(click.Group):
-    """Commands that Ctrl-C ends with one line and exit status 130, and whose output nobody has to read."""
+    """Commands that end with one line and exit status 130 on Ctrl-C, and that tolerate a closed output."""
 
-    def make_context(self, *arguments: Any, **others: Any) -> click.Context:
-        """Read the arguments, which prints what --help asks for."""
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        """Parse the arguments; --help prints here."""
         with _ignore_broken_pipe():
-            return super().make_context(*arguments, **others)
+            return super().make_context(info_name, args, parent, **extra)
 
-    def invoke(self, ctx: click.Context) -> Any:
+    def invoke(self, ctx: click.Context) -> None:
         """Run the command."""
         try:
             with _ignore_broken_pipe():
-                return super().invoke(ctx)
+                super().invoke(ctx)
         except KeyboardInterrupt:
             note("interrupted")
             sys.exit(INTERRUPTED)
@@ -51,7 +55,7 @@ class Commands(click.Group):
 
 @contextmanager
 def _ignore_broken_pipe() -> Iterator[None]:
-    """A reader, such as head, who has had enough is no failure; to click it is one."""
+    """End quietly when a reader such as head closes the pipe; click takes that for a failure."""
     try:
         yield
     except BrokenPipeError as error:
@@ -73,9 +77,10 @@ for command in (
     scenarios.check,
     studio.studio,
     sweeps.sweep,
-    studies.bench,
-    studies.reproduce,
-    studies.tune,
+    bench.bench,
+    reproduce.reproduce,
+    tune.tune,
+    tune.tune_log,
     logs.replay,
     boards.export,
     mount.mount,
@@ -84,14 +89,14 @@ for command in (
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point of `cmg-mj`: wrong input ends in one line on standard error and exit status 2."""
+    """Run `cmg-mj`; wrong input ends in one line on standard error and exit status 2."""
     _open_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a title's letters where the terminal has only ASCII
     if "" not in sys.path:
         sys.path.append("")  # a user's own observer in the current folder; last, so that it can hide nothing
-    status: Any = DONE
+    status: ExitStatus = DONE
     try:
         status = _status(sys.argv[1:] if arguments is None else arguments)
         for stream in (sys.stdout, sys.stderr):
@@ -104,8 +109,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(status)
 
 
-def _status(arguments: Sequence[str]) -> Any:
-    """Run a command: its exit status. What is wrong is said."""
+def _status(arguments: Sequence[str]) -> ExitStatus:
+    """Run a command, print its error if there is one, and return its exit status."""
     if not arguments:
         click.echo(cli.make_context("cmg-mj", [], resilient_parsing=True).get_help(), err=True)
         return WRONG_INPUT
@@ -125,21 +130,21 @@ def _status(arguments: Sequence[str]) -> Any:
 
 
 def _open_streams() -> None:
-    """What a shell has closed (`>&-`) takes all and shows nothing; else the next file written would get its number."""
+    """Open null devices for streams that the shell closed (`>&-`); else the next file would get their number."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
 
 
-def _fail_with(complaint: str, status: int) -> int:
-    """The status, whether anyone has read the complaint or not."""
+def _fail_with(message: str, status: int) -> int:
+    """Print a message, if it is read, and return the status."""
     with suppress(BrokenPipeError):
-        note(complaint)
+        note(message)
     return status
 
 
 def _detach_streams(error: OSError) -> None:
-    """Nothing more is written to a stream that takes nothing, by Python at its end either; say why if that can be."""
+    """Redirect streams that cannot be written to the null device, and print why if possible."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -147,5 +152,5 @@ def _detach_streams(error: OSError) -> None:
             with suppress(OSError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     if not isinstance(error, BrokenPipeError):
-        nameless = "the current folder" if isinstance(error, FileNotFoundError) else "standard output"
-        note(f"{error.filename or nameless}: {error.strerror}")
+        default = "the current folder" if isinstance(error, FileNotFoundError) else "standard output"
+        note(f"{error.filename or default}: {error.strerror}")

@@ -1,4 +1,4 @@
-"""The commands that leave the bench: an observer as C for a board."""
+"""The command that exports an observer as C for a board."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
 
 @click.command(short_help="Write an observer and the control law around it as C code.")
 @click.argument("observer")
-@click.option("--out", metavar="FOLDER", help="Folder to write to; by default one in runs/.")
+@click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: one in runs/]")
 @click.option(
     "--precision",
     type=click.Choice(["double", "single"]),
     default="double",
     show_default=True,
-    help="Of every number in the C.",
+    help="Precision of all numbers in the C code.",
 )
 @click.option(
     "--name",
     "asked",
     metavar="NAME",
-    help="What files, types and functions begin with; by default OBSERVER's own name.",
+    help="Prefix of files, types and functions.  [default: OBSERVER's name]",
 )
 @click.option(
     "--scenario",
     default="push_recovery",
     show_default=True,
     metavar="NAME",
-    help="Where the rig, the gains and the rates come from.",
+    help="Scenario that gives the plant, the gains and the rates.",
 )
 @click.option(
     "--set",
     "settings",
     multiple=True,
     metavar="FIELD=VALUE",
-    help="Replace a field of the scenario, such as observer.k1=25 or controller.rate_hz=400; may be given again.",
+    help="Set a field of the scenario, such as observer.k1=25 or controller.rate_hz=400. May be given again.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the figures alone, as JSON, on standard output.")
+@click.option("--json", "as_json", is_flag=True, help="Print only the figures, as JSON, on standard output.")
 @users_code()
 def export(
     observer: str,
@@ -52,12 +52,16 @@ def export(
     settings: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Write OBSERVER, a name or your own as package.module:Class, and the control law around it as C.
+    """Write OBSERVER, a name or your own as package.module:Class, and the control law as C without malloc.
 
-    Files without malloc, NAME.h and NAME.c: init and step are the observer, update is the whole controller, from raw
-    accelerations and encoders to the gimbal rate. NAME_example.c compiles, runs, and compares the C with the
-    test vector in NAME_test_vector.h. What is written has been compared with Python on random signals.
-    """
+    \b
+    Writes a folder:
+      NAME.h, NAME.c      init, step: the observer; update: the controller, sensors to gimbal rate
+      NAME_example.c      program that compares the C code with the test vector
+      NAME_test_vector.h  test vector
+
+    The C code is compared with Python on random signals before it is written.
+    """  # noqa: D301  (click wants the character itself)
     from cmg_mj.codegen.export import check_installed, generate_code, write_code
     from cmg_mj.codegen.export.names import export_files, name_of
     from cmg_mj.codegen.export.pipeline import export_table

@@ -1,4 +1,4 @@
-"""The options with which a run is shown while it goes on, and what is said of it."""
+"""The options that show a run in a viewer while it goes on."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import refuse_given
+from cmg_mj.cli.arguments import refuse_unused
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from cmg_mj.simulation.experiment import Experiment
     from cmg_mj.studies.live_run import LiveRun
 
-HERE = "127.0.0.1:9876"
-"""Where rerun listens if it is not told otherwise."""
+DEFAULT_ADDRESS = "127.0.0.1:9876"
+"""Rerun's default address."""
 
 
 def live_options(command: Callable) -> Callable:
-    """Options of a command whose run can be looked at while it goes on: `live`, `connect`, `pace`."""
+    """Add the options `live`, `connect` and `pace` of a run that a viewer can show."""
     for decorate in reversed(
         (
             click.option("--live", is_flag=True, help="Show the run in a rerun viewer while it goes on."),
@@ -30,15 +30,15 @@ def live_options(command: Callable) -> Callable:
                 "--connect",
                 metavar="[ADDRESS]",
                 is_flag=False,
-                flag_value=HERE,
-                help=f"The same in a viewer that runs already: PORT or HOST:PORT.  [default: {HERE}]",
+                flag_value=DEFAULT_ADDRESS,
+                help=f"Show the run in a viewer that runs already, at PORT or HOST:PORT.  [default: {DEFAULT_ADDRESS}]",
             ),
             click.option(
                 "--pace",
                 metavar="FACTOR",
                 default="1",
                 show_default=True,
-                help="With --live or --connect: times real time; max for as fast as it goes.",
+                help="Speed with --live or --connect, in multiples of real time; max for no limit.",
             ),
         )
     ):
@@ -47,7 +47,7 @@ def live_options(command: Callable) -> Callable:
 
 
 def factor_of(pace: str) -> float:
-    """Simulated seconds a second; inf for as fast as it goes."""
+    """Parse `--pace` into simulated seconds per second; inf for no limit."""
     if pace == "max":
         return math.inf
     try:
@@ -55,25 +55,25 @@ def factor_of(pace: str) -> float:
     except ValueError:
         factor = math.nan
     if not 0.0 <= factor < math.inf:
-        raise InputError(f"--pace {pace!r}: must be a number such as 0.5 or 4, or max for as fast as it goes")
+        raise InputError(f"--pace {pace!r}: must be a number such as 0.5 or 4, or max for no limit")
     return factor or math.inf
 
 
 def live_run(
     experiment: Experiment, live: bool, connect: str | None, pace: str, driver: Driver, world: int
 ) -> LiveRun | None:
-    """The run as it is to be shown; None if it is not.
+    """Set up the view of a run; None without one.
 
     Raises:
-        InputError: There is no viewer, or the options do not go together.
+        InputError: There is no viewer, or the options exclude each other.
     """
     if not live and connect is None:
-        refuse_given(["pace"], "goes with --live or --connect; without a viewer a run goes as fast as it can")
+        refuse_unused(["pace"], "goes with --live or --connect; without a viewer a run goes as fast as it can")
         return None
     if live and connect is not None:
         raise InputError("--live starts a viewer, --connect takes one that runs already: give one of them")
     factor = factor_of(pace)
-    # Rerun reads it when it is imported. What it would say of a viewer that has gone, the command says at the end.
+    # Rerun reads it when it is imported. The command itself reports a lost viewer at the end.
     os.environ.setdefault("RUST_LOG", "off")
     from cmg_mj.studies.live_run import LiveRun, RealTimeClock
     from cmg_mj.visualization.recording.viewer import require_listening, start_viewer, url_of

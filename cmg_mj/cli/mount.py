@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -14,138 +12,117 @@ from cmg_mj.cli.terminal import note, note_hints, own_stdout, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.plant.mounting import MountedRobot
+    from cmg_mj.plant.mounting.axes import AxisLike
+    from cmg_mj.plant.mounting.held_joints import Hold
 
 
-@click.command(short_help="Mount a pair on a robot of your own: any MJCF in, a rig out.")
+@click.command(short_help="Mount a scissored pair on your own robot, with a scenario.")
 @click.argument("robot", metavar="ROBOT.xml")
-@click.option("--body", required=True, metavar="NAME", help="The body that carries the pair and its sensors.")
+@click.option("--body", required=True, metavar="NAME", help="Body that carries the pair and its sensors.")
 @click.option(
     "--axis",
     default="y",
     show_default=True,
-    help="About what it tilts: a hinge's name, or a direction in the body's frame, x, y or '0.1 1 0'. Of a body that "
-    "hangs on a hinge along it, that hinge; of a free one, the line that it stands on.",
+    metavar="HINGE|DIRECTION",
+    help="Tilt axis: a hinge name, or a direction in the body frame (x, y, or '0.1 1 0'). A direction selects the "
+    "hinge parallel to it, or, for a free body, the contact line.",
 )
-@click.option("-o", "--out", metavar="FILE", default="balanced.xml", show_default=True, help="What to write.")
-@click.option("--at", metavar="'X Y Z'", help="The pair's middle in the body's frame [m].  [default: its mass's]")
-@click.option("--cubes", default=2, show_default=True, metavar="N", help="How many modules.")
-@click.option("--scale", default=1.0, show_default=True, metavar="S", help="Of the modules' lengths.")
-@click.option("--name", default="", help="Of the axis; a second one on the same robot needs one.")
-@click.option("--keyframe", metavar="NAME", help="In which the robot stands.  [default: its reference pose]")
+@click.option(
+    "-o",
+    "--out",
+    metavar="FILE",
+    default="balanced.xml",
+    show_default=True,
+    help="Model file to write; the scenario gets the same name with .toml.",
+)
+@click.option(
+    "--position",
+    metavar="'X Y Z'",
+    help="Middle of the row of modules in the body frame [m].  [default: the body's centre of mass]",
+)
+@click.option("--modules", default=2, show_default=True, metavar="N", help="Number of modules.")
+@click.option("--scale", default=1.0, show_default=True, metavar="S", help="Scale of the modules' lengths.")
+@click.option("--name", default="", metavar="WORD", help="Name of the axis; a second axis on a robot needs one.")
+@click.option("--keyframe", metavar="NAME", help="Keyframe in which the robot stands.  [default: its reference pose]")
 @click.option(
     "--hold",
     type=click.Choice(["constraints", "servos"]),
     default="constraints",
     show_default=True,
-    help="What holds the robot's other joints: constraints all of them, or its own servos those that have one.",
+    help="Hold the other joints by constraints, or by the robot's own servos where a joint has one.",
 )
-@click.option("--free", multiple=True, metavar="JOINT", help="A joint that nothing holds. May be given again.")
-@click.option("--free-base", is_flag=True, help="Let it stand on the floor: its root's joints make way for a free one.")
-@click.option("--observer", default="homogeneous", show_default=True, metavar="NAME", help="With which it is to stand.")
-@click.option("--json", "as_json", is_flag=True, help="Print what the pair can do as JSON, and nothing else.")
-@click.option("--overwrite", is_flag=True, help="Write over what an earlier mount has written.")
+@click.option("--release", multiple=True, metavar="JOINT", help="Joint that nothing holds. May be given again.")
+@click.option("--free-base", is_flag=True, help="Replace the joints of the robot's root by a free joint.")
+@click.option("--observer", default="homogeneous", show_default=True, metavar="NAME", help="Observer in the loop.")
+@click.option("--json", "as_json", is_flag=True, help="Print the limits as JSON, and nothing else.")
+@click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()
 def mount(
     robot: str,
     body: str,
     axis: str,
     out: str,
-    at: str | None,
-    cubes: int,
+    position: str | None,
+    modules: int,
     scale: float,
     name: str,
     keyframe: str | None,
-    hold: str,
-    free: tuple[str, ...],
+    hold: Hold,
+    release: tuple[str, ...],
     free_base: bool,
     observer: str,
     as_json: bool,
     overwrite: bool,
 ) -> None:
-    """Mount control moment gyroscopes on a robot, and say what they can do there.
+    """Mount control moment gyroscopes on a robot, and print the largest pushes it recovers from.
 
-    Writes the robot with the pair on it, which plain MuJoCo loads too, and beside it a scenario to run: its gains are
-    Table 2's, carried over by the robot's time scale and the pair's authority, and it is pushed with 0.6 of what it
-    bears.
+    Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario scales
+    the gains of the papers' Table 2 to the robot. It pushes with 0.6 of the largest push that its controller recovers
+    from.
     """
-    import mujoco
+    from cmg_mj.plant.mounting.request import MountRequest
+    from cmg_mj.studies.push_limits.mount_files import mount_and_write
+    from cmg_mj.studies.push_limits.mount_report import mount_report_lines
 
-    from cmg_mj.observers.registry import observer_class
-    from cmg_mj.plant.mounting import mount as mounted_on
-    from cmg_mj.plant.mounting.mounted import check_target, with_scenario
-    from cmg_mj.plant.plant import load_plant
-    from cmg_mj.studies.push_limits.mount_report import mount_report_lines, scenario_text, write_scenario
-    from cmg_mj.studies.push_limits.prospects import LOW_CEILING_DEG, prospects, smallest_sufficient_scale
-    from cmg_mj.studies.push_limits.recoverable_states import ceiling
-
-    along = axis.split() if len(axis.split()) == 3 else axis
-
-    def mounted_at(size: float) -> MountedRobot:
-        try:
-            return mounted_on(
-                Path(robot),
-                body,
-                axis=along,  # type: ignore[arg-type]
-                at=_point(at),
-                cubes=cubes,
-                scale=size,
-                name=name,
-                keyframe=keyframe,
-                hold=hold,  # type: ignore[arg-type]
-                free=free,
-                base="free" if free_base else "as_is",
-            )
-        except InputError:
-            raise
-        except (ValueError, KeyError, mujoco.FatalError) as error:  # of MuJoCo's editing: what nobody has foreseen
-            said = " ".join(str(error.args[0] if error.args else error).split()).removeprefix("Error: ")
-            raise InputError(f"{robot}: MuJoCo cannot put a pair on it: {said}") from error
-
-    target = Path(out).expanduser()
+    request = MountRequest(
+        body,
+        _hinge_or_direction(axis),
+        _point(position),
+        modules,
+        scale,
+        name,
+        keyframe,
+        hold,
+        release,
+        "free" if free_base else "as_is",
+    )
     check_observer("--observer", observer)
-    observer_class(observer)
-    check_target(target, Path(robot).expanduser())
-    for path in (target, target.with_suffix(".toml")):
-        if path.exists() and not overwrite:
-            raise InputError(f"-o {out}: {path} exists; give another name, or --overwrite")
-    found = mounted_at(scale)
-    with with_scenario(target) as model:
-        found.save(model)
-        can = prospects(write_scenario(model, found.path, observer, axis=name), name)
-        experiment = write_scenario(model, found.path, observer, can, name)
-        plant = experiment.plant.single_axis(name)
-        enough = None
-        if math.degrees(can.ceiling.tilt) < LOW_CEILING_DEG:
-
-            def ceiling_at(size: float) -> float:
-                trial = mounted_at(size).save(model.with_name(f".{target.stem}.trial.xml"))
-                try:
-                    return ceiling(
-                        load_plant(model=str(trial)).single_axis(name).reduced, experiment.law.rate_limit
-                    ).tilt
-                finally:
-                    trial.unlink()
-
-            enough = smallest_sufficient_scale(ceiling_at, scale)
-        scenario = scenario_text(target.name, found.path, observer, can, name)
-        model.with_suffix(".toml").write_text(scenario, encoding="utf-8")
+    result = mount_and_write(robot, request, out, observer, overwrite=overwrite)
     if as_json:
-        figures = can.figures() | {"model": str(target), "held": list(found.held), "scale_that_suffices": enough}
-        click.echo(json.dumps(figures, indent=2), file=own_stdout())
+        click.echo(json.dumps(result.figures(), indent=2), file=own_stdout())
         return
-    click.echo("\n".join(mount_report_lines(found, plant, can, enough)), file=own_stdout())
-    note_hints(can.hints)
-    note(f"wrote {target} and {target.with_suffix('.toml')}; try: cmg-mj run {target.with_suffix('.toml')}")
+    click.echo("\n".join(mount_report_lines(result)), file=own_stdout())
+    note_hints(result.prospects.hints)
+    note(f"wrote {result.path} and {result.scenario_path}; try: cmg-mj run {result.scenario_path}")
 
 
-def _point(at: str | None) -> list[float] | None:
-    if at is None:
+def _hinge_or_direction(axis: str) -> AxisLike:
+    parts = axis.split()
+    if len(parts) != 3:
+        return axis
+    try:
+        return [float(part) for part in parts]
+    except ValueError:
+        return axis
+
+
+def _point(position: str | None) -> list[float] | None:
+    if position is None:
         return None
     try:
-        point = [float(part) for part in at.replace(",", " ").split()]
+        point = [float(part) for part in position.replace(",", " ").split()]
     except ValueError:
         point = []
     if len(point) != 3:
-        raise InputError(f"--at {at}: must be three numbers, such as '0 0 0.1' [m]")
+        raise InputError(f"--position {position}: must be three numbers, such as '0 0 0.1' [m]")
     return point

@@ -1,4 +1,4 @@
-"""How fast something goes, and how long it still takes, in words."""
+"""Rate and remaining time of a progress, in words."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import time
 from collections.abc import Callable
 
 LINE_S = 60.0
-"""Between two lines, where there is no terminal."""
+"""Time between two lines, where there is no terminal [s]."""
 SOON_S = 1.0
-"""Before so much has passed nobody can tell."""
+"""Time before a rate is known [s]."""
 
 
 class ProgressRate:
-    """The pace of what is counted, by all that was done since the beginning.
+    """The mean rate of a progress since its beginning.
 
     Args:
         unit: What is counted, such as `trials`.
-        total: How many there are.
-        before: How many were done before the beginning.
-        clock: Says how late it is [s].
+        total: The total count.
+        before: The count at the beginning.
+        clock: Returns the time [s].
     """
 
     def __init__(
@@ -28,27 +28,27 @@ class ProgressRate:
         self._clock = clock
         self._start = self._line = clock()
 
-    def said(self, done: float) -> str:
-        """Such as `310 trials a second, 4 min left`; nothing as long as nobody can tell."""
+    def text(self, done: float) -> str:
+        """Return text such as `310 trials a second, 4 min left`; empty while the rate is unknown."""
         passed, new = self._clock() - self._start, done - self.before
         if passed < SOON_S or new <= 0.0:
             return ""
         rate = new / passed
         speed = f"{rate:.0f}" if rate >= 10.0 else f"{rate:.2g}"
-        return f"{speed} {self.unit} a second, {in_time((self.total - done) / rate)} left"
+        return f"{speed} {self.unit} a second, {duration_text((self.total - done) / rate)} left"
 
     def line(self, done: float) -> str | None:
-        """A line of its own, if one is due: one a minute."""
+        """Return a line of its own, if one is due: one a minute."""
         now = self._clock()
         if now - self._line < LINE_S:
             return None
         self._line = now
-        said = self.said(done)
-        return f"{int(done)} of {int(self.total)} {self.unit}" + (f", {said}" if said else "")
+        rate = self.text(done)
+        return f"{int(done)} of {int(self.total)} {self.unit}" + (f", {rate}" if rate else "")
 
 
-def in_time(left: float) -> str:
-    """So many seconds in words: seconds, minutes or hours."""
+def duration_text(left: float) -> str:
+    """Write seconds as seconds, minutes or hours."""
     if left < 99.5:
         return f"{left:.0f} s"
     return f"{left / 60.0:.0f} min" if left < 99.5 * 60.0 else f"{left / 3600.0:.1f} h"

@@ -1,4 +1,4 @@
-"""The commands that run scenarios, and those that say what there is."""
+"""The commands that run, compare, list and check scenarios."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import MOST_WORLDS, RunArguments, check_observer, names_of, run_options
+from cmg_mj.cli.arguments import MOST_WORLDS, RunArguments, check_observer, names_of, run_options, with_observer
 from cmg_mj.cli.live import live_options, live_run
 from cmg_mj.cli.terminal import (
     INTERRUPTED,
@@ -30,28 +30,28 @@ if TYPE_CHECKING:
     from cmg_mj.results.result import Driver
 
 LAST_WORLD = 2**63 - 1
-"""Tables hold its number in 64 bits."""
+"""Largest number of a world; tables hold it in 64 bits."""
 
 
 @click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
-@click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
+@with_observer
 @run_options
 @click.option(
     "--driver",
     type=click.Choice(["native", "callback", "board"]),
     default="native",
     show_default=True,
-    help="Who calls the controller: the runner, or MuJoCo through its control callback; or board: it runs as C on an "
-    "emulated Cortex-M7 (docs/board.md).",
+    help="Caller of the controller: the runner (native) or MuJoCo's control callback; with board the controller runs "
+    "as C on an emulated Cortex-M7 (docs/board.md).",
 )
 @click.option(
     "--world",
     type=click.IntRange(0, LAST_WORLD),
     default=0,
     metavar="N",
-    help="Which world of the seed: N has the noise of world N of a comparison or a sweep.  [default: 0]",
+    help="World of the seed; world N has the noise of world N in a comparison or a sweep.  [default: 0]",
 )
-@click.option("--plot", is_flag=True, help="Write plot.png as well.")
+@click.option("--plot", is_flag=True, help="Also write plot.png.")
 @live_options
 @users_code()
 def run(
@@ -64,12 +64,16 @@ def run(
     connect: str | None,
     pace: str,
 ) -> None:
-    """Run a scenario and write a folder.
+    """Run a scenario and write its results to a folder.
 
-    Its files: summary.json, trajectory.parquet, recording.rrd (a rerun recording), and scenario.toml, which has every
-    default written out and reruns to the same numbers (of a run on the board, with --driver board again; of another
-    world than 0, with --world again).
-    """
+    \b
+      summary.json        figures of the run
+      trajectory.parquet  all signals, a row for each control tick
+      recording.rrd       rerun recording
+      scenario.toml       scenario with all defaults, which reruns to the same numbers
+
+    A rerun needs the same --driver board and --world, if they were given.
+    """  # noqa: D301  (click wants the character itself)
     from cmg_mj.results import terminal_tables as report
     from cmg_mj.simulation.experiment import prepare
     from cmg_mj.simulation.simulate import SimulationOptions
@@ -82,22 +86,24 @@ def run(
     note_hints(experiment.hints)
     if scenario.compare:
         note("[compare] is for cmg-mj compare; this is one run")
-    what = runs.file_name(scenario.observer.kind)
-    folder = arguments.folder(what, runs.files_of_run(experiment, plot=plot), experiment, driver, world)
-    shown = live_run(experiment, live, connect, pace, driver, world)
-    with CtrlC() as ctrl_c, shown or nullcontext():
+    label = runs.file_name(scenario.observer.kind)
+    folder = arguments.folder(label, runs.files_of_run(experiment, plot=plot), experiment, driver, world)
+    live_view = live_run(experiment, live, connect, pace, driver, world)
+    with CtrlC() as ctrl_c, live_view or nullcontext():
         with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
-            options: SimulationOptions = {"on_progress": on_progress} if shown is None else shown.options(on_progress)
+            options: SimulationOptions = (
+                {"on_progress": on_progress} if live_view is None else live_view.options(on_progress)
+            )
             result = experiment.run(driver=driver, world=world, **options)
-        if shown is not None:
-            shown.ended(result)
+        if live_view is not None:
+            live_view.ended(result)
         summary = runs.summary_of(experiment, result)
         try:
             place = runs.save_run(folder, experiment, result, plot=plot)
         finally:
             show(summary, report.summary_table(summary), arguments.as_json)
-    if shown is not None and shown.lost:
-        note(f"the viewer did not get all of it: {shown.lost}; the run and its files are whole")
+    if live_view is not None and live_view.lost:
+        note(f"the viewer missed a part: {live_view.lost}; the run and its files are complete")
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", arguments.as_json)
     outcome = result.outcomes[0]
     if outcome.kind == "stopped":
@@ -106,7 +112,7 @@ def run(
         note(f"interrupted at {outcome.time_s:g} s; what was recorded until then is in {final_path(folder, place)}")
         sys.exit(INTERRUPTED)
     if ctrl_c.noted:
-        note(f"interrupted when all was done; it is in {final_path(folder, place)}")
+        note(f"interrupted at the end; the complete run is in {final_path(folder, place)}")
         sys.exit(INTERRUPTED)
 
 
@@ -114,7 +120,7 @@ def run(
 @click.option(
     "--observers",
     metavar="NAMES",
-    help="Names with commas between, or all; your own as package.module:Class.  "
+    help="Observers separated by commas, or all; your own as package.module:Class.  "
     "[default: the scenario's [compare], or all]",
 )
 @run_options
@@ -122,19 +128,24 @@ def run(
     "--worlds",
     type=click.IntRange(1, MOST_WORLDS),
     metavar="N",
-    help="Runs an observer, each with noise of its own; all observers get the same.  "
+    help="Worlds of each observer, each with its own noise, which is the same for all observers.  "
     "[default: the scenario's [compare], or 20]",
 )
 @click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
-@click.option("--plot", is_flag=True, help="Write plot.png as well: every figure over the worlds.")
+@click.option("--plot", is_flag=True, help="Also write plot.png with the figures of all worlds.")
 @users_code()
 def compare(arguments: RunArguments, observers: str | None, worlds: int | None, markdown: bool, plot: bool) -> None:
-    """Run several observers on the same plant, pushes and noise: one table, one recording.
+    """Run several observers on the same plant, pushes and noise.
 
-    The table has the means over the worlds that stood to the end, with 95 % intervals, and the differences to the best,
-    world by world. worlds.parquet has a row per observer and world; the recording has world 0 of every observer, and
-    scenario.toml runs to the same comparison: cmg-mj compare FOLDER/scenario.toml.
-    """
+    Prints a table: means over the worlds that stood to the end, with 95 % intervals, and the paired differences to the
+    best observer.
+
+    \b
+    Writes a folder:
+      worlds.parquet  a row for each observer and world
+      recording.rrd   rerun recording of every observer's world 0
+      scenario.toml   reruns the comparison: cmg-mj compare FOLDER/scenario.toml
+    """  # noqa: D301  (click wants the character itself)
     from cmg_mj.controllers.laws.protocol import needs
     from cmg_mj.results import terminal_tables as report
     from cmg_mj.scenario.differences import describe_differences
@@ -145,8 +156,8 @@ def compare(arguments: RunArguments, observers: str | None, worlds: int | None, 
 
     names = None if observers is None else names_of(observers)
     scenario = arguments.scenario()
-    asked = scenario.compare or CompareSettings()
-    names, worlds = names or asked.names(), worlds or asked.worlds
+    settings = scenario.compare or CompareSettings()
+    names, worlds = names or settings.names(), worlds or settings.worlds
     for name in names:
         check_observer("compare.observers:", name)
     for setting in arguments.settings:
@@ -156,12 +167,12 @@ def compare(arguments: RunArguments, observers: str | None, worlds: int | None, 
                 f"--observers {','.join(names)}; the others are compared with their default parameters"
             )
     experiments = comparison.prepare_comparison(scenario, names)
-    own = comparison.rerunnable(scenario, experiments, worlds)
-    note_hints(own.hints)
-    if not needs(own.law):
+    rerun = comparison.rerunnable(scenario, experiments, worlds)
+    note_hints(rerun.hints)
+    if not needs(rerun.law):
         note(f"{scenario.controller.kind} takes nothing of the observer: every loop is the same, the estimates differ")
     files = runs.files_of_comparison(names, plot=plot)
-    folder = arguments.folder("compare", files, own)
+    folder = arguments.folder("compare", files, rerun)
     with CtrlC() as ctrl_c:
         with progress(f"{scenario.title or arguments.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
             compared = comparison.compare(experiments, worlds, on_progress)
@@ -170,9 +181,9 @@ def compare(arguments: RunArguments, observers: str | None, worlds: int | None, 
             sys.exit(INTERRUPTED)
         summaries = standings(compared)
         try:
-            place = runs.save_comparison(folder, own, compared, plot=plot, complete=len(compared) == len(names))
+            place = runs.save_comparison(folder, rerun, compared, plot=plot, complete=len(compared) == len(names))
         finally:
-            differs = describe_differences(own.differences)
+            differs = describe_differences(rerun.differences)
             title = f"{scenario.title or arguments.name}: {worlds} worlds an observer, seed {scenario.seed}{differs}"
             table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
             show(summaries, table, arguments.as_json)
@@ -212,7 +223,7 @@ def list_names(what: str | None) -> None:
 @click.argument("file")
 @users_code()
 def check(file: str) -> None:
-    """Check a scenario file, or a model file (.xml), without running it, and say what it amounts to."""
+    """Check a scenario file, or a model file (.xml), without running it, and print its main parameters."""
     from cmg_mj.scenario.description import description, rig_description
     from cmg_mj.scenario.loading import load_scenario, parse_scenario
     from cmg_mj.simulation.experiment import prepare
@@ -221,5 +232,5 @@ def check(file: str) -> None:
     scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file)
     describe = rig_description if is_model else description
     parts = prepare(scenario).parts
-    words = [describe(file, part.scenario, part.design, part.plant.parameters, part.plant.axis.name) for part in parts]
-    click.echo("\n".join(words), file=own_stdout())
+    texts = [describe(file, part.scenario, part.design, part.plant.parameters, part.plant.axis.name) for part in parts]
+    click.echo("\n".join(texts), file=own_stdout())

@@ -7,33 +7,27 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import RunArguments, check_observer
+from cmg_mj.cli.arguments import RunArguments, check_observer, with_observer, with_seed, with_settings
 from cmg_mj.cli.terminal import note_hints, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.simulation.experiment import Experiment
 
-GRAPHICS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_software")
+VIEWERS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_software")
 
 
 @click.command(short_help="Open a scenario in MuJoCo Studio, its controller running.")
 @click.argument("scenario")
-@click.option("--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class.")
+@with_observer
+@with_settings
+@with_seed
 @click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="FIELD=VALUE",
-    help="Replace a field of the scenario, such as plant.initial_tilt_deg=2.0; may be given again.",
-)
-@click.option("--seed", type=click.IntRange(0, 2**128 - 1), metavar="N", help="Seed of the sensors' noise.")
-@click.option(
-    "--gfx",
-    type=click.Choice(GRAPHICS),
+    "--viewer",
+    type=click.Choice(VIEWERS),
     default="web",
     show_default=True,
-    help="web: in a browser, for this machine alone. native and the others: in a window (Python 3.12 or newer).",
+    help="web opens in a browser, on this machine only; the others open a window and need Python 3.12 or newer.",
 )
 @click.option(
     "--port",
@@ -49,15 +43,15 @@ def studio(
     observer: str | None,
     settings: tuple[str, ...],
     seed: int | None,
-    gfx: str,
+    viewer: str,
     port: int,
     browser: bool,
 ) -> None:
     """Open SCENARIO in MuJoCo Studio, its controller running, until the viewer is closed or Ctrl-C.
 
-    As long as nobody interferes it is the trajectory of cmg-mj run. A panel switches the observer, the gains and the
-    rate that is fed back, pushes, and sets the bias and the accelerometers' noise; Studio pauses, steps, resets, and
-    goes back in time (docs/studio.md).
+    Without user actions the trajectory is that of cmg-mj run. A panel pushes the plant, switches the observer, the
+    gains and the feedback, and sets the bias and the accelerometers' noise. Studio pauses, steps, resets, and goes
+    back in time (docs/studio.md).
     """
     from cmg_mj.simulation.experiment import prepare
 
@@ -65,16 +59,16 @@ def studio(
         check_observer("--observer", observer)
     arguments = RunArguments(scenario, settings, seed, None, False)
 
-    def opened(model: str) -> Experiment:
-        """The scenario as its file is now; with another rig, if one was dropped on the viewer."""
+    def prepare_now(model: str) -> Experiment:
+        """Prepare the scenario from its current file, with another plant if one was dropped on the viewer."""
         if not model:
             return prepare(arguments.scenario(observer))
         return prepare(arguments.scenario(observer)).with_settings({"plant.model": model})
 
-    first = opened("")
+    first = prepare_now("")
     note_hints(first.hints)
     if importlib.util.find_spec("mujoco.studio") is None:
         raise InputError("this MuJoCo comes without Studio: install the wheel from PyPI, python -m pip install mujoco")
     from cmg_mj.visualization.studio.open import open_in_studio
 
-    open_in_studio(opened, first.scenario.title or scenario, gfx, port, browser)
+    open_in_studio(prepare_now, first.scenario.title or scenario, viewer, port, browser)

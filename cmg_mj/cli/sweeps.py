@@ -1,21 +1,22 @@
-"""The command that sweeps: a scenario on many rigs, at many noises, with many observers."""
+"""The command that sweeps a scenario over many plants, noises and observers."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from cmg_mj.cli.arguments import MOST_WORLDS, RunArguments, claim_folder, named_observers, output_path, run_options
-from cmg_mj.cli.pace import ProgressRate, in_time
+from cmg_mj.cli.pace import ProgressRate, duration_text
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, note, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
+    from cmg_mj.replay.report import JsonValue
     from cmg_mj.studies.sweeps.report import SweepTables
     from cmg_mj.studies.sweeps.study import SweepStudy
 
@@ -27,24 +28,26 @@ if TYPE_CHECKING:
     "varied",
     multiple=True,
     metavar="FIELD=VALUES",
-    help="A field and its values: a list 0,0.5,1, also of words such as RK4,implicit; a range first:last:count, a"
-    " logarithmic one log:first:last:count; without a count, low:high, only with --sample or --sobol. Fields with +"
-    " between take the same values together. May be given again: every combination is run.",
+    help="Field and its values: a list (0,0.5,1 or RK4,implicit), a range first:last:count, or a logarithmic range "
+    "log:first:last:count. With --sample or --sobol also low:high. Fields joined by + take the same values. May be "
+    "given again; every combination is run.",
 )
-@click.option("--observers", metavar="NAMES", help="Names with commas between, or all.  [default: the scenario's own]")
-@click.option("--worlds", type=click.IntRange(1, MOST_WORLDS), metavar="N", help="Worlds a cell.  [default: 20]")
+@click.option("--observers", metavar="NAMES", help="Observers separated by commas, or all.  [default: the scenario's]")
+@click.option("--worlds", type=click.IntRange(1, MOST_WORLDS), metavar="N", help="Worlds of each cell.  [default: 20]")
 @click.option(
-    "--sample", type=click.IntRange(1), metavar="N", help="N points of a quasi-random design of the ranges and lists."
+    "--sample", type=click.IntRange(1), metavar="N", help="Run N points of a quasi-random design instead of a grid."
 )
-@click.option("--sobol", type=click.IntRange(1), metavar="N", help="A design for Sobol indices, N a power of two.")
-@click.option("--order", metavar="NAMES", help="Observers, the best first: count how often that holds.")
-@click.option("--plan", is_flag=True, help="Say what it would take, and run nothing.")
+@click.option(
+    "--sobol", type=click.IntRange(1), metavar="N", help="Run a design for Sobol indices; N is a power of two."
+)
+@click.option("--order", metavar="NAMES", help="Observers, best first; report how often this ranking holds.")
+@click.option("--dry-run", is_flag=True, help="Print the number of trials, time and memory, and run nothing.")
 @click.option(
     "--cluster",
     metavar="ADDRESS",
-    help="Compute on a Dask cluster: its scheduler's address, or local:2 for one of 2 workers on this machine.",
+    help="Run on a Dask cluster: its scheduler's address, or local:2 for 2 workers on this machine.",
 )
-@click.option("--yes", is_flag=True, help="Run it even if it is very large.")
+@click.option("--yes", is_flag=True, help="Run the sweep even if it is very large.")
 @users_code()
 def sweep(
     arguments: RunArguments,
@@ -54,16 +57,21 @@ def sweep(
     sample: int | None,
     sobol: int | None,
     order: str | None,
-    plan: bool,
+    dry_run: bool,
     cluster: str | None,
     yes: bool,
 ) -> None:
-    """Run SCENARIO, or a study file that a sweep has written, in every cell: every point with every observer.
+    """Run SCENARIO, or the study file of a sweep, at every point with every observer: a cell for each.
 
-    World i has the same noise in every cell. Writes a folder: trials.parquet (a row a trial), cells.parquet (means with
-    95 % intervals, shares of falls, paired differences to the best), report.md with pictures, and study.toml, which
-    reruns. The same command again goes on where it was stopped.
-    """
+    World i has the same noise in every cell. An interrupted sweep resumes when the same command runs again.
+
+    \b
+    Writes a folder:
+      trials.parquet  a row for each trial
+      cells.parquet   means with 95 % intervals, fall fractions, paired differences to the best
+      report.md       the tables, with pictures
+      study.toml      reruns the sweep
+    """  # noqa: D301  (click wants the character itself)
     from cmg_mj.studies.sweeps.cells import COLUMNS, Trials
     from cmg_mj.studies.sweeps.chunk_store import Store
     from cmg_mj.studies.sweeps.plan import estimate_cost
@@ -76,14 +84,14 @@ def sweep(
         local_workers(cluster)
     study = _study(arguments, varied, observers, worlds, sample, sobol, order)
     check_values(study)
-    if plan:
-        takes = estimate_cost(study)
-        show(takes, _plan_text(takes), arguments.as_json)
+    if dry_run:
+        cost = estimate_cost(study)
+        show(cost, _cost_text(cost), arguments.as_json)
         return
     if study.trials > MOST_TRIALS and not yes:
         raise InputError(
             f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; beyond {MOST_TRIALS} say "
-            "--yes (--plan says what it would take)"
+            "--yes (--dry-run prints the time and memory)"
         )
     place = Path("runs") / f"sweep-{Path(arguments.name).stem}" if arguments.out is None else output_path(arguments.out)
     with _runner(cluster) as run:
@@ -100,15 +108,15 @@ def sweep(
             except KeyboardInterrupt:
                 note(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
                 sys.exit(INTERRUPTED)
-            found = found_of(Trials(study, store.tables(COLUMNS)))
-            at = save(folder, store, found)
-    show(_as_json(found) if arguments.as_json else None, summary(found), arguments.as_json)
-    say_written(folder, at, f"Read {at / 'report.md'}", arguments.as_json)
+            tables = found_of(Trials(study, store.tables(COLUMNS)))
+            written = save(folder, store, tables)
+    show(_as_json(tables) if arguments.as_json else None, summary(tables), arguments.as_json)
+    say_written(folder, written, f"Read {written / 'report.md'}", arguments.as_json)
 
 
 @contextmanager
 def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
-    """What runs the chunks: this process, or a cluster."""
+    """Provide the function that runs the chunks: in this process, or on a cluster."""
     if cluster is None:
         from cmg_mj.studies.sweeps.chunk_store import run
 
@@ -138,24 +146,23 @@ def _study(
         raise InputError("--sample and --sobol: one of them")
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
     fields = study_file(arguments.name)
-    asked: dict[str, Any] = {}
     if fields is None:
-        scenario = arguments.scenario()
+        scenario, settings = arguments.scenario(), {}
     else:
         scenario = scenario_of(arguments.name, fields, arguments.settings)
         if arguments.seed is not None:
             scenario = scenario.model_copy(update={"seed": arguments.seed})
-        asked = fields.get("sweep", {})
+        settings = fields.get("sweep", {})
         axes = axes or axes_of(arguments.name, fields)
-    design, n = design_of(arguments.name, asked)
+    design, n = design_of(arguments.name, settings)
     if sample is not None or sobol is not None:
         design, n = ("sample", sample or 0) if sample is not None else ("sobol", sobol or 0)
-    names = asked.get("observers", [scenario.observer.kind])
+    names = settings.get("observers", [scenario.observer.kind])
     if observers is not None:
         names = named_observers(observers)
-    expected = asked.get("order", []) if order is None else [name.strip() for name in order.split(",")]
-    of_each = worlds or asked.get("worlds", WORLDS)
-    return SweepStudy(scenario, tuple(axes), tuple(names), of_each, design, n, tuple(expected))
+    expected = settings.get("order", []) if order is None else [name.strip() for name in order.split(",")]
+    worlds_per_cell = worlds or settings.get("worlds", WORLDS)
+    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, design, n, tuple(expected))
 
 
 def _split(setting: str) -> tuple[str, str]:
@@ -163,23 +170,25 @@ def _split(setting: str) -> tuple[str, str]:
     return field.strip(), values
 
 
-def _as_json(found: SweepTables) -> dict[str, Any]:
+def _as_json(tables: SweepTables) -> JsonValue:
     from cmg_mj.studies.sweeps.cells import cells_of
 
-    study = found.trials.study
-    tables: dict[str, Any] = {"trials": study.trials, "cells": list(cells_of(found.trials))}
-    if study.order:
-        tables["order"] = found.order
-    return tables | ({"indices": found.indices} if study.design == "sobol" else {})
+    study = tables.trials.study
+    return {
+        "trials": study.trials,
+        "cells": list(cells_of(tables.trials)),
+        **({"order": tables.order} if study.order else {}),
+        **({"indices": tables.indices} if study.design == "sobol" else {}),
+    }
 
 
-def _plan_text(takes: dict[str, Any]) -> str:
+def _cost_text(cost: Mapping[str, float]) -> str:
     from cmg_mj.studies.sweeps.study import counted
 
-    how_many = " x ".join(counted(takes[what], what[:-1]) for what in ("points", "observers", "worlds"))
-    seconds, chunks = takes["minutes"] * 60.0, counted(takes["chunks"], "chunk")
-    how_long = f"{seconds:.2g} s" if seconds < 10.0 else in_time(seconds)
-    return (
-        f"{how_many} = {counted(takes['trials'], 'trial')} in {chunks}; about {how_long} on this machine, "
-        f"{takes['memory_mb']:.0f} MB"
-    )
+    def count(key: str) -> str:
+        return counted(int(cost[key]), key[:-1])
+
+    size = " x ".join(count(key) for key in ("points", "observers", "worlds"))
+    seconds = cost["minutes"] * 60.0
+    time = f"{seconds:.2g} s" if seconds < 10.0 else duration_text(seconds)
+    return f"{size} = {count('trials')} in {count('chunks')}; about {time} on this machine, {cost['memory_mb']:.0f} MB"

@@ -1,4 +1,4 @@
-"""What the commands say and draw on the terminal, and how they hear Ctrl-C."""
+"""Output of the commands on the terminal, and their handling of Ctrl-C."""
 
 from __future__ import annotations
 
@@ -6,18 +6,24 @@ import json
 import signal
 import sys
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from types import FrameType
+from typing import TYPE_CHECKING, Protocol, TextIO
 
 import click
 
 from cmg_mj.cli.pace import ProgressRate
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from cmg_mj.replay.report import JsonValue
     from cmg_mj.results.run_folder import RunFolder
+
+    Handler = Callable[[int, FrameType | None], None] | signal.Handlers
 
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 """Exit statuses."""
@@ -27,44 +33,50 @@ class OnProgress(Protocol):
     """Moves a progress bar."""
 
     def __call__(self, done: float, now: str | None = None) -> None:
-        """Show how much is done, and perhaps what is done now."""
+        """Show how much is done, and perhaps the current part."""
 
 
 class CtrlC:
-    """Ctrl-C while something is run and written: the first is noted and acted on by `check`, the second acts at once.
+    """Handles Ctrl-C while a command runs and writes: `check` acts on the first one, the second one acts at once.
 
-    So a run ends between two ticks, and a file that is being written is finished. What ends a process from outside,
-    SIGTERM and, where there is one, SIGHUP, counts as Ctrl-C.
+    A run ends between two ticks, and a file that is being written is finished. SIGTERM and, where it exists, SIGHUP
+    count as Ctrl-C.
 
     Attributes:
-        noted: Whether there was one.
+        noted: Whether there was a Ctrl-C.
     """
 
     def __init__(self) -> None:
         self.noted = False
-        self._before: dict[int, Any] = {}
+        self._replaced: list[tuple[signal.Signals, Handler]] = []
 
     def __enter__(self) -> CtrlC:
-        # Where somebody else has a say in a signal (another thread, a job in the background), nothing is changed.
-        untouched = {"SIGINT": signal.default_int_handler, "SIGTERM": signal.SIG_DFL, "SIGHUP": signal.SIG_DFL}
+        # Signals that somebody else handles (another thread, a job in the background) stay as they are.
+        defaults: dict[str, Handler] = {
+            "SIGINT": signal.default_int_handler,
+            "SIGTERM": signal.SIG_DFL,
+            "SIGHUP": signal.SIG_DFL,
+        }
         if threading.current_thread() is threading.main_thread():
-            for name, handler in untouched.items():
+            for name, handler in defaults.items():
                 number = getattr(signal, name, None)  # Windows has no SIGHUP
                 if number is not None and signal.getsignal(number) == handler:
-                    self._before[number] = signal.signal(number, self._note)
+                    signal.signal(number, self._note)
+                    self._replaced.append((number, handler))
         return self
 
     def __exit__(self, *exception: object) -> None:
-        for number, before in self._before.items():
-            signal.signal(number, before)
+        for number, handler in self._replaced:
+            signal.signal(number, handler)
+        self._replaced.clear()
 
-    def _note(self, *signal: Any) -> None:
+    def _note(self, number: int, frame: FrameType | None) -> None:
         if self.noted:
             raise KeyboardInterrupt
         self.noted = True
 
     def check(self) -> None:
-        """Act on what was noted.
+        """Act on a Ctrl-C.
 
         Raises:
             KeyboardInterrupt: There was a Ctrl-C.
@@ -73,50 +85,50 @@ class CtrlC:
             raise KeyboardInterrupt
 
 
-_own_stdout: ContextVar[Any] = ContextVar("standard output")
+_command_stdout: ContextVar[TextIO] = ContextVar("standard output")
 
 
 @contextmanager
 def users_code() -> Iterator[None]:
-    """While a user's observer may run: what it prints goes to standard error. Standard output is the command's own."""
-    token = _own_stdout.set(sys.stdout)
+    """Send what a user's code prints to standard error; standard output is for the command alone."""
+    token = _command_stdout.set(sys.stdout)
     try:
         with redirect_stdout(sys.stderr):
             yield
     finally:
-        _own_stdout.reset(token)
+        _command_stdout.reset(token)
 
 
-def own_stdout() -> Any:
-    """Standard output, whatever has been done to it for a user's code."""
-    return _own_stdout.get(sys.stdout)
+def own_stdout() -> TextIO:
+    """Return standard output, also within `users_code`."""
+    return _command_stdout.get(sys.stdout)
 
 
 def note(message: str) -> None:
-    """One line on standard error, if anybody reads it."""
+    """Write one line to standard error, if it is read."""
     with suppress(OSError):
         click.echo(f"cmg-mj: {' '.join(message.split())}", err=True)
 
 
 def note_hints(hints: Iterable[str]) -> None:
-    """What is no mistake and yet likely to make the rig fall, before it does."""
+    """Write hints: settings that are no mistake but likely to make the plant fall."""
     for hint in hints:
         note(f"hint: {hint}")
 
 
 def final_path(folder: RunFolder, place: Path) -> str:
-    """Where a result is, and why if it is not where the user wanted it."""
+    """Return the path of a result, with the reason if it is not the requested folder."""
     return str(place) if place == folder.path else f"{place}; what {folder.path} has held stays as it was"
 
 
 def say_written(folder: RunFolder, place: Path, open_it: str, as_json: bool) -> None:
-    """Where the files are, and how to open them; with JSON on standard output only what is not as expected."""
+    """Write the path of the files and how to open them; with JSON only if the path is not the expected one."""
     if not as_json or place != folder.path:
         click.echo(f"Written to {final_path(folder, place)}. {open_it}", err=True)
 
 
-def show(value: Any, table: Any, as_json: bool) -> None:
-    """A table, or text, as wide as the terminal allows and as it is where there is none; or the value as JSON."""
+def show(value: JsonValue, table: RenderableType, as_json: bool) -> None:
+    """Print a value as JSON, or a table (or text) as wide as the terminal; in full width without a terminal."""
     from rich.console import Console
 
     if as_json or isinstance(table, str):
@@ -136,16 +148,16 @@ def show(value: Any, table: Any, as_json: bool) -> None:
 def progress(
     label: str, total: float, ctrl_c: CtrlC | None = None, pace: ProgressRate | None = None
 ) -> Iterator[OnProgress]:
-    """A progress bar on standard error, gone when done; where there is no terminal a line a minute of a pace, or none.
+    """Show a progress bar on standard error until the end; without a terminal, a line a minute if there is a pace.
 
     Args:
-        label: What is going on.
-        total: How much is to be done.
-        ctrl_c: Looked at on every call.
-        pace: Says how fast it goes.
+        label: Description of the task.
+        total: Total of the progress.
+        ctrl_c: Checked on every call.
+        pace: Formats the rate.
 
     Yields:
-        What moves it.
+        Function that moves the bar.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -175,7 +187,7 @@ def progress(
         shown = done
         bar.update(task, completed=done, description=now)  # None leaves the description as it is
         if pace is not None:
-            bar.update(task, pace=pace.said(done))
+            bar.update(task, pace=pace.text(done))
 
     with bar if console.is_terminal else nullcontext():  # below rich 15, a disabled bar leaves an empty line
         yield on_progress

@@ -1,4 +1,4 @@
-"""What a reference is to a measured tilt: how far it comes behind, its scale and its offset."""
+"""Lag, scale and offset of a reference rate relative to the measured tilt."""
 
 from __future__ import annotations
 
@@ -10,57 +10,57 @@ import numpy as np
 from cmg_mj.replay.lag import lag
 
 SPAN_S = 0.2
-"""A reference is compared by how far it says that the tilt has come in so long [s]: slopes are mostly noise."""
+"""Time over which increments of the tilt and of the integrated reference are compared [s]; slopes are mostly noise."""
 
 
 class Alignment(NamedTuple):
-    """What a reference is to the measured tilt, found from the two alone."""
+    """Lag, scale and offset of a reference relative to the measured tilt; None where they cannot be found."""
 
     lag_s: float | None
-    """How far it comes behind the tilt, as it was read [s]."""
+    """Lag of the reference behind the tilt, as it was read [s]."""
     scale: float | None
-    """By what it must be multiplied to say how far the tilt has come."""
+    """Factor of the reference that fits the tilt's increments."""
     offset_rad_s: float | None
-    """What must be added then [rad/s]."""
+    """Addend after the scale [rad/s]."""
     correlation: float | None
-    """Of its increments with the tilt's: near -1 if it counts the other way."""
+    """Correlation of the increments, near -1 for a reference of the other sign."""
 
 
 def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: float) -> Alignment:
-    """Compare how far the tilt comes in `SPAN_S`, at every sample, with how far the reference says so.
+    """Compare the tilt's increments over `SPAN_S` with those of the integrated reference, at every sample.
 
-    The lag is where the two are most alike; the tilt's increments are then fitted by the reference's, taken back by it.
+    The lag is where the two correlate most. The tilt's increments are then fitted by the reference's, shifted by it.
 
     Args:
-        tilt: Its pieces, each (n,) [rad].
-        reference: The pieces of the rate [rad/s]; NaN where it is not known.
+        tilt: Pieces of the tilt, each (n,) [rad].
+        reference: Pieces of the rate, each (n,) [rad/s]; NaN where it is unknown.
         dt: Sample period [s].
 
     Returns:
-        The four numbers; None for those that cannot be found.
+        The alignment.
     """
     span = max(2, round(SPAN_S / dt))
     pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
     rises = [y[span:] - y[:-span] for y, _ in pieces]
-    found = lag([_travelled(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
-    travels = [_travelled(rate, span, dt, found or 0.0) for _, rate in pieces]
+    lag_s = lag([_travelled(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
+    travels = [_travelled(rate, span, dt, lag_s or 0.0) for _, rate in pieces]
     if not rises:
-        return Alignment(found, None, None, None)
+        return Alignment(lag_s, None, None, None)
     rise, travel = np.concatenate(rises), np.concatenate(travels)
     rise, travel = rise[np.isfinite(travel)], travel[np.isfinite(travel)]
     if len(rise) < 3 or not np.ptp(travel) > 0.0 or not np.ptp(rise) > 0.0:
-        return Alignment(found, None, None, None)
+        return Alignment(lag_s, None, None, None)
     correlation = float(np.corrcoef(rise, travel)[0, 1])
     slope, start = np.polynomial.polynomial.polyfit(travel, rise, 1)[::-1]
-    return Alignment(found, float(slope), float(start / (span * dt)), correlation)
+    return Alignment(lag_s, float(slope), float(start / (span * dt)), correlation)
 
 
-def _travelled(rate: np.ndarray, span: int, dt: float, late_s: float) -> np.ndarray:
-    """How far a rate goes in each span of samples, when it comes so late; NaN over what is not known, (n - span,)."""
+def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float) -> np.ndarray:
+    """Integrate a rate, shifted by its lag, over each span of samples; NaN where it is unknown, (n - span,)."""
     clock = np.arange(len(rate)) * dt
     steps = (rate[1:] + rate[:-1]) * dt / 2.0
     unknown = np.concatenate([[0], np.cumsum(np.isnan(steps))])
     travelled = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
-    when = clock + late_s
+    when = clock + lag_s
     travelled, unknown = (np.interp(when, clock, sums, left=np.nan, right=np.nan) for sums in (travelled, unknown))
     return np.where(unknown[span:] == unknown[:-span], travelled[span:] - travelled[:-span], np.nan)

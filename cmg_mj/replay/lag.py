@@ -1,4 +1,4 @@
-"""How far one signal lags behind another, finer than a sample, and when that cannot be told."""
+"""The lag of one signal behind another, finer than a sample."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 LONGEST_LAG_S = 0.5
-"""Lags are looked for up to this, and no farther than a quarter of what there is [s]."""
+"""Longest lag that is searched, and no longer than a quarter of the signal [s]."""
 AS_GOOD = 0.98
 """A periodic motion fits itself every period: of peaks this close to the highest, the one nearest to no lag counts."""
 ALIKE = 0.5
-"""Of an estimate whose correlation peaks lower, less than a quarter of the variance is the reference, however late."""
+"""Lowest peak of the correlation: below, the reference explains less than a quarter of the estimate's variance."""
 STRETCHES = 8
-"""Each of so many stretches is left out in turn: what the lag then changes shows how far it is known."""
+"""Stretches of the jackknife: each is omitted in turn, and the change of the lag shows its standard error."""
 TAPS = 15
 """The correlation is smoothed over so many lags either way, if there are as many."""
 
@@ -25,7 +25,7 @@ def lag(
     dt: float,
     longest_s: float = LONGEST_LAG_S,
 ) -> float | None:
-    """How long one signal comes after another: the peak of their correlation coefficient, between the samples too.
+    """Find how long one signal comes after another: the peak of their correlation, between the samples too.
 
     For every whole number of samples the coefficient is that of all pairs there are. Before its peak is sought, all
     above a quarter of the sampling rate is taken out of it: what was folded down from above half the rate lies there,
@@ -33,34 +33,34 @@ def lag(
     its peak where a pure delay is, whatever the signals' sizes.
 
     Args:
-        behind: Its pieces, each (n,); NaN where it is not known.
-        ahead: The pieces of the other at the same times.
+        behind: Pieces of the later signal, each (n,); NaN where it is unknown.
+        ahead: Pieces of the other signal at the same times.
         dt: Sample period [s].
-        longest_s: Longest lag looked for, either way [s].
+        longest_s: Longest lag that is searched, either way [s].
 
     Returns:
-        The lag [s], negative if it comes before; None if there is none: no motion, no likeness (`ALIKE`), a peak at the
-        end, or a standard error, by the jackknife over `STRETCHES`, above a sample and above half of the lag.
+        The lag [s], negative if the signal comes before the other. None for no motion, a low correlation (`ALIKE`), a
+        peak at the end, or a standard error (jackknife over `STRETCHES`) above a sample and above half of the lag.
     """
     size = max((len(piece) for piece in behind), default=0)
     reach = min(math.ceil(longest_s / dt), (size - 1) // 4)
     if reach < 1:
         return None
-    each = _sums(behind, ahead, reach)
-    whole = each.sum(axis=0)
-    found = _peak_of(whole)
-    if found is None:
+    stretches = _sums(behind, ahead, reach)
+    whole = stretches.sum(axis=0)
+    peak = _peak_of(whole)
+    if peak is None:
         return None
-    others = [_peak_of(whole - one) for one in each if one[0].any()]
+    others = [_peak_of(whole - stretch) for stretch in stretches if stretch[0].any()]
     known = np.array([other for other in others if other is not None])
     if len(known) < max(2, len(others)):
         return None
     error = math.sqrt((len(known) - 1) * float(np.var(known)))
-    return found * dt if error <= max(1.0, abs(found) / 2.0) else None
+    return peak * dt if error <= max(1.0, abs(peak) / 2.0) else None
 
 
 def _sums(behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], reach: int) -> np.ndarray:
-    """Count, sums, squares and products of the pairs that are known, (stretches, 6, lags)."""
+    """Sum counts, values, squares and products of the known pairs, (stretches, 6, lags)."""
     from scipy.signal import correlate
 
     # Numbers of like size: of the products of transforms, what is far smaller than the largest is lost.
@@ -90,7 +90,7 @@ def _mean(pieces: Sequence[np.ndarray]) -> float:
 
 
 def _stretches(sizes: Sequence[int], least: int) -> Iterator[tuple[int, int, slice]]:
-    """Stretch, piece and rows in it of all pieces longer than the least, cut into `STRETCHES` of equal size."""
+    """Cut all pieces longer than the least into `STRETCHES` of equal size: stretch, piece and its rows."""
     total, before = sum(size for size in sizes if size > least), 0
     edges = [round(total * k / STRETCHES) for k in range(STRETCHES + 1)]
     for piece, size in enumerate(sizes):
@@ -104,7 +104,7 @@ def _stretches(sizes: Sequence[int], least: int) -> Iterator[tuple[int, int, sli
 
 
 def _peak_of(sums: np.ndarray) -> float | None:
-    """Where the correlation coefficient has its peak, in samples."""
+    """Return the lag at which the correlation coefficient has its peak, in samples."""
     n, sx, sy, sxx, syy, sxy = sums
     with np.errstate(all="ignore"):
         r = (sxy - sx * sy / n) / np.sqrt((sxx - sx * sx / n) * (syy - sy * sy / n))
@@ -118,7 +118,7 @@ def _peak_of(sums: np.ndarray) -> float | None:
 
 
 def _half_band(taps: int) -> np.ndarray:
-    """A symmetric low-pass at a quarter of the sampling rate, (2 taps + 1,); of a few taps it is none."""
+    """Return a symmetric low-pass at a quarter of the sampling rate, (2 taps + 1,); with few taps, no filter."""
     if taps < 3:
         return np.ones(1)
     places = np.arange(-taps, taps + 1)
@@ -127,7 +127,7 @@ def _half_band(taps: int) -> np.ndarray:
 
 
 def _between(lags: np.ndarray, r: np.ndarray, at: int) -> float:
-    """Where between the samples a curve through them is highest, in samples."""
+    """Return where a curve through the samples is highest, in samples."""
     from scipy.interpolate import make_interp_spline
     from scipy.optimize import minimize_scalar
 
@@ -136,5 +136,5 @@ def _between(lags: np.ndarray, r: np.ndarray, at: int) -> float:
         return float(lags[at])
     curve = make_interp_spline(lags[around], r[around], k=5)
     ends = (lags[at] - 1, lags[at] + 1)
-    found = minimize_scalar(lambda m: -curve(m), bounds=ends, method="bounded", options={"xatol": 1e-7})
-    return float(found.x)  # pyright: ignore[reportAttributeAccessIssue]
+    result = minimize_scalar(lambda m: -curve(m), bounds=ends, method="bounded", options={"xatol": 1e-7})
+    return float(result.x)  # pyright: ignore[reportAttributeAccessIssue]

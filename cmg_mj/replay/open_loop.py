@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from cmg_mj.elementwise import Scalar
 from cmg_mj.observers import Estimate, Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.results.trajectory import ESTIMATES, Trajectory
 
 
 def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
-    """What the observer makes of the recorded measurements y1, y2, angular acceleration (if recorded) and command u.
+    """Replay an observer on recorded measurements: y1, y2, angular acceleration (if recorded) and command u.
 
-    The loop may have been closed on anything else: the observer only rides along. From the first row on, its
-    estimates are bitwise those of an open-loop observer in the same run.
+    The observer runs open loop, whatever the loop was closed on. From the first row on, its estimates are bitwise
+    those of an open-loop observer in the same run.
 
     Args:
         observer: The observer; its sample period must be the trajectory's.
@@ -26,19 +26,19 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
         Estimates of x1 [rad], x2 [rad/s] and x3 [rad], each of the recorded columns' shape, (n_ticks,) or
         (n_ticks, n_worlds); NaN after a world's end.
     """
-    found = replay_all(observer, trajectory)
-    return Estimate(*(found[name] for name in ESTIMATES))
+    signals = replay_all(observer, trajectory)
+    return Estimate(*(signals[name] for name in ESTIMATES))
 
 
 def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarray]:
-    """The same, and what the observer estimates beyond x, by name; at the first row that is zero."""
+    """Replay as `replay` does; return x and the observer's other estimates (zero at the first row) by name."""
     names = (*ESTIMATES, *extra_signals(observer))
     y1, y2, u = (_rows(trajectory[name]) for name in ("y1_rad", "y2_rad", "u_rad_s"))
     measured = trajectory.columns.get("acceleration_rad_s2")
     acceleration = _rows(np.full_like(trajectory["y1_rad"], np.nan) if measured is None else measured)
     zero = 0.0 * y1[0]
     state = observer.init(Measurement(y1[0], y2[0], acceleration[0]))
-    rows: list[Sequence[Any]] = [(y1[0], zero, y2[0], *[zero] * (len(names) - len(ESTIMATES)))]
+    rows: list[Sequence[Scalar]] = [(y1[0], zero, y2[0], *[zero] * (len(names) - len(ESTIMATES)))]
     for k in range(1, len(y1)):
         state, estimate = observer.step(state, Measurement(y1[k], y2[k], acceleration[k]), u[k - 1])
         rows.append(estimate)
@@ -47,6 +47,6 @@ def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarr
     return {name: np.array(column, dtype=float).reshape(shape) for name, column in zip(names, columns, strict=True)}
 
 
-def _rows(values: np.ndarray) -> Any:
-    """Ticks as floats (one world) or as arrays (n_worlds,): what the observers take."""
+def _rows(values: np.ndarray) -> Sequence[Scalar] | np.ndarray:
+    """Return ticks as the observers take them: floats (one world) or arrays (n_worlds,)."""
     return values.tolist() if values.ndim == 1 else np.ascontiguousarray(values)

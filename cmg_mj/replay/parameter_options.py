@@ -1,54 +1,59 @@
-"""Options of a replay as texts: numbers by name, and observers' parameters."""
+"""Parsing of a replay's options: numbers by name, and observers' parameters."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Collection, Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from typing import TypeAlias
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.observers import OBSERVERS, observer_class
 
+ParameterValue: TypeAlias = "bool | int | float | str | Sequence[ParameterValue] | None"
+"""Value of an observer's parameter."""
+Parameters = Mapping[str, Mapping[str, ParameterValue]]
+"""Observer -> parameter -> value."""
+
 
 def numbers(text: str, option: str, names: Collection[str]) -> dict[str, float]:
-    """`inertia=0.06,gravity_torque=3.4` -> by name.
+    """Parse `inertia=0.06,gravity_torque=3.4`.
 
     Args:
         text: NAME=VALUE with commas between.
         option: The option's name, for messages.
-        names: Those that there are.
+        names: The known names.
 
     Returns:
-        Finite numbers.
+        Name -> finite number.
 
     Raises:
-        InputError: Not of this form, an unknown name, or one twice.
+        InputError: The text has another form, or a name is unknown or given twice.
     """
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = (piece.strip() for piece in part.partition("="))
         if name not in names:
             raise InputError(f"{option} {name}: no such number; {nearest(name, names)}")
-        if name in found:
+        if name in values:
             raise InputError(f"{option} {name}: given twice")
-        found[name] = _finite(value, f"{option} {name}")
-    return found
+        values[name] = _finite(value, f"{option} {name}")
+    return values
 
 
-def parameters_of(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """`--set homogeneous.k1=20` -> observer -> parameter -> value.
+def parameters_of(settings: Sequence[str]) -> dict[str, dict[str, ParameterValue]]:
+    """Parse `--set homogeneous.k1=20`.
 
     Args:
         settings: Each OBSERVER.PARAMETER=VALUE.
 
     Returns:
-        Values as TOML reads them.
+        Observer -> parameter -> value, as TOML reads it.
 
     Raises:
-        InputError: Not of this form, or no such observer.
+        InputError: A setting has another form, or there is no such observer.
     """
-    found: dict[str, dict[str, Any]] = {}
+    parameters: dict[str, dict[str, ParameterValue]] = {}
     for setting in settings:
         place, equals, text = setting.partition("=")
         kind, dot, name = place.strip().rpartition(".")
@@ -61,8 +66,8 @@ def parameters_of(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
             (value,) = tomllib.loads(f"value = {text}").values()
         except (ValueError, RecursionError):
             raise InputError(f"--set {setting!r}: {text!r} is no number, list or text in quotes") from None
-        found.setdefault(kind, {})[name] = value
-    return found
+        parameters.setdefault(kind, {})[name] = value
+    return parameters
 
 
 def _finite(text: str, where: str) -> float:

@@ -1,16 +1,16 @@
-"""A replay drawn: the tilt, what the observers say of its rate, how far off that is, its liveliest seconds close by."""
+"""The plot of a replay: tilt, estimated rates, their errors, and the liveliest seconds in detail."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cmg_mj.replay.log_replay import ReplayResult, described
+from cmg_mj.replay.log_replay import ReplayResult, describe_log
 from cmg_mj.replay.logs.log import REFERENCE
-from cmg_mj.replay.report import shown_first, written
+from cmg_mj.replay.report import figure_text, shown_first
+from cmg_mj.replay.scores import Figures
 from cmg_mj.results.trajectory import whole_file
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
@@ -25,14 +25,14 @@ from cmg_mj.visualization.plots.run_plot import (
     pyplot,
 )
 
-CLOSE_S = 2.0
-"""So much is drawn close by [s]."""
+DETAIL_S = 2.0
+"""Length of the detail [s]."""
 
 
-def close_by(replayed: ReplayResult) -> tuple[float, float]:
-    """Where the tilt accelerates most: so many seconds around the middle of that [s]."""
+def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
+    """Return the ends of the span in which the tilt accelerates most [s]."""
     log = replayed.log
-    length = max(2, round(CLOSE_S / log.dt))
+    length = max(2, round(DETAIL_S / log.dt))
     liveliest, where = -1.0, (log["time_s"][0], log["time_s"][-1])
     for part in log.parts:
         time, tilt = log["time_s"][part], log["y1_rad"][part]
@@ -42,12 +42,12 @@ def close_by(replayed: ReplayResult) -> tuple[float, float]:
         sums = np.concatenate([[0.0], np.cumsum(bend)])
         n = min(length, len(tilt))
         lively = sums[n:] - sums[:-n]
-        at = int(np.argmax(lively))
-        if lively[at] > liveliest:
-            liveliest = float(lively[at])
-            middle = np.average(np.arange(n), weights=bend[at : at + n] + 1e-300)
-            at = int(np.clip(at + middle - n / 2.0, 0, len(time) - n))
-            where = float(time[at]), float(time[at + n - 1])
+        start = int(np.argmax(lively))
+        if lively[start] > liveliest:
+            liveliest = float(lively[start])
+            middle = np.average(np.arange(n), weights=bend[start : start + n] + 1e-300)
+            start = int(np.clip(start + middle - n / 2.0, 0, len(time) - n))
+            where = float(time[start]), float(time[start + n - 1])
     return where
 
 
@@ -56,7 +56,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
 
     Args:
         path: The PNG to write.
-        replayed: What the observers made of it.
+        replayed: The replay.
     """
     plt = pyplot()
     log, names = replayed.log, list(replayed.estimates)
@@ -70,7 +70,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     figure = plt.figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
     grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
     panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
-    start, end = close_by(replayed)
+    start, end = liveliest_span(replayed)
     _line(panels[0], replayed, np.degrees(log["y1_rad"]), color=MEASURED, linewidth=0.8, label="measured")
     panels[0].set_ylabel("tilt [deg]")
     rates = None
@@ -103,9 +103,9 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     for axes in panels:
         axes.grid(alpha=0.3)
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
-    panels[-1].set_xlabel(f"time [s], {CLOSE_S:g} s close by" if end - start < log.duration_s else "time [s]")
+    panels[-1].set_xlabel(f"time [s], {DETAIL_S:g} s in detail" if end - start < log.duration_s else "time [s]")
     figure.align_ylabels(panels)
-    figure.suptitle(described(log), x=0.01, ha="left", parse_math=False)
+    figure.suptitle(describe_log(log), x=0.01, ha="left", parse_math=False)
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=110, format="png")
     plt.close(figure)
@@ -122,20 +122,21 @@ def _draw_small(
     label: str,
     color: str,
     rates: tuple[float, float] | None,
-    close: tuple[float, float],
+    span: tuple[float, float],
 ) -> None:
-    """Another observer, close by, on the axis of the few."""
+    """Draw another observer in detail, on the axis of the few."""
     _line(axes, replayed, replayed.estimates[name]["x2_rad_s"], color=color, linewidth=0.7)
     if "reference" in replayed.log.has:
         _line(axes, replayed, replayed.log[REFERENCE], color=INK, linewidth=0.8)
     text = f"{label} {_rms(replayed.summaries[name])}".strip()
     axes.set_title(text, loc="left", fontsize="small", parse_math=False, pad=2.0)
-    axes.set_xlim(*close)
+    axes.set_xlim(*span)
     axes.grid(alpha=0.3)
     if rates is not None:
         axes.set_ylim(*rates)
 
 
-def _rms(figures: Mapping[str, Any]) -> str:
+def _rms(figures: Figures) -> str:
     key = "velocity_rms_error_rad_s"
-    return written(key, figures[key]) if figures.get(key) is not None else ""
+    value = figures.get(key)
+    return "" if value is None else figure_text(key, value)

@@ -1,4 +1,4 @@
-"""Replays as a rerun recording: what was measured, what the observers say, how far off they are."""
+"""Replays as a rerun recording: measurements, estimates and their errors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[st
         path: The file, `recording.rrd`.
         replays: The replays; each has a branch of its own.
         names: Their names, no two alike.
-        settings_toml: What was asked for.
+        settings_toml: The request, as TOML.
 
     Raises:
         InputError: The environment turns rerun off.
@@ -43,7 +43,7 @@ def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[st
 
 
 def series(replayed: ReplayResult) -> list[Series]:
-    """All time series of one log: angles in degrees, rates in rad/s."""
+    """Return all time series of one log: angles in degrees, rates in rad/s."""
     log = replayed.log
 
     def row(path: str, name: str, values: np.ndarray, color: tuple, width: float = 1.5, **more: object) -> Series:
@@ -56,12 +56,12 @@ def series(replayed: ReplayResult) -> list[Series]:
     for part, (name, color) in zip(numbered_parts(names), colours(names).items(), strict=True):
         estimates = replayed.estimates[name]
         rate = estimates["x2_rad_s"]
-        said = {"rate_estimate": rate}
+        signals = {"rate_estimate": rate}
         if "reference" in log.has:
-            said["rate_error"] = rate - log[REFERENCE]
+            signals["rate_error"] = rate - log[REFERENCE]
         if BIAS in estimates:
-            said["bias"] = np.degrees(estimates[BIAS])
-        for folder, values in said.items():
+            signals["bias"] = np.degrees(estimates[BIAS])
+        for folder, values in signals.items():
             rows.append(row(f"{folder}/{part}", labels[name], values, color, whole=False, observer=name))
     if "acceleration" in log.has:
         measured = log["acceleration_rad_s2"]

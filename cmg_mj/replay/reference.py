@@ -1,4 +1,4 @@
-"""What is said of a log and its reference before anything is judged, in replays and in tuning."""
+"""Remarks on a log and its reference, in replays and in tuning."""
 
 from __future__ import annotations
 
@@ -11,47 +11,47 @@ from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
 
 OFF = 0.05
-"""A reference whose size differs by more from what the tilt shows is worth a word."""
+"""Relative deviation of the reference's scale or offset from which it is reported."""
 LATE = 0.1
-"""So is one that is late by more than this much of a period of the log's rows, or of its samples if these are rarer."""
+"""Lag from which it is reported, in periods of the log's rows or its samples, the longer of the two."""
 ALIKE = 0.5
-"""Tilt and reference that correlate less have nothing to do with each other."""
+"""Correlation below which tilt and reference are unrelated."""
 AGREES = 0.95
-"""Only if they correlate so far at the best lag, or oppose each other so far, is a cure offered: of a tilt that freezes
-half-way neither lag nor scale is worth anything."""
+"""Correlation at the best lag, of either sign, from which a cure is offered. If the tilt freezes half-way, neither lag
+nor scale is meaningful."""
 UNIT_NEAR = 1.1
 """A scale within this factor of a degree, or of its inverse, is probably a unit."""
 
 
 def alignment_of(log: Log) -> Alignment | None:
-    """What a log's reference is to its tilt; None without one, and of a run's recording, whose truth it is."""
+    """Align a log's reference with its tilt; None without a reference, and for a run's recording."""
     if "reference" not in log.has or log.scenario is not None:
         return None
     tilts, references = ([log[name][part] for part in log.parts] for name in ("y1_rad", REFERENCE))
     return alignment(tilts, references, log.dt)
 
 
-def remarks_on(log: Log, found: Alignment | None) -> list[str]:
-    """What was done to a log, and what its reference is.
+def remarks_on(log: Log, aligned: Alignment | None) -> list[str]:
+    """Describe the changes to a log, and its reference.
 
     Args:
         log: The log.
-        found: By `alignment_of`.
+        aligned: Alignment from `alignment_of`.
 
     Returns:
         Sentences.
     """
     lines = [f"{note[:1].upper()}{note[1:]}{'' if note.endswith('?') else '.'}" for note in log.notes]
-    return lines if found is None else lines + _of_the_reference(log, found)
+    return lines if aligned is None else lines + _reference_remarks(log, aligned)
 
 
-def _of_the_reference(log: Log, found: Alignment) -> list[str]:
-    """The reference's lag, size and offset if they matter, and what would take them out: no line, or one."""
-    lag, scale, offset, correlation = found
+def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
+    """Describe the reference's lag, scale and offset if they matter, with options that correct them."""
+    lag, scale, offset, correlation = aligned
     if scale is None or offset is None or correlation is None:
         return ["The reference cannot be compared with the tilt: too little motion, or too short."]
     if correlation <= -AGREES:
-        scale_now = dict(log.given.get("scale", {})).get("rate", 1.0)
+        scale_now = log.options.scale.get("rate", 1.0)
         return [
             f"The reference does not go with the tilt (correlation {correlation:.2f}): it counts the other way: "
             f"--scale rate={-scale_now:g}."
@@ -60,7 +60,7 @@ def _of_the_reference(log: Log, found: Alignment) -> list[str]:
         return [
             f"The reference does not go with the tilt (correlation {correlation:.2f}): is it the rate of this tilt?"
         ]
-    late = None if lag is None or abs(lag) <= LATE * max(log.dt, log.rows_s or 0.0) else lag
+    late = None if lag is None or abs(lag) <= LATE * max(log.dt, log.row_period_s or 0.0) else lag
     resized = abs(scale - 1.0) > OFF
     known = log[REFERENCE][np.isfinite(log[REFERENCE])]
     motion = math.sqrt(float(np.mean(known**2)))
@@ -74,17 +74,18 @@ def _of_the_reference(log: Log, found: Alignment) -> list[str]:
     when = "an unknown time" if lag is None else f"{abs(lag) * 1e3:.2f} ms {'behind' if lag >= 0.0 else 'before'}"
     sign = "plus" if offset >= 0.0 else "less"
     times = f"{scale:.4f}" if scale > 0.1 else f"{scale:.4g}"
-    said = f"Beside the tilt the reference comes {when}; {times} times it {sign} {abs(offset):.4f} rad/s fits"
+    remark = f"Beside the tilt the reference comes {when}; {times} times it {sign} {abs(offset):.4f} rad/s fits"
     cures = [f"--delay {late:.4f}"] if late is not None else []
     cures += [f"--scale rate={scale:.4g}"] if resized else []
-    beyond = "beyond what was set; " if {"delay_s", "scale", "offset"} & log.given.keys() else ""
+    corrected = log.options.delay_s or log.options.scale or log.options.offset
+    beyond = "beyond what was set; " if corrected else ""
     cure = f" ({beyond}to take it out: {' '.join(cures)})" if cures else ""
-    return [said + cure + (_a_unit(log, scale) or ".")]
+    return [remark + cure + (_unit_question(log, scale) or ".")]
 
 
-def _a_unit(log: Log, scale: float) -> str | None:
-    """Whether a reference's scale is that of degrees taken as radians, or the other way."""
-    units = log.given.get("units", {})
+def _unit_question(log: Log, scale: float) -> str | None:
+    """Ask for the unit if a reference's scale is that of degrees taken as radians, or the other way."""
+    units = log.options.units
     for factor, rate, tilt in ((math.pi / 180.0, "deg/s", "rad"), (180.0 / math.pi, "rad/s", "deg")):
         if 1.0 / UNIT_NEAR < scale / factor < UNIT_NEAR:
             tilts = f", or the tilt {tilt}" if "tilt" in units and units["tilt"] != tilt else ""

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import NamedTuple, TypeAlias
 
 from rich import box
-from rich.console import Group
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from cmg_mj.replay.log_replay import ReplayResult, described
+from cmg_mj.replay.log_replay import ReplayResult, describe_log
 from cmg_mj.replay.reference import remarks_on
-from cmg_mj.replay.scores import RECONSTRUCTED_S
+from cmg_mj.replay.scores import RECONSTRUCTED_S, Figures
 from cmg_mj.results import markdown
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import Key
 from cmg_mj.visualization.plots.readability import observers_to_draw
+
+JsonValue: TypeAlias = "float | str | Sequence[JsonValue] | Mapping[str, JsonValue] | None"
 
 FIGURES = {
     "velocity_rms_error_rad_s": Key("RMS error", "rad/s", "{:.4f}"),
@@ -30,24 +32,29 @@ FIGURES = {
     "roughness_rad_s": Key("roughness", "rad/s", "{:.4f}"),
     "noise_gain_1_s": Key("noise gain", "1/s", "{:.1f}"),
 }
-"""What a table of a replay can show, in this order."""
+"""Figures of a replay, in the order of its table."""
 
 
 def shown_first(replayed: ReplayResult) -> list[str]:
-    """The few observers that can be followed over each other: with a reference the best, else the first."""
+    """Return the few observers to draw over each other: the best with a reference, else the first."""
     return observers_to_draw({name: replayed.summaries[name] for name in replayed.estimates})
 
 
-def figures_of(replays: Sequence[ReplayResult]) -> dict[str, Any]:
-    """What `cmg-mj replay --json` prints."""
-    found: dict[str, Any] = {"logs": [_figures(replayed) for replayed in replays]}
+def replay_figures(replays: Sequence[ReplayResult]) -> dict[str, JsonValue]:
+    """Return the figures that `cmg-mj replay --json` prints."""
+    figures: dict[str, JsonValue] = {"logs": [log_figures(replayed) for replayed in replays]}
     if len(replays) > 1:
-        found["mean"] = _means(replays)
-    return found
+        figures["mean"] = {
+            name: {"logs": mean.logs, **{key: figure._asdict() for key, figure in mean.figures.items()}}
+            for name, mean in _means(replays).items()
+        }
+    return figures
 
 
-def _figures(replayed: ReplayResult) -> dict[str, Any]:
-    log = replayed.log
+def log_figures(replayed: ReplayResult) -> dict[str, JsonValue]:
+    """Return the figures of one log."""
+    log, noise = replayed.log, replayed.noise
+    acceleration = {"acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}
     return {
         "log": log.name,
         "samples": len(log),
@@ -56,18 +63,11 @@ def _figures(replayed: ReplayResult) -> dict[str, Any]:
         "parts": len(log.parts),
         "has": sorted(log.has),
         "notes": list(log.notes),
-        "skipped_s": replayed.skip_s,
+        "settle_s": replayed.settle_s,
         **({"windows_s": [list(window) for window in log.windows]} if log.windows else {}),
         "noise": {
-            "tilt_rad": replayed.noise.tilt,
-            **(
-                {
-                    "acceleration_rad_s2": replayed.noise.acceleration,
-                    "correlation": replayed.noise.correlation,
-                }
-                if "acceleration" in log.has
-                else {}
-            ),
+            "tilt_rad": noise.tilt,
+            **(acceleration if "acceleration" in log.has else {}),
         },
         **({"reference": replayed.alignment._asdict()} if replayed.alignment else {}),
         "observers": {name: dict(figures) for name, figures in replayed.summaries.items()},
@@ -75,23 +75,36 @@ def _figures(replayed: ReplayResult) -> dict[str, Any]:
     }
 
 
-def _means(replays: Sequence[ReplayResult]) -> dict[str, dict[str, Any]]:
-    """Of every observer the means over the logs that have the figure, and their 95 % intervals."""
+class _Mean(NamedTuple):
+    """Mean of a figure over the logs that have it, with its 95 % interval."""
+
+    mean: float | None
+    interval: list[float] | None
+    logs: int
+
+
+class _ObserverMeans(NamedTuple):
+    """Means of an observer's figures over the logs that it took part in."""
+
+    logs: int
+    figures: dict[str, _Mean]
+
+
+def _means(replays: Sequence[ReplayResult]) -> dict[str, _ObserverMeans]:
+    """Return every observer's means over the logs, the baseline's last."""
     names = [name for name in dict.fromkeys(n for r in replays for n in r.summaries) if name != ZERO]
-    found: dict[str, dict[str, Any]] = {}
+    means = {}
     for name in [*names, ZERO]:
-        figures: dict[str, Any] = {"logs": sum(name in r.summaries for r in replays)}
-        for key in _keys(replays):
-            values = [r.summaries[name].get(key) for r in replays if name in r.summaries]
-            known = [value for value in values if value is not None]
-            interval = known_interval(known)
-            figures[key] = {
-                "mean": sum(known) / len(known) if known else None,
-                "interval": [interval.low, interval.high] if interval and math.isfinite(interval.low) else None,
-                "logs": len(known),
-            }
-        found[name] = figures
-    return found
+        summaries = [replayed.summaries[name] for replayed in replays if name in replayed.summaries]
+        means[name] = _ObserverMeans(len(summaries), {key: _mean_of(summaries, key) for key in _keys(replays)})
+    return means
+
+
+def _mean_of(summaries: Sequence[Figures], key: str) -> _Mean:
+    values = [value for summary in summaries if (value := summary.get(key)) is not None]
+    interval = known_interval(values)
+    ends = [interval.low, interval.high] if interval and math.isfinite(interval.low) else None
+    return _Mean(sum(values) / len(values) if values else None, ends, len(values))
 
 
 def _keys(replays: Sequence[ReplayResult]) -> list[str]:
@@ -99,43 +112,44 @@ def _keys(replays: Sequence[ReplayResult]) -> list[str]:
 
 
 def replay_tables(replays: Sequence[ReplayResult]) -> Group:
-    """What `cmg-mj replay` prints: a table a log, and one over them."""
-    parts: list[Any] = []
+    """Return the tables that `cmg-mj replay` prints: one for each log, and one of the means."""
+    parts: list[RenderableType] = []
     for replayed in replays:
         keys = _keys([replayed])
-        table = _table(described(replayed.log), keys)
+        table = _table(describe_log(replayed.log), keys)
         for name, figures in replayed.summaries.items():
-            table.add_row(name, *(written(key, figures.get(key)) for key in keys))
-        said = [_text(line) for line in remarks(replayed)]
-        parts += [table, *said, *([Text("")] if said else [])]  # a table ends with an empty line of its own
+            table.add_row(name, *(figure_text(key, figures.get(key)) for key in keys))
+        lines = [_text(line) for line in remarks(replayed)]
+        parts += [table, *lines, *([Text("")] if lines else [])]  # a table ends with an empty line of its own
     if len(replays) > 1:
         keys = _keys(replays)
         table = _table(f"Means over {len(replays)} logs, with 95 % intervals", keys)
-        for name, figures in _means(replays).items():
-            few = "" if figures["logs"] == len(replays) else f" ({figures['logs']} logs)"
-            table.add_row(name + few, *(_mean(key, figures[key]) for key in keys))
+        for name, mean in _means(replays).items():
+            few = "" if mean.logs == len(replays) else f" ({mean.logs} logs)"
+            table.add_row(name + few, *(_mean_text(key, mean.figures[key]) for key in keys))
         parts.append(table)
-    return Group(*parts, _text(note(replays)))
+    return Group(*parts, _text(table_note(replays)))
 
 
 def replay_markdown(replays: Sequence[ReplayResult]) -> str:
-    """The same in Markdown."""
+    """Return the tables as Markdown."""
     parts = []
     for replayed in replays:
         keys = _keys([replayed])
         rows = [
-            (f"`{name}`", *(written(key, figures.get(key)) for key in keys))
+            (f"`{name}`", *(figure_text(key, figures.get(key)) for key in keys))
             for name, figures in replayed.summaries.items()
         ]
-        parts += [f"{described(replayed.log)}:", markdown.table(["observer", *map(_heading, keys)], rows)]
+        parts += [f"{describe_log(replayed.log)}:", markdown.table(["observer", *map(_heading, keys)], rows)]
         parts += remarks(replayed)
     if len(replays) > 1:
         keys = _keys(replays)
         rows = [
-            (f"`{n}`", *(_mean(key, f[key]).replace("\n", " ") for key in keys)) for n, f in _means(replays).items()
+            (f"`{name}`", *(_mean_text(key, mean.figures[key]).replace("\n", " ") for key in keys))
+            for name, mean in _means(replays).items()
         ]
         parts += [f"Means over {len(replays)} logs:", markdown.table(["observer", *map(_heading, keys)], rows)]
-    return "\n\n".join([*parts, note(replays)])
+    return "\n\n".join([*parts, table_note(replays)])
 
 
 def _table(title: str, keys: Sequence[str]) -> Table:
@@ -151,19 +165,19 @@ def _heading(key: str) -> str:
     return "lag [ms]" if key == "lag_s" else FIGURES[key].heading
 
 
-def written(key: str, value: float | None) -> str:
-    """A figure as tables show it; a dash where there is none."""
+def figure_text(key: str, value: float | None) -> str:
+    """Format a figure for a table; a dash for None."""
     if value is None:
         return "-"
     return f"{value * 1e3:.2f}" if key == "lag_s" else FIGURES[key].pattern.format(value)
 
 
-def _mean(key: str, figure: Mapping[str, Any]) -> str:
-    text = written(key, figure["mean"])
-    if figure["interval"] is None:
+def _mean_text(key: str, figure: _Mean) -> str:
+    text = figure_text(key, figure.mean)
+    if figure.interval is None:
         return text
-    low, high = figure["interval"]
-    return f"{text}\n±{written(key, (high - low) / 2.0)}"
+    low, high = figure.interval
+    return f"{text}\n±{figure_text(key, (high - low) / 2.0)}"
 
 
 def _text(line: str) -> Text:
@@ -171,7 +185,7 @@ def _text(line: str) -> Text:
 
 
 def remarks(replayed: ReplayResult) -> list[str]:
-    """What was done to one log, what its reference is, and who did not take part."""
+    """Return the remarks on a log and its reference, and the observers left out."""
     lines = remarks_on(replayed.log, replayed.alignment)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
@@ -179,8 +193,8 @@ def remarks(replayed: ReplayResult) -> list[str]:
     return [*lines, *(f"Without {', '.join(names)}: {reason}." for reason, names in reasons.items())]
 
 
-def note(replays: Sequence[ReplayResult]) -> str:
-    """What the tables do not say by themselves."""
+def table_note(replays: Sequence[ReplayResult]) -> str:
+    """Explain the figures of the tables."""
     first = replays[0]
     keys = _keys(replays)
     lines = []
@@ -198,6 +212,6 @@ def note(replays: Sequence[ReplayResult]) -> str:
     size = f"{math.degrees(first.noise.tilt):.3g} deg"
     more = " and the acceleration's beside it" if "acceleration" in first.log.has else ""
     lines.append(f"Noise gain: what white noise of {size} in the tilt{more} makes of the rate, by that size.")
-    if first.skip_s:
-        lines.append(f"Judged from {first.skip_s:g} s after each start on.")
+    if first.settle_s:
+        lines.append(f"Scored from {first.settle_s:g} s after each start on.")
     return "\n".join(lines)

@@ -1,18 +1,16 @@
-"""What a replay writes."""
+"""The files that a replay writes."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import tomli_w
 
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.plot import plot_replay
-from cmg_mj.replay.report import figures_of
+from cmg_mj.replay.report import JsonValue, log_figures, replay_figures
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
@@ -21,26 +19,24 @@ from cmg_mj.scenario.differences import safe_name
 SETTINGS = "replay.toml"
 
 
-def distinct(names: Sequence[str]) -> list[str]:
-    """Logs' names as parts of file names, no two alike: a number behind those that have come before."""
-    found: list[str] = []
+def distinct_names(names: Sequence[str]) -> list[str]:
+    """Return logs' names as parts of file names, the repeated ones numbered."""
+    distinct: list[str] = []
     for name in map(safe_name, names):
-        number, wanted = 1, name
-        while wanted.casefold() in [one.casefold() for one in found]:
+        number, candidate = 1, name
+        while candidate.casefold() in [other.casefold() for other in distinct]:
             number += 1
-            wanted = f"{name}-{number}"
-        found.append(wanted)
-    return found
+            candidate = f"{name}-{number}"
+        distinct.append(candidate)
+    return distinct
 
 
 def files_of_replay(names: Sequence[str]) -> list[str]:
-    """Names of what a replay of these logs writes."""
-    each = (
-        [("signals.parquet", "plot.png")]
-        if len(names) == 1
-        else [(f"signals-{name}.parquet", f"plot-{name}.png") for name in names]
-    )
-    return ["summary.json", SETTINGS, "recording.rrd", *(file for files in each for file in files)]
+    """Return the names of the files of a replay of some logs."""
+    files = ["summary.json", SETTINGS, "recording.rrd"]
+    for suffix in [""] if len(names) == 1 else [f"-{name}" for name in names]:
+        files += [f"signals{suffix}.parquet", f"plot{suffix}.png"]
+    return files
 
 
 def save_replay(
@@ -54,49 +50,44 @@ def save_replay(
     """Write summary.json, replay.toml, recording.rrd, and of every log signals.parquet and plot.png, all at once.
 
     Args:
-        folder: Where. What is there and was not written by cmg_mj stays.
-        replays: What to write.
-        names: The logs' names, from `distinct`.
-        settings_toml: What was asked for.
-        complete: Whether these are all logs that were to be replayed.
+        folder: The folder. Files in it that cmg_mj did not write stay.
+        replays: The replays.
+        names: The logs' names, from `distinct_names`.
+        settings_toml: The request, as TOML.
+        complete: Whether these are all logs that were requested.
 
     Returns:
-        Where they are: the folder, or one in it (see `RunFolder.write`).
+        The folder of the files: the given one, or one in it (see `RunFolder.write`).
 
     Raises:
         InputError: The folder, or a file, cannot be written.
     """
-    writers: list[Any] = [
-        lambda path: write_text(path, json.dumps(finite_throughout(figures_of(replays)), indent=2)),
+    writers: list[Callable[[Path], None]] = [
+        lambda path: write_text(path, json.dumps(finite_throughout(replay_figures(replays)), indent=2)),
         lambda path: write_text(path, settings_toml),
         lambda path: _record(path, replays, names, settings_toml),
     ]
     for replayed in replays:
         writers += [signals(replayed).save, lambda path, replayed=replayed: plot_replay(path, replayed)]
-    with claimed(folder) as it:
-        return it.write(dict(zip(files_of_replay(names), writers, strict=True)), complete=complete)
+    with claimed(folder) as claim:
+        return claim.write(dict(zip(files_of_replay(names), writers, strict=True)), complete=complete)
 
 
 def signals(replayed: ReplayResult) -> Trajectory:
-    """All signals and estimates of a log as one table, evenly sampled, in SI and radians."""
+    """Return all signals and estimates of a log as one table, evenly sampled, in SI and radians."""
     log = replayed.log
-    kept = [name for name in log.columns if np.isfinite(log[name]).any()]
+    known = [name for name in log.columns if np.isfinite(log[name]).any()]
     names = tuple(replayed.estimates)
     extra = tuple(tuple(name for name in replayed.estimates[kind] if name not in ESTIMATES) for kind in names)
-    columns = {name: np.ascontiguousarray(log[name]) for name in kept}
+    columns = {name: np.ascontiguousarray(log[name]) for name in known}
     for kind in names:
         columns |= {f"estimate/{kind}/{name}": values for name, values in replayed.estimates[kind].items()}
-    metadata = {"replay": finite_throughout(figures_of([replayed])["logs"][0])}
+    metadata = {"replay": finite_throughout(log_figures(replayed))}
     return Trajectory(columns, metadata, Layout(names, extra))
 
 
-def settings_of(paths: Sequence[str], replay: Mapping[str, Any], read: Mapping[str, Any]) -> str:
-    """What was asked for, as TOML: the logs, how they were read, and with what they were replayed."""
-    return tomli_w.dumps({"logs": list(paths), **({"log": dict(read)} if read else {}), "replay": dict(replay)})
-
-
-def finite_throughout(value: Any) -> Any:
-    """None for numbers that JSON does not know, in lists too."""
+def finite_throughout(value: JsonValue) -> JsonValue:
+    """Replace numbers that JSON does not know by None, in lists and tables too."""
     if isinstance(value, list):
         return [finite_throughout(item) for item in value]
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""How good an estimate of the rate is on a log: against a reference, or without one by what it makes of the tilt."""
+"""Scores of an estimated rate on a log: against the reference, or, without one, against the tilt."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.scenario.disturbances import inside
 
 RECONSTRUCTED_S = 1.0
-"""The estimated rate is integrated over so long at a time [s]."""
+"""Length of the stretches over which the estimated rate is integrated [s]."""
+
+Figures = dict[str, float | None]
+"""Name -> figure; None where it does not exist."""
 
 
-def scores(log: Log, rate: np.ndarray, scored: np.ndarray) -> dict[str, float | None]:
-    """The figures of one estimate.
+def scores(log: Log, rate: np.ndarray, scored: np.ndarray) -> Figures:
+    """Compute the figures of one estimate.
 
     Args:
         log: The log.
@@ -24,7 +27,7 @@ def scores(log: Log, rate: np.ndarray, scored: np.ndarray) -> dict[str, float | 
         scored: Which samples count, (n,).
 
     Returns:
-        By the names that `--json` prints; None where there is no such number.
+        The figures by the names that `--json` prints.
     """
     if "reference" in log.has:
         return _against(log, rate, scored)
@@ -34,7 +37,7 @@ def scores(log: Log, rate: np.ndarray, scored: np.ndarray) -> dict[str, float | 
     }
 
 
-def _against(log: Log, rate: np.ndarray, scored: np.ndarray) -> dict[str, float | None]:
+def _against(log: Log, rate: np.ndarray, scored: np.ndarray) -> Figures:
     true = log[REFERENCE]
     counted = scored & np.isfinite(true)
     error, motion = _rms((rate - true)[counted]), _rms(true[counted])
@@ -52,7 +55,7 @@ def _against(log: Log, rate: np.ndarray, scored: np.ndarray) -> dict[str, float 
 
 
 def _lag(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
-    """How long the estimate comes after the reference [s]."""
+    """Find the lag of the estimate behind the reference [s]."""
     true = np.where(scored, log[REFERENCE], np.nan)
     rate = np.where(scored & np.isfinite(rate), rate, np.nan)
     pieces = _pieces(log, scored)
@@ -60,10 +63,10 @@ def _lag(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
 
 
 def reconstruction(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
-    """RMS of the tilt integrated from an estimated rate less the measured tilt.
+    """Compute the RMS of the tilt integrated from an estimated rate less the measured tilt.
 
-    By the trapezoidal rule, `RECONSTRUCTED_S` at a time, each with the constant that fits it best: what the rate misses
-    over a second, not what a small offset of it becomes in an hour.
+    The rate is integrated by the trapezoidal rule over `RECONSTRUCTED_S` at a time, each with the constant that fits
+    best: the error over a second counts, not what a small offset becomes in an hour.
 
     Args:
         log: The log.
@@ -71,7 +74,7 @@ def reconstruction(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | No
         scored: Which samples count, (n,).
 
     Returns:
-        The error [deg]; None if no stretch is as long.
+        The error [deg]; None if no stretch is long enough.
     """
     span = max(2, round(RECONSTRUCTED_S / log.dt) + 1)
     errors = []
@@ -86,7 +89,7 @@ def reconstruction(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | No
 
 
 def roughness(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
-    """The size of the white noise whose second differences are as large as an estimate's.
+    """Compute the size of the white noise whose second differences are as large as an estimate's.
 
     Args:
         log: The log.
@@ -102,22 +105,22 @@ def roughness(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
 
 
 def noise_gain(response: np.ndarray, size: float, scored: np.ndarray) -> float | None:
-    """By how much white noise of the tilt comes out of an estimate.
+    """Compute the gain from white noise of the tilt to an estimate.
 
     Args:
-        response: What the noise has changed in the estimate, (n,) [rad/s].
+        response: The change of the estimate due to the noise, (n,) [rad/s].
         size: Standard deviation of one sample of the noise [rad].
         scored: Which samples count, (n,).
 
     Returns:
-        RMS of the response by that [1/s].
+        RMS of the response, divided by the size [1/s].
     """
     rms = _rms(response[scored])
     return None if rms is None or not size > 0.0 else rms / size
 
 
 def _pieces(log: Log, scored: np.ndarray) -> list[slice]:
-    """What is scored of each part."""
+    """Return the scored slice of each part."""
     pieces = []
     for part in log.parts:
         counted = np.flatnonzero(scored[part])
@@ -127,7 +130,7 @@ def _pieces(log: Log, scored: np.ndarray) -> list[slice]:
 
 
 def _rms(values: np.ndarray) -> float | None:
-    """None of none, or if one is not finite."""
+    """Return the RMS; None of no values, or if one is not finite."""
     if not len(values):
         return None
     with np.errstate(over="ignore", invalid="ignore"):
@@ -135,7 +138,7 @@ def _rms(values: np.ndarray) -> float | None:
 
 
 def _fit(error: float | None, motion: float | None) -> float | None:
-    """1 - error/motion: 1 is the reference, 0 an estimate of zero."""
+    """Return 1 - error/motion: 1 for the reference, 0 for an estimate of zero."""
     return _number(1.0 - error / motion) if motion and error is not None else None
 
 

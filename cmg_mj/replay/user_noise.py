@@ -1,4 +1,4 @@
-"""What observers are told of the sensors' noise."""
+"""The sensors' noise that observers assume."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.tilt import TiltNoise
 
 TILT_NOISE_DEG = 0.1
-"""What observers are told of the noise of a tilt of unknown make: standard deviation of one sample [deg]."""
+"""Assumed noise of a tilt from an unknown sensor: standard deviation of one sample [deg]."""
 ACCELERATION_NOISE_RAD_S2 = 1.0
-"""The same of an angular acceleration that does not come from two accelerometers [rad/s^2]."""
+"""Assumed noise of an angular acceleration that does not come from two accelerometers [rad/s^2]."""
 NOISE_DENSITY_UG_RTHZ = 400.0
-"""The same of two accelerometers, the bench's own [ug/sqrt(Hz)]."""
+"""Assumed noise density of two accelerometers, the bench's own [ug/sqrt(Hz)]."""
 NOISES = ("accelerometer", "tilt", "acceleration")
-"""Of `--noise`."""
+"""Names of `--noise`."""
 
 
 def noise_of(
@@ -39,7 +39,7 @@ def noise_of(
         acceleration_rad_s2: One sample's of another angular acceleration [rad/s^2].
 
     Returns:
-        Both, and their correlation.
+        The noise of tilt and acceleration, and their correlation.
     """
     if log.tilt is not None:
         density = NOISE_DENSITY_UG_RTHZ if accelerometer_ug_rthz is None else accelerometer_ug_rthz
@@ -51,20 +51,20 @@ def noise_of(
 
 
 def noise_numbers(text: str) -> dict[str, float]:
-    """`--noise tilt=0.05,acceleration=2` -> by name: ug/rtHz, deg, rad/s^2."""
-    found = numbers(text, "--noise", NOISES) if text.strip() else {}
-    for name, value in found.items():
+    """Parse `--noise tilt=0.05,acceleration=2` [ug/rtHz, deg, rad/s^2]."""
+    noises = numbers(text, "--noise", NOISES) if text.strip() else {}
+    for name, value in noises.items():
         if not value > 0.0:
             raise InputError(f"--noise {name}={value:g}: must be greater than 0")
-    return found
+    return noises
 
 
-def noise_told(log: Log, noises: Mapping[str, float]) -> TiltNoise | None:
-    """The noise of a user's log by what `noise_numbers` gives; None if that is nothing."""
+def noise_from(log: Log, noises: Mapping[str, float]) -> TiltNoise | None:
+    """Return the noise of a user's log from `noise_numbers`; None without any."""
     if not noises:
         return None
     if log.tilt is not None and ({"tilt", "acceleration"} & noises.keys()):
-        raise InputError("--noise: of two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
+        raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
     if log.tilt is None and "accelerometer" in noises:
         raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
     return noise_of(

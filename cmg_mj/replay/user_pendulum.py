@@ -1,4 +1,4 @@
-"""The pendulum of a log: a rig, or numbers of the user's own."""
+"""The pendulum of a log: a plant's MJCF, or the user's own numbers."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ NUMBERS = {
     "momentum": "spin momentum of the flywheels together, J_d omega_d [N m s]",
     "gimbal_inertia": "what the gimbals' turn by 90 degrees adds to the inertia, J2 [kg m^2]",
 }
-"""Of `--model`: the first two must be given, the others are 0 for a pendulum without gimbals."""
+"""Numbers of `--model`. The first two are required; the others are 0 for a pendulum without gimbals."""
 
 
 def model_of(text: str) -> ReducedModel:
-    """A user's pendulum.
+    """Return the reduced model of a user's pendulum.
 
     Args:
-        text: An MJCF rig's path or bundled name, or numbers, `inertia=0.06,gravity_torque=3.4,...` (`NUMBERS`).
+        text: Path or bundled name of a plant's MJCF, or numbers, `inertia=0.06,gravity_torque=3.4,...` (`NUMBERS`).
 
     Returns:
-        Its reduced model.
+        The reduced model.
 
     Raises:
-        InputError: There is no such file or rig, or the numbers are not as they must be.
+        InputError: There is no such file, or a number is missing or impossible.
     """
     if "=" not in text:
-        return rig_of(parse_scenario({"plant": {"model": text}}, f"--model {text}")).reduced
-    found = numbers(text, "--model", NUMBERS)
+        return plant_parameters_of(parse_scenario({"plant": {"model": text}}, f"--model {text}")).reduced
+    values = numbers(text, "--model", NUMBERS)
     for name in ("inertia", "gravity_torque"):
-        if name not in found:
+        if name not in values:
             raise InputError(f"--model: {name} is missing: {NUMBERS[name]}")
-    inertia, added = found["inertia"], found.get("gimbal_inertia", 0.0)
+    inertia, added = values["inertia"], values.get("gimbal_inertia", 0.0)
     if not inertia > 0.0 or not inertia + added > 0.0:
         raise InputError("--model: inertia, and inertia + gimbal_inertia, must be greater than 0 [kg m^2]")
-    return ReducedModel(inertia, added, found.get("momentum", 0.0), 1.0, found["gravity_torque"])
+    return ReducedModel(inertia, added, values.get("momentum", 0.0), 1.0, values["gravity_torque"])
 
 
-def rig_of(scenario: Scenario) -> PlantParameters:
-    """The parameters of a scenario's rig."""
+def plant_parameters_of(scenario: Scenario) -> PlantParameters:
+    """Return the parameters of a scenario's plant."""
     experiment = prepare(scenario)
     experiment.require_single_axis("replay")
     return experiment.plant.parameters

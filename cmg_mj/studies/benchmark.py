@@ -1,4 +1,4 @@
-"""How fast the closed loop is, against bare MuJoCo in the same run, and what an observer's update costs."""
+"""Speed of the closed loop against bare MuJoCo in the same run, and cost of an observer's update."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from mujoco.batch import Batch
 from rich import box
 from rich.table import Table
 
+from cmg_mj.elementwise import Scalar
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import parse_scenario
@@ -25,7 +26,9 @@ REPEATS = 7
 ONE_WORLD_S = 6.0
 MANY_WORLDS_S = 1.0
 UPDATES = 400
-"""So many updates of an observer are timed at once, along a recorded run."""
+"""Updates of an observer that are timed at once, along a recorded run."""
+
+Signal = Sequence[Scalar] | np.ndarray
 
 
 def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float], None]) -> dict[str, Any]:
@@ -37,10 +40,10 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
     Args:
         observers: Names of the observers.
         worlds: Worlds of the batch.
-        on_progress: Called with the share done.
+        on_progress: Called with the completed share.
 
     Returns:
-        The figures, as `--json` prints them.
+        The figures that `cmg-mj bench loop --json` prints.
 
     Raises:
         InputError: An observer does not exist.
@@ -84,7 +87,7 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
 
 
 def bench_table(figures: dict[str, Any]) -> Table:
-    """The table that `cmg-mj bench` prints."""
+    """Return the table that `cmg-mj bench loop` prints."""
     load = figures["load_before"]
     busy = "" if load is None else f", {load:.1f} processes wanted one before"
     table = Table(
@@ -127,8 +130,8 @@ def update_us(experiment: Experiment, worlds: int | None) -> float | None:
     """Microseconds of one update of the observer, the median of some repeats along a recorded run.
 
     Args:
-        experiment: Whose observer, and whose motion.
-        worlds: So many worlds at once, on arrays; None for one, on floats.
+        experiment: Gives the observer and the motion.
+        worlds: Number of worlds at once, on arrays; None for one world, on floats.
 
     Returns:
         The time [us]; None for an observer that raises, or a rig that falls at once.
@@ -144,9 +147,7 @@ def update_us(experiment: Experiment, worlds: int | None) -> float | None:
         return None
 
 
-def time_of_update(
-    observer: Observer, y1: Sequence[Any], y2: Sequence[Any], acceleration: Sequence[Any], u: Sequence[Any]
-) -> float:
+def time_of_update(observer: Observer, y1: Signal, y2: Signal, acceleration: Signal, u: Signal) -> float:
     """Microseconds of one update along given signals, the median of some repeats.
 
     Args:
@@ -187,7 +188,7 @@ def _scenario(observer: str, rate: float, duration_s: float) -> Scenario:
 
 
 class _Cost(NamedTuple):
-    """What a simulated world-second takes [s]."""
+    """Time for a simulated second of one world [s]."""
 
     wall: float
     cpu: float
@@ -205,13 +206,13 @@ def _timed(work: Callable[[], float], worlds: int) -> _Cost:
 def _bare_one(experiment: Experiment) -> _Cost:
     """MuJoCo alone on one world: a forward pass where sensors are read, then steps."""
     model, data = experiment.plant.model, experiment.plant.new_data()
-    looks, steps = _looks(experiment)
+    samples, steps = _samples(experiment)
 
     def work() -> float:
-        for _ in range(looks):
+        for _ in range(samples):
             mujoco.mj_forward(model, data)
             mujoco.mj_step(model, data, steps)
-        return looks * steps * model.opt.timestep
+        return samples * steps * model.opt.timestep
 
     return _timed(work, 1)
 
@@ -219,16 +220,16 @@ def _bare_one(experiment: Experiment) -> _Cost:
 def _bare_many(experiment: Experiment, worlds: int) -> _Cost:
     """MuJoCo's Batch alone: the same."""
     model, data = experiment.plant.model, experiment.plant.new_data()
-    looks, steps = _looks(experiment)
+    samples, steps = _samples(experiment)
     batch = Batch(model, worlds)
     for field in ("qpos", "qvel", "act", "ctrl"):
         batch.bind(field)[:] = getattr(data, field)
 
     def work() -> float:
-        for _ in range(looks):
+        for _ in range(samples):
             batch.forward()
             batch.step(nstep=steps)
-        return looks * steps * model.opt.timestep
+        return samples * steps * model.opt.timestep
 
     return _timed(work, worlds)
 
@@ -244,18 +245,18 @@ def _closed_many(experiment: Experiment, worlds: int) -> _Cost:
 
 
 def _finished(result: Result) -> Result:
-    """The result, unless Ctrl-C has cut it short: that ends the measurement."""
+    """Return the result of a complete run; an interrupted run ends the measurement."""
     if any(outcome.kind == "interrupted" for outcome in result.outcomes):
         raise KeyboardInterrupt
     return result
 
 
-def _looks(experiment: Experiment) -> tuple[int, int]:
-    """How often a run looks at its sensors, and the physics steps in between."""
+def _samples(experiment: Experiment) -> tuple[int, int]:
+    """Return the number of sensor samples of a run, and the physics steps between two."""
     steps = experiment.controller().steps_per_sample
     return round(experiment.scenario.duration_s / (experiment.plant.timestep * steps)), steps
 
 
 def _load() -> float | None:
-    """How many processes wanted a processor in the last minute; None where the system does not say."""
+    """Return the load average of the last minute; None where the system has none."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None

@@ -3,7 +3,7 @@
 python docs/studies/for_a_builder.py [--worlds 20] (about two minutes on two quiet cores)
 
 Errors are those of `cmg-mj compare push_recovery`: the same worlds and noise for every observer, each in its own loop.
-How much bias a loop bears is `bias_limits.py`'s, under the same push. Instructions are those of `cmg-mj bench --board`;
+How much bias a loop bears is `bias_limits.py`'s, under the same push. Instructions are those of `cmg-mj bench board`;
 without the tools for that they are left out.
 """
 

@@ -17,7 +17,7 @@ mpl.use("agg")
 import matplotlib.pyplot as plt
 
 from cmg_mj import mount
-from cmg_mj.studies.push_limits.mount_report import PUSHED_AT_S, write_scenario
+from cmg_mj.studies.push_limits.mount_files import PUSHED_AT_S, write_scenario
 from cmg_mj.studies.push_limits.prospects import prospects
 from cmg_mj.visualization.plots.colours import colour, hexadecimal
 

@@ -21,7 +21,7 @@ from cmg_mj import mount
 from cmg_mj.results.markdown import table
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits.largest_push import PUSH_S
-from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.push_limits.prospects import prospects
 from tests.plant.mounting.robots import ROBOTS, Robot
 
@@ -56,9 +56,9 @@ def row(name: str, robot: Robot, folder: Path) -> list[str]:
         "its feet or wheels" if robot.on_contacts else "a hinge",
         f"{robot.options.get('scale', 1.0):g}",
         f"{figures['inertia_kg_m2']:.3g}",
-        f"{can.ceiling.pole:.2f}, {can.pole:.2f}",
-        f"{figures['ceiling_tilt_deg']:.1f}",
-        f"{can.ceiling_push:.2f}",
+        f"{can.limit.pole:.2f}, {can.pole:.2f}",
+        f"{figures['limit_tilt_deg']:.1f}",
+        f"{can.limit_push_impulse:.2f}",
         f"{can.push_margin.median_impulse:.2f} ({can.fraction_of_limit:.0%})",
         f"{simulated(pushed, torque):.2f} E",
         f"{stood(pushed, push__0__torque_n_m=0.0)}, {stood(pushed, push__0__torque_n_m=0.6 * torque)}",

@@ -1,6 +1,6 @@
 """Choose L and Sigma of `adaptive`: velocity error against bias error, with the observer in the loop.
 
-Riding along on the gyro's loop, as `cmg-mj tune` does, nothing can be tuned here: the rig hardly moves but for the
+Open loop on the gyro's loop, as `cmg-mj tune` does, nothing can be tuned here: the rig hardly moves but for the
 push, and an estimate of zero is as good as the best. So the loop is closed on the observer, at three biases, with the
 push of push_recovery and without. L is parametrised by the poles of A + L C2 (natural frequency w and damping ratio),
 Sigma by the rate s at which a bias is learnt: s = Sigma Gamma T1^2 with T1 = (M/J1)/w^2, the steady solution of (8).

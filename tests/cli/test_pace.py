@@ -29,7 +29,7 @@ def test_the_pace_is_of_what_was_done_since(seconds: float, done: int, said: str
     clock = Clock()
     pace = ProgressRate("trials", 20_000, 400, clock)
     clock.now += seconds
-    assert pace.said(done) == said
+    assert pace.text(done) == said
 
 
 def test_without_a_terminal_a_line_a_minute(capsys: pytest.CaptureFixture[str]) -> None:

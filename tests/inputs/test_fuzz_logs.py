@@ -12,7 +12,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.replay.log_replay import replay_log
-from cmg_mj.replay.logs import read_log
+from cmg_mj.replay.logs import ReadOptions, read_log
 from tests.inputs.test_fuzz import GROUP, TEXTS, broken, no_hang
 from tests.replay.logs.motion import sine, tilt, write_csv
 
@@ -78,7 +78,9 @@ def test_logs(first: int, monkeypatch: pytest.MonkeyPatch) -> None:
         rate = None if "time" in roles and rng.random() < 0.7 else float(rng.choice([1.0, 100.0, 1e5]))
         try:
             with no_hang():
-                replayed = replay_log(read_log(path, roles, rate_hz=rate), ["linear", "finite_difference"], skip_s=0.1)
+                replayed = replay_log(
+                    read_log(path, ReadOptions(roles, rate_hz=rate)), ["linear", "finite_difference"], settle_s=0.1
+                )
             right += 1
             assert replayed.summaries["zero"]["noise_gain_1_s"] == 0.0
         except InputError as error:

@@ -88,6 +88,6 @@ def test_floats_and_arrays_are_not_mixed() -> None:
 def test_bench_says_what_it_can_of_an_observer_that_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("REPEATS", 1), ("ONE_WORLD_S", 0.1), ("MANY_WORLDS_S", 0.1), ("CONTROL_RATES_HZ", (200.0,))):
         monkeypatch.setattr(f"cmg_mj.studies.benchmark.{name}", value)
-    said = cmg_mj("bench", "--observers", f"{__name__}:RaisesLate", "--worlds", 2)
+    said = cmg_mj("bench", "loop", "--observers", f"{__name__}:RaisesLate", "--worlds", 2)
     assert said.status == 0, said.err
     assert said.out.splitlines()[-1].split()[-2:] == ["-", "-"]

@@ -1,4 +1,4 @@
-"""`cmg-mj replay` and `cmg-mj tune --log` as a user types them."""
+"""`cmg-mj replay` and `cmg-mj tune-log` as a user types them."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ def test_its_recording() -> None:
 
 def test_the_same_replay_goes_to_the_same_folder() -> None:
     for wanted in ("runs/replay-sine", "runs/replay-sine", "runs/replay-sine-2"):
-        skip = ("--skip", "0.5") if wanted.endswith("2") else ()
-        assert f"Written to {wanted}." in replay("sine.csv", "--columns", PLAIN, *skip).err
+        settle = ("--settle-s", "0.5") if wanted.endswith("2") else ()
+        assert f"Written to {wanted}." in replay("sine.csv", "--columns", PLAIN, *settle).err
 
 
 def test_several_logs() -> None:
@@ -120,7 +120,7 @@ def test_markdown_and_table_say_the_same() -> None:
         (("--columns", PLAIN, "--delay", "nan"), "--delay nan: must be a finite number"),
         (("--columns", PLAIN, "--scale", "rate=x"), "--scale rate=x: must be a number"),
         (("--columns", PLAIN, "--radii", "1"), "write INNER,OUTER"),
-        (("--columns", PLAIN, "--between", "5:1"), "must end after its start"),
+        (("--columns", PLAIN, "--time-range", "5:1"), "must end after its start"),
         (("--columns", PLAIN, "--window", "a"), "--window 'a': write START:END"),
         (("--columns", PLAIN, "--observers", "liner"), "did you mean 'linear'?"),
         (
@@ -129,7 +129,7 @@ def test_markdown_and_table_say_the_same() -> None:
         ),
         (("--columns", PLAIN, "--set", "ltv.nope=3"), "observer.nope: ltv has no such parameter"),
         (("--columns", PLAIN, "--set", "linear.tau=-1"), "tau = -1: must be a number greater than 0"),
-        (("--columns", PLAIN, "--skip", "nan"), "--skip nan"),
+        (("--columns", PLAIN, "--settle-s", "nan"), "--settle-s nan"),
         (("--columns", PLAIN, "--noise", "accelerometer=3"), "the tilt is not that of two accelerometers"),
         (("--columns", PLAIN, "--noise", "tilt=0.05,tilt=0.1"), "--noise tilt: given twice"),
         (("--columns", "time=t_s,tilt=tilt_rad", "--window", "2:4"), "--window: there is no reference"),
@@ -154,8 +154,8 @@ def test_a_window_of_ones_own() -> None:
 
 def test_tune_on_a_log() -> None:
     """Of a sine without noise the smallest time constant is the best; fitted on one part, scored on the other."""
-    arguments = ("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    said = cmg_mj("tune", *arguments, "--split", "0.3", "--json", "--out", "it")
+    arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
+    said = cmg_mj("tune-log", *arguments, "--split", "0.3", "--json", "--out", "it")
     found = json.loads(said.out)
     assert found["parameters"]["tau"] == pytest.approx(0.004, rel=0.01)
     assert found["at_a_limit"] == ["tau"]
@@ -166,28 +166,18 @@ def test_tune_on_a_log() -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("observer_tuning", "--log", "sine.csv", "--columns", PLAIN, "--observer", "linear"), "not both"),
-        (("--log", "sine.csv", "--columns", PLAIN), "say which observer"),
-        (
-            ("--log", "sine.csv", "--columns", "time=t_s,tilt=tilt_rad", "--observer", "linear"),
-            "no reference to tune to",
-        ),
-        (("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--split", "1"), "between 0 and 1"),
-        (("--log", "sine.csv", "--columns", PLAIN, "--observer", "ltv"), "needs a model"),
-        (("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--worlds", "20"), "--worlds: is for a"),
-        (("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--seed", "1"), "--seed: is for a scenario"),
-        (
-            ("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--noise", "100,200"),
-            "--noise 100,200: den",
-        ),
-        (("observer_tuning", "--columns", PLAIN), "is for --log"),
-        (("observer_tuning", "--max-gap", "1"), "--max-gap: is for --log"),
-        (("observer_tuning", "--split", "0.5"), "--split: is for --log"),
-        ((), "name a scenario"),
+        (("sine.csv", "--columns", PLAIN), "Missing option '--observer'"),
+        (("sine.csv", "--columns", "time=t_s,tilt=tilt_rad", "--observer", "linear"), "no reference to tune to"),
+        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--split", "1"), "between 0 and 1"),
+        (("sine.csv", "--columns", PLAIN, "--observer", "ltv"), "needs a model"),
+        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--worlds", "20"), "No such option"),
+        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--noise", "100,200"), "--noise 100: no such"),
+        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--set", "tau=1"), "write observer.PARAMETER=VALUE"),
+        ((), "Missing argument 'LOG...'"),
     ],
 )
 def test_wrong_tuning(arguments: tuple, says: str) -> None:
-    assert says in cmg_mj("tune", *arguments).complaint
+    assert says in cmg_mj("tune-log", *arguments).complaint
 
 
 def test_a_real_log_has_its_licence_beside_it() -> None:
@@ -223,8 +213,8 @@ def test_the_same_log_twice() -> None:
     assert replay("sine.csv", "./sine.csv", "--columns", PLAIN).complaint.endswith(
         "./sine.csv: the same log as sine.csv"
     )
-    arguments = ("--log", "sine.csv", "--log", "sine.csv", "--columns", PLAIN, "--observer", "linear")
-    assert "sine.csv: given twice" in cmg_mj("tune", *arguments).complaint
+    arguments = ("sine.csv", "sine.csv", "--columns", PLAIN, "--observer", "linear")
+    assert "sine.csv: given twice" in cmg_mj("tune-log", *arguments).complaint
 
 
 def test_its_help_has_its_examples_on_lines_of_their_own() -> None:
@@ -234,7 +224,7 @@ def test_its_help_has_its_examples_on_lines_of_their_own() -> None:
 
 
 def test_what_was_tuned_can_be_replayed() -> None:
-    arguments = ("--log", "sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    said = " ".join(cmg_mj("tune", *arguments, "--out", "it").err.split())
+    arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
+    said = " ".join(cmg_mj("tune-log", *arguments, "--out", "it").err.split())
     assert "Replay it tuned: --set 'linear.tau=0.004'" in said
     assert replay("sine.csv", "--columns", PLAIN, "--set", "linear.tau=0.004").status == 0

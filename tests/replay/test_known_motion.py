@@ -13,7 +13,7 @@ from cmg_mj.replay import replay
 from cmg_mj.replay.alignment import alignment
 from cmg_mj.replay.lag import lag
 from cmg_mj.replay.log_replay import ReplayResult, replay_log
-from cmg_mj.replay.logs import read_log
+from cmg_mj.replay.logs import ReadOptions, read_log
 from cmg_mj.results.trajectory import Trajectory
 from tests.observers.reference import PAPER
 from tests.replay.logs.motion import AMPLITUDE, COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
@@ -24,7 +24,7 @@ GAIN = math.sin(OMEGA * DT / 2.0) / (OMEGA * DT / 2.0)
 
 
 def replayed(tmp_path: Path) -> ReplayResult:
-    return replay_log(read_log(write_csv(tmp_path / "sine.csv", sine()), COLUMNS), skip_s=1.0)
+    return replay_log(read_log(write_csv(tmp_path / "sine.csv", sine()), ReadOptions(COLUMNS)), settle_s=1.0)
 
 
 def test_the_difference_of_a_sine(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_zero_has_a_fit_of_zero_and_no_lag(tmp_path: Path) -> None:
 def test_without_a_reference(tmp_path: Path) -> None:
     """The difference's integral is the mean of two measured tilts: half a step behind."""
     path = write_csv(tmp_path / "sine.csv", sine())
-    found = replay_log(read_log(path, {"time": "t_s", "tilt": "tilt_rad"})).summaries
+    found = replay_log(read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}))).summaries
     assert set(found["finite_difference"]) == {"reconstruction_rms_deg", "roughness_rad_s", "noise_gain_1_s"}
     step = 2.0 * AMPLITUDE * math.sin(OMEGA * DT / 2.0) / math.sqrt(2.0)
     assert found["finite_difference"]["reconstruction_rms_deg"] == pytest.approx(math.degrees(step / 2.0), rel=5e-3)
@@ -75,7 +75,7 @@ def test_roughness_of_white_noise_is_its_size(tmp_path: Path) -> None:
     steps = np.random.default_rng(1).standard_normal(N) * 0.01
     columns = {"t_s": DT * np.arange(N), "tilt_rad": np.cumsum(steps) * DT}
     path = write_csv(tmp_path / "walk.csv", columns)
-    found = replay_log(read_log(path, {"time": "t_s", "tilt": "tilt_rad"})).summaries
+    found = replay_log(read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}))).summaries
     assert found["finite_difference"]["roughness_rad_s"] == pytest.approx(0.01, rel=0.05)
 
 
@@ -84,13 +84,13 @@ def test_a_late_reference_is_noticed_and_taken_back(tmp_path: Path, late: float)
     t = DT * np.arange(N)
     columns = {"t_s": t, "tilt_rad": tilt(t), "gyro_rad_s": rate(t - late) / 1.015 - 0.02}
     path = write_csv(tmp_path / "late.csv", columns)
-    found = replay_log(read_log(path, COLUMNS)).alignment
+    found = replay_log(read_log(path, ReadOptions(COLUMNS))).alignment
     assert found is not None
     assert found.lag_s == pytest.approx(late, abs=2e-5)
     assert found.scale == pytest.approx(1.015, rel=1e-3)
     assert found.offset_rad_s == pytest.approx(1.015 * 0.02, rel=1e-2)
-    corrected = read_log(path, COLUMNS, delay_s=late, scale={"rate": 1.015}, offset={"rate": 1.015 * 0.02})
-    once = replay_log(read_log(write_csv(tmp_path / "sine.csv", sine()), COLUMNS)).summaries
+    corrected = read_log(path, ReadOptions(COLUMNS, delay_s=late, scale={"rate": 1.015}, offset={"rate": 1.015 * 0.02}))
+    once = replay_log(read_log(write_csv(tmp_path / "sine.csv", sine()), ReadOptions(COLUMNS))).summaries
     for name, figures in replay_log(corrected).summaries.items():
         assert figures["velocity_rms_error_rad_s"] == pytest.approx(once[name]["velocity_rms_error_rad_s"], rel=1e-3)
 

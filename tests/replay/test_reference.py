@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.replay.logs import read_log
+from cmg_mj.replay.logs import ReadOptions, read_log
 from cmg_mj.replay.reference import AGREES, alignment_of, remarks_on
 from tests.command import ROOT, cmg_mj
 from tests.replay.logs.motion import COLUMNS, DT, N, sine, write_csv
@@ -17,7 +17,7 @@ ENCODER = {"time": "time_s", "tilt": "encoder_rad", "rate": "gyr_y_rad_s"}
 
 
 def remarks(path: Path, columns: dict[str, str] = COLUMNS, **given) -> list[str]:
-    log = read_log(path, columns, **given)
+    log = read_log(path, ReadOptions(columns, **given))
     return remarks_on(log, alignment_of(log))
 
 
@@ -39,7 +39,7 @@ def test_a_cure_is_offered_from_the_criterion_on(noise: float, tmp_path: Path) -
     log = sine()
     noisy = log["tilt_rad"] + noise * np.random.default_rng(0).standard_normal(N)
     path = written(tmp_path, tilt_rad=noisy, gyro_rad_s=0.5 * log["gyro_rad_s"])
-    found = alignment_of(read_log(path, COLUMNS))
+    found = alignment_of(read_log(path, ReadOptions(COLUMNS)))
     assert found is not None
     assert found.correlation is not None
     (said,) = remarks(path)
@@ -87,7 +87,7 @@ def test_tuning_says_the_same(elsewhere: None) -> None:
     (said,) = remarks(path)
     assert "--delay 0.02" in said
     replayed = cmg_mj("replay", path, *columns, "--observers", "linear").out
-    tuned = cmg_mj("tune", "--log", path, *columns, "--observer", "linear", "--range", "tau=0.01:0.1").out
+    tuned = cmg_mj("tune-log", path, *columns, "--observer", "linear", "--range", "tau=0.01:0.1").out
     assert " ".join(said.split()) in " ".join(replayed.split())
     assert " ".join(said.split()) in " ".join(tuned.split())
 
@@ -99,7 +99,7 @@ def test_of_short_stretches_there_is_no_interval(elsewhere: None) -> None:
     tune = ("--observer", "linear", "--range", "tau=0.01:0.1", *columns)
     for rows, there in ((2500, True), (2350, False)):  # the second half less a second, by ten: 0.525 and 0.4875 s
         write_csv("log.csv", {name: values[:rows] for name, values in sine().items()})
-        table = cmg_mj("tune", "--log", "log.csv", *tune).out
+        table = cmg_mj("tune-log", "log.csv", *tune).out
         assert ("No interval: the scored stretches are 0.48 s short; there is one from 0.5 s on." in table) != there
-        found = json.loads(cmg_mj("tune", "--log", "log.csv", *tune, "--json").out)
+        found = json.loads(cmg_mj("tune-log", "log.csv", *tune, "--json").out)
         assert (found["verdict"] is not None) == (found["held_out_ratio"] is not None) == there

@@ -14,7 +14,7 @@ from cmg_mj import InputError, ReducedModel, load_scenario, prepare
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
 from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
-from cmg_mj.replay.logs import Log, read_log
+from cmg_mj.replay.logs import Log, ReadOptions, read_log
 from cmg_mj.replay.observer_inputs import observer_inputs, replay_prepared
 from cmg_mj.replay.parameter_options import parameters_of
 from cmg_mj.replay.user_noise import noise_numbers, noise_of
@@ -43,7 +43,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def log(tmp_path: Path, **more: np.ndarray) -> Log:
     columns = dict(COLUMNS, **{name.partition("_")[0]: name for name in more})
-    return read_log(write_csv(tmp_path / "log.csv", {**sine(), **more}), columns)
+    return read_log(write_csv(tmp_path / "log.csv", {**sine(), **more}), ReadOptions(columns))
 
 
 def test_a_run_replays_to_its_figures(run: Path) -> None:
@@ -79,8 +79,8 @@ def test_a_runs_parameters_model_and_noise_can_be_changed(run: Path) -> None:
 def test_a_runs_recording_as_any_parquet(run: Path) -> None:
     """With --columns it is a log like others: the same estimates of those that need no more."""
     path = run / "trajectory.parquet"
-    plain = read_log(path, {"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"})
-    replayed = replay_log(plain, ["linear"], skip_s=0.0)
+    plain = read_log(path, ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
+    replayed = replay_log(plain, ["linear"], settle_s=0.0)
     kept = Trajectory.load(path)["estimate/linear/x2_rad_s"]
     np.testing.assert_allclose(replayed.estimates["linear"]["x2_rad_s"], kept, atol=1e-9)
 
@@ -125,9 +125,9 @@ def test_observers_that_need_no_model_do_not_look_at_it() -> None:
 def test_parts_are_replayed_each_from_its_start(tmp_path: Path) -> None:
     kept = np.ones(N, dtype=bool)
     kept[2000:2300] = False
-    parted = read_log(write_csv(tmp_path / "p.csv", {k: v[kept] for k, v in sine().items()}), COLUMNS)
-    second = read_log(write_csv(tmp_path / "s.csv", {k: v[2300:] for k, v in sine().items()}), COLUMNS)
-    both, one = replay_log(parted, ["linear"], skip_s=0.5), replay_log(second, ["linear"], skip_s=0.5)
+    parted = read_log(write_csv(tmp_path / "p.csv", {k: v[kept] for k, v in sine().items()}), ReadOptions(COLUMNS))
+    second = read_log(write_csv(tmp_path / "s.csv", {k: v[2300:] for k, v in sine().items()}), ReadOptions(COLUMNS))
+    both, one = replay_log(parted, ["linear"], settle_s=0.5), replay_log(second, ["linear"], settle_s=0.5)
     np.testing.assert_array_equal(both.estimates["linear"]["x2_rad_s"][2000:], one.estimates["linear"]["x2_rad_s"])
     assert parted.scored(0.5).sum() == 1900 + 1600
 
@@ -209,8 +209,8 @@ def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
     one = log(tmp_path)
     with pytest.raises(InputError, match="linear has no such parameter"):
         replay_log(one, ["linear"], parameters={"linear": {"tou": 0.1}})
-    with pytest.raises(InputError, match="nothing is left to be judged"):
-        replay_log(one, skip_s=20.0)
+    with pytest.raises(InputError, match="nothing is left to score"):
+        replay_log(one, settle_s=20.0)
     with pytest.raises(InputError, match="no observer can take part: ltv needs a model"):
         replay_log(one, ["ltv"])
 
@@ -236,11 +236,11 @@ def test_a_class_that_does_not_say_what_it_needs_is_told_how_to(tmp_path: Path) 
 def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
     """Its rig (no --model), its sensors' noise and its observer's parameters: the given error is that of a replay."""
     recorded = read_log(run)
-    study = tune_on_logs([recorded], "homogeneous", parameters=["k1"], ranges={"k1": (22.0, 24.0)}, skip_s=0.3)
+    study = tune_on_logs([recorded], "homogeneous", parameters=["k1"], ranges={"k1": (22.0, 24.0)}, settle_s=0.3)
     assert study.given["k1"] == 23.0
     assert study.noises == [prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]]
     half = recorded.cut(slice(len(recorded) // 2, None))
-    study = tune_on_logs([recorded], "gyro_free", parameters=["jerk"], skip_s=0.3)
+    study = tune_on_logs([recorded], "gyro_free", parameters=["jerk"], settle_s=0.3)
     error = half["reference_rad_s"] - replay_prepared(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
     stretches = np.array_split(error[half.scored(0.3)], len(study.level.given_rms))
     np.testing.assert_allclose(study.level.given_rms, [np.sqrt(np.mean(s**2)) for s in stretches], rtol=1e-9)
@@ -248,8 +248,8 @@ def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
 
 def test_every_log_is_tuned_with_its_own_noise(run: Path) -> None:
     recorded = read_log(run)
-    plain = read_log(run / "trajectory.parquet", {"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"})
-    settings = {"skip_s": 0.2, "parameters": ["tau"], "ranges": {"tau": (0.01, 0.05)}}
+    plain = read_log(run / "trajectory.parquet", ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
+    settings = {"settle_s": 0.2, "parameters": ["tau"], "ranges": {"tau": (0.01, 0.05)}}
     own, other = tune_on_logs([recorded, plain], "linear", **settings).noises
     assert own == prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]
     assert other == noise_of(plain) != own
@@ -262,12 +262,12 @@ def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:
     assert recorded.scenario is not None
     other = dict(recorded.scenario, observer={**recorded.scenario["observer"], "k1": 21.0})
     with pytest.raises(InputError, match="different parameters of homogeneous"):
-        tune_on_logs([recorded, dataclasses.replace(recorded, scenario=other)], "homogeneous", skip_s=0.2)
+        tune_on_logs([recorded, dataclasses.replace(recorded, scenario=other)], "homogeneous", settle_s=0.2)
 
 
 def test_of_a_run_nothing_told_is_ignored(run: Path) -> None:
     with pytest.raises(InputError, match=r"--delay: .* is a run's own recording"):
-        read_log(run, delay_s=0.1)
-    assert read_log(run, windows_s=[(0.4, 0.6)]).windows == ((0.4, 0.6),)
+        read_log(run, ReadOptions(delay_s=0.1))
+    assert read_log(run, ReadOptions(windows_s=[(0.4, 0.6)])).windows == ((0.4, 0.6),)
     with pytest.raises(InputError, match=r"--window 5:6: .* has no sample there"):
-        read_log(run, windows_s=[(5.0, 6.0)])
+        read_log(run, ReadOptions(windows_s=[(5.0, 6.0)]))

@@ -209,7 +209,7 @@ def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, how:
         took = time.monotonic() - began
     assert run.returncode == 0, err
     why = {signal.SIGKILL: GONE, signal.SIGSTOP: STUCK}[how]
-    assert err == f"cmg-mj: the viewer did not get all of it: {why}; the run and its files are whole\n"
+    assert err == f"cmg-mj: the viewer missed a part: {why}; the run and its files are complete\n"
     assert json.loads(out)["outcome"] == "done"
     assert len(assert_whole("it")) == 600
     assert took < 30.0
@@ -269,7 +269,7 @@ def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPa
         (["--connect=1:2:3"], "--connect '1:2:3': no address of a viewer; "),
         (["--connect=localhost:99999"], "--connect 'localhost:99999': no address of a viewer; "),
         (["--connect={unused}", "--live"], "--live starts a viewer, --connect takes one that runs already: give one"),
-        (["--live", "--pace=fast"], "--pace 'fast': must be a number such as 0.5 or 4, or max for as fast as it goes"),
+        (["--live", "--pace=fast"], "--pace 'fast': must be a number such as 0.5 or 4, or max for no limit"),
         (["--live", "--pace=-1"], "--pace '-1': must be "),
         (["--live", "--pace=nan"], "--pace 'nan': must be "),
         (["--pace=2"], "--pace: goes with --live or --connect; "),

@@ -73,7 +73,7 @@ def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
 def test_ends_a_measurement_of_speed() -> None:
     """The run that hears it ends as a result; no other is started."""
     write(OBSERVER, "pressing.py")
-    said = cmg_mj_process("bench", "--observers", "pressing:Interrupts", "--worlds", "2", cwd=Path())
+    said = cmg_mj_process("bench", "loop", "--observers", "pressing:Interrupts", "--worlds", "2", cwd=Path())
     assert (said.status, said.out, said.err) == (130, "", "cmg-mj: interrupted\n")
 
 

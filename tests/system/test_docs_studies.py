@@ -60,6 +60,6 @@ def test_the_tables_of_two_axes() -> None:
 
 @pytest.mark.parametrize("study", sorted(path.name for path in STUDIES.glob("*.toml")))
 def test_a_study_file_can_be_run(study: str) -> None:
-    said = cmg_mj("sweep", STUDIES / study, "--plan")
+    said = cmg_mj("sweep", STUDIES / study, "--dry-run")
     assert said.status == 0, said.err
     assert " trials in " in said.out

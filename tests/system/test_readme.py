@@ -49,7 +49,7 @@ def first_cells(text: str) -> list[str]:
 
 
 def test_every_command_is_listed_once() -> None:
-    listed = re.findall(r"^cmg-mj (\w+)", section("Commands"), flags=re.MULTILINE)
+    listed = re.findall(r"^cmg-mj ([\w-]+)", section("Commands"), flags=re.MULTILINE)
     assert sorted(listed) == sorted(cli.commands)
 
 
@@ -112,11 +112,13 @@ def test_the_first_command_writes_what_it_says() -> None:
 def test_the_list_of_commands_is_complete() -> None:
     (block,) = re.findall(r"```text\n(.*?)```", section("Commands"), flags=re.DOTALL)
     listed = {part.split()[0]: part for part in block.split("cmg-mj ")[1:]}
-    helped = re.findall(r"^  (\w+) ", cmg_mj("--help").out.split("Commands:")[1], flags=re.MULTILINE)
+    helped = re.findall(r"^  ([\w-]+) ", cmg_mj("--help").out.split("Commands:")[1], flags=re.MULTILINE)
     assert sorted(listed) == sorted(helped)
     for command, rest in listed.items():
-        options = set(re.findall(r"--\w+", cmg_mj(command, "--help").out.split("Options:")[1])) - {"--help"}
-        named = set(re.findall(r"--\w+", rest))
+        parts = [[command], *([command, part] for part in getattr(cli.commands[command], "commands", ()))]
+        helps = "".join(cmg_mj(*part, "--help").out.split("Options:")[1] for part in parts)
+        options = set(re.findall(r"--[\w-]+", helps)) - {"--help"}
+        named = set(re.findall(r"--[\w-]+", rest))
         assert named == options, command
 
 

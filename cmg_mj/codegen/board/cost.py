@@ -169,7 +169,7 @@ def _instructions(costs: Sequence[Cost]) -> tuple[float, int]:
 
 
 def cost_table(figures: CostFigures) -> Table:
-    """Make the table that `cmg-mj bench --board` prints."""
+    """Make the table that `cmg-mj bench board` prints."""
     printed = Table(
         title="An update on a Cortex-M7 in single precision: instructions counted by QEMU, median and most over "
         f"{SECONDS:g} s of push_recovery;\nmicroseconds at {CLOCK_MHZ:g} MHz are an estimate: one cycle an instruction",

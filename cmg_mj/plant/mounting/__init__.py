@@ -1,4 +1,4 @@
-"""Pairs mounted on a user's own robot: any MJCF in, a rig out."""
+"""Mounting of scissored pairs on a user's own robot: MJCF in, a plant out."""
 
 from cmg_mj.plant.mounting.mount import mount
 from cmg_mj.plant.mounting.mounted import MountedRobot

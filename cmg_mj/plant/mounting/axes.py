@@ -1,4 +1,4 @@
-"""Which way a pair's axis lies: a hinge of the robot's, or a direction."""
+"""The tilt axis of a pair: a hinge of the robot, or a direction."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ AxisLike = str | Sequence[float]
 
 
 def chain_of(model: mujoco.MjModel, body: int) -> list[int]:
-    """The joints that a body hangs on, the nearest first."""
-    found = []
+    """Return the joints between a body and the world, the nearest first."""
+    joints = []
     while body:
         first = int(model.body_jntadr[body])
-        found += reversed(range(first, first + int(model.body_jntnum[body])))
+        joints += reversed(range(first, first + int(model.body_jntnum[body])))
         body = int(model.body_parentid[body])
-    return found
+    return joints
 
 
 def hinge_or_direction(
     model: mujoco.MjModel, data: mujoco.MjData, body: int, axis: AxisLike, path: Path
 ) -> tuple[int | None, np.ndarray]:
-    """What an axis means on a robot.
+    """Find the hinge or the direction that an axis names.
 
     Args:
         model: The robot.
         data: The robot as it is to stand, after a forward pass.
         body: The body that is to carry the pair.
-        axis: The name of a hinge, or `x`, `y`, or three numbers: a direction in the body's frame.
+        axis: The name of a hinge, or a direction in the body frame: `x`, `y`, or three numbers.
         path: The file, for messages.
 
     Returns:
@@ -57,17 +57,17 @@ def hinge_or_direction(
         return joint, _level(data.xaxis[joint], f"hinge {axis!r}", path)
     vector = _vector(axis, list(by_name), path)
     turn = data.xmat[body].reshape(3, 3)
-    direction = _level(turn @ vector, f"--axis {_said(axis)}", path)
-    along = [j for j in hinges if abs(float(data.xaxis[j] @ direction)) > PARALLEL]
+    direction = _level(turn @ vector, f"--axis {_axis_text(axis)}", path)
+    parallel = [j for j in hinges if abs(float(data.xaxis[j] @ direction)) > PARALLEL]
     if free:
         return None, direction
-    if not along:
+    if not parallel:
         raise InputError(
-            f"--axis {_said(axis)}: {path} hangs body {model.body(body).name!r} on no hinge along it, and the body is "
-            f"not free; its hinges: {', '.join(by_name) or 'none'} (--free-base lets it stand on the floor)"
+            f"--axis {_axis_text(axis)}: {path} hangs body {model.body(body).name!r} on no hinge along it, and the "
+            f"body is not free; its hinges: {', '.join(by_name) or 'none'} (--free-base lets it stand on the floor)"
         )
-    joint = along[0]
-    return joint, _level(data.xaxis[joint] * np.sign(data.xaxis[joint] @ direction), f"--axis {_said(axis)}", path)
+    joint = parallel[0]
+    return joint, _level(data.xaxis[joint] * np.sign(data.xaxis[joint] @ direction), f"--axis {_axis_text(axis)}", path)
 
 
 def _vector(axis: AxisLike, hinges: Sequence[str], path: Path) -> np.ndarray:
@@ -83,7 +83,9 @@ def _vector(axis: AxisLike, hinges: Sequence[str], path: Path) -> np.ndarray:
     except (TypeError, ValueError):
         vector = np.zeros(0)
     if vector.shape != (3,) or not np.isfinite(vector).all() or not np.linalg.norm(vector) > 1e-9:
-        raise InputError(f"--axis {_said(axis)}: must be x, y, three numbers that are not all 0, or a hinge's name")
+        raise InputError(
+            f"--axis {_axis_text(axis)}: must be x, y, three numbers that are not all 0, or a hinge's name"
+        )
     return vector / np.linalg.norm(vector)
 
 
@@ -97,5 +99,5 @@ def _level(direction: np.ndarray, what: str, path: Path) -> np.ndarray:
     return level / np.linalg.norm(level)
 
 
-def _said(axis: AxisLike) -> str:
+def _axis_text(axis: AxisLike) -> str:
     return axis if isinstance(axis, str) else shown(" ".join(map(str, axis)))

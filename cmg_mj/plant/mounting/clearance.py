@@ -1,4 +1,4 @@
-"""Whether modules have room: above the floor, and beside those of other axes."""
+"""Checks that modules have room above the floor and beside those of other axes."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ HALF = "/half"
 
 
 def check_room(
-    model: mujoco.MjModel, data: mujoco.MjData, cubes: Sequence[str], floor: float | None, path: Path
+    model: mujoco.MjModel, data: mujoco.MjData, modules: Sequence[str], floor: float | None, path: Path
 ) -> None:
-    """See that modules reach neither below the floor nor into others. Through the robot itself they may reach.
+    """Check that modules reach neither below the floor nor into other modules; they may overlap the robot itself.
 
     Args:
         model: The robot with all its modules.
         data: The same where it stands, after a forward pass.
-        cubes: Names of the modules that are new.
-        floor: How high what the robot stands on is, if it does [m].
+        modules: Names of the new modules.
+        floor: Height of the floor that the robot stands on [m]; None for a robot on a hinge.
         path: The file, for messages.
 
     Raises:
-        InputError: They do.
+        InputError: A module has no room.
     """
     names = [model.body(i).name for i in range(model.nbody)]
-    own = [f"{cube}{HALF}" for cube in cubes]
+    new = [f"{module}{HALF}" for module in modules]
     lowest = min(
-        float(data.body(name).xpos[2] - _half(model, name) * np.abs(_axes(data, name)[2]).sum()) for name in own
+        float(data.body(name).xpos[2] - _half(model, name) * np.abs(_axes(data, name)[2]).sum()) for name in new
     )
     if floor is not None and lowest < floor - TOUCH_M:
         raise InputError(
-            f"{path}: no room: the modules reach {floor - lowest:.3g} m below what it stands on; a smaller --scale, or "
-            "--at a higher place"
+            f"{path}: no room: the modules reach {floor - lowest:.3g} m below what it stands on; use a smaller "
+            "--scale, or a higher --position"
         )
     for other in names:
-        if other.endswith(HALF) and other not in own and any(_overlap(model, data, name, other) for name in own):
+        if other.endswith(HALF) and other not in new and any(_overlap(model, data, name, other) for name in new):
             raise InputError(
-                f"{path}: no room: the modules overlap {other.removesuffix(HALF)!r}, which is there already; --at "
-                "another place"
+                f"{path}: no room: the modules overlap {other.removesuffix(HALF)!r}, which is there already; "
+                "choose another --position"
             )
 
 
@@ -59,7 +59,7 @@ def _axes(data: mujoco.MjData, name: str) -> np.ndarray:
 
 
 def _overlap(model: mujoco.MjModel, data: mujoco.MjData, one: str, other: str) -> bool:
-    """Whether two cubes overlap: no face of either parts them."""
+    """Return whether two modules overlap: no face of either separates them."""
     apart = data.body(other).xpos - data.body(one).xpos
     for normal in np.hstack([_axes(data, one), _axes(data, other)]).T:
         reach = sum(_half(model, name) * np.abs(normal @ _axes(data, name)).sum() for name in (one, other))

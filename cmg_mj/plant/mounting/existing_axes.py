@@ -1,4 +1,4 @@
-"""What earlier mounts have put on a robot, which a second axis leaves as it is."""
+"""Axes that a robot has from earlier mounts; a second axis leaves them unchanged."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ class ExistingAxes(NamedTuple):
     lines: Sequence[str]
     """The hinges that it tilts about."""
     drives: Sequence[str]
-    """The joints of their modules."""
+    """The gimbal and flywheel joints of the modules."""
     speeds: Mapping[str, float]
-    """Of their flywheels, by joint [rad/s]."""
+    """Flywheel joint -> speed [rad/s]."""
     controls: Mapping[str, float]
-    """Of their flywheels' motors, by actuator."""
+    """Flywheel motor -> control [rad/s]."""
 
 
-def earlier_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, path: Path) -> ExistingAxes:
-    """Look for axes that a robot has.
+def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, path: Path) -> ExistingAxes:
+    """Find the axes that a robot has already.
 
     Args:
         spec: The robot.
         model: The same, compiled.
-        name: Of the axis that it is to get.
+        name: Name of the new axis.
         path: The file, for messages.
 
     Returns:
-        What they consist of.
+        The hinges, joints and speeds of these axes.
 
     Raises:
         InputError: It has one and the new one has no name, or has half of one, or a keyframe of that name that is none.
@@ -58,11 +58,11 @@ def earlier_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, path: Pa
         raise InputError(f"{path}: has an axis{known} already: give the new one a name, such as --name pitch")
     key = model.key(EQUILIBRIUM_KEY).id
     axes = [find_axis(model, key, axis) for axis in names]
-    cubes = [cube for axis in axes for cube in axis.cubes]
+    modules = [module for axis in axes for module in axis.cubes]
     lines = [model.joint(axis.line.joint).name for axis in axes if isinstance(axis.line, HingeLine)]
     return ExistingAxes(
         lines,
-        [f"{cube.name}/{joint}" for cube in cubes for joint in ("gimbal", "flywheel")],
-        {f"{cube.name}/flywheel": cube.speed for cube in cubes},
-        {f"{cube.name}/flywheel_motor": cube.speed for cube in cubes},
+        [f"{module.name}/{joint}" for module in modules for joint in ("gimbal", "flywheel")],
+        {f"{module.name}/flywheel": module.speed for module in modules},
+        {f"{module.name}/flywheel_motor": module.speed for module in modules},
     )

@@ -1,4 +1,4 @@
-"""How a robot starts to fall when nothing is controlled: what its reduced model is tried on."""
+"""The unstable pole of an uncontrolled robot, by simulation."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import mujoco
 from cmg_mj.plant.tilt_line import Line
 
 TRIED_DEG = 0.05
-"""From which tilt it is let fall [deg]."""
+"""Tilt at which a robot is released [deg]."""
 UNTIL = 4.0
-"""Until it leans so many times as much."""
+"""Growth of the tilt at which the simulation ends."""
 LONGEST_S = 3.0
-"""A robot that has not begun to fall by then stands [s]."""
+"""Longest simulation; a robot that has not begun to fall by then stands [s]."""
 
 
-def falls_with(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.0) -> float:
-    """The pole lambda of cosh(lambda t), as which a small tilt grows: flywheels at rest, gimbals held.
+def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.0) -> float:
+    """Simulate a small tilt's growth cosh(lambda t), flywheels at rest and gimbals held, and return its pole lambda.
 
     Args:
-        model: The rig.
-        key: The keyframe in which it stands.
-        line: The line that it tilts about.
-        bias: e, by which its equilibrium is off the keyframe [rad].
+        model: The plant's model.
+        key: The keyframe in which the plant stands.
+        line: The tilt line.
+        bias: Equilibrium bias e: tilt of the equilibrium, less that of the keyframe [rad].
 
     Returns:
-        lambda [1/s]; 0 if it does not fall.
+        lambda [1/s]; 0 if the robot does not fall.
     """
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)
@@ -38,8 +38,8 @@ def falls_with(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.0) -
             data.ctrl[motor] = 0.0
     start = math.radians(TRIED_DEG)
     line.tilt(data, start - bias)
-    grown = 1.0
-    while grown < UNTIL and data.time < LONGEST_S:
+    growth = 1.0
+    while growth < UNTIL and data.time < LONGEST_S:
         mujoco.mj_step(model, data)
-        grown = (float(line.lean(data.qpos)) + bias) / start
-    return math.acosh(grown) / float(data.time) if grown >= UNTIL else 0.0
+        growth = (float(line.lean(data.qpos)) + bias) / start
+    return math.acosh(growth) / float(data.time) if growth >= UNTIL else 0.0

@@ -1,4 +1,4 @@
-"""Joints that nobody holds, held where they stand."""
+"""Equality constraints that hold a robot's joints where they stand."""
 
 from __future__ import annotations
 
@@ -10,27 +10,35 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.plant.mounting.element_names import free_name
 from cmg_mj.plant.mounting.servos import holds
 
 Hold = Literal["constraints", "servos"]
 IMPEDANCE = 0.9999
-"""Of a constraint that holds a joint, MuJoCo's largest. What it lacks of 1 is the share of every acceleration that the
-joint gives way by: with MuJoCo's default of 0.9 to 0.95 a trunk on its waist jerks with every change of the command,
-and its accelerometers show that as tilt."""
+"""Impedance of a constraint that holds a joint, MuJoCo's largest. A joint gives way by 1 less this, in shares of every
+acceleration: with MuJoCo's default of 0.9 to 0.95 a trunk on its waist jerks with every change of the command, and its
+accelerometers show that as tilt."""
 SAME_PLACE = 1e-3
-"""A joint so near is where a constraint holds it [rad, m]: files have six digits."""
+"""Largest distance of a joint from where a constraint of the file holds it [rad, m]; files have six digits."""
 
 
-def held_name(joint: str) -> str:
-    """What the constraint that holds a joint is called."""
+def unused_name(name: str, taken: Collection[str]) -> str:
+    """Return the name, or the first of `name_2`, `name_3`, ... that is not taken."""
+    number, candidate = 1, name
+    while candidate in taken:
+        number += 1
+        candidate = f"{name}_{number}"
+    return candidate
+
+
+def constraint_name(joint: str) -> str:
+    """Return the name of the constraint that holds a joint."""
     return f"{joint}_held"
 
 
 def joint_held(spec: mujoco.MjSpec, tie: mujoco.MjsEquality) -> str:
-    """The joint that an equality constraint holds where it stands, as an earlier mount's does; "" for any other.
+    """Return the joint that an equality constraint holds, as an earlier mount's does; "" for any other constraint.
 
-    Whatever it is called: it is on, and of one joint alone, or of a ball's body with the one that this hangs on.
+    Such a constraint is active, and is of one joint alone, or welds a ball joint's body to its parent.
     """
     if not tie.active:
         return ""
@@ -45,13 +53,13 @@ def joint_held(spec: mujoco.MjSpec, tie: mujoco.MjsEquality) -> str:
 
 
 def _check_stands(model: mujoco.MjModel, pose: np.ndarray, name: str, tie: mujoco.MjsEquality, path: Path) -> None:
-    """See that a constraint of the file's holds a joint where the robot is to stand, not elsewhere."""
+    """Check that a constraint of the file holds a joint where the robot is to stand."""
     address = int(model.joint(name).qposadr[0])
-    at, stands = float(model.qpos0[address] + tie.data[0]), float(pose[address])
-    if int(tie.type) == int(mujoco.mjtEq.mjEQ_JOINT) and abs(at - stands) > SAME_PLACE:
+    target, stands = float(model.qpos0[address] + tie.data[0]), float(pose[address])
+    if int(tie.type) == int(mujoco.mjtEq.mjEQ_JOINT) and abs(target - stands) > SAME_PLACE:
         raise InputError(
-            f"{path}: equality {tie.name!r} holds the joint {name!r} at {at:.4g}, and the robot is to stand with it at "
-            f"{stands:.4g}: give a --keyframe that has it there, or take the equality out of the file"
+            f"{path}: equality {tie.name!r} holds the joint {name!r} at {target:.4g}, and the robot is to stand with "
+            f"it at {stands:.4g}: give a --keyframe that has it there, or take the equality out of the file"
         )
 
 
@@ -59,80 +67,89 @@ def hold_joints(
     spec: mujoco.MjSpec,
     model: mujoco.MjModel,
     pose: np.ndarray,
-    how: Hold,
+    hold: Hold,
     moving: Collection[str],
-    loose: Collection[str],
+    released: Collection[str],
     path: Path,
 ) -> list[str]:
-    """Tie every joint to where it stands, by an equality constraint.
+    """Hold every joint where it stands, by an equality constraint.
 
     Args:
         spec: The model, which is changed.
         model: The same, compiled.
-        pose: Where the joints stand, (nq,).
-        how: `constraints`: all joints; `servos`: those that no actuator of the robot's drives.
-        moving: Joints that tilt the robot, and those of modules: they are left alone, or let go if they were held.
-        loose: Joints that the user wants free.
+        pose: Joint positions, (nq,).
+        hold: `constraints`: all joints; `servos`: those that no servo of the robot's holds.
+        moving: Joints that tilt the robot, and those of modules. They stay free, or are released if they were held.
+        released: Joints that the user wants free.
         path: The file, for messages.
 
     Returns:
-        The joints that are held so.
+        The joints that a new constraint holds.
 
     Raises:
-        InputError: A joint to be left free does not exist, or the file holds one elsewhere.
+        InputError: A joint to release does not exist, or the file holds a joint elsewhere.
     """
     names = [model.joint(i).name for i in range(model.njnt)]
-    for name in loose:
+    for name in released:
         if name not in names:
-            raise InputError(f"--free {name}: {path} has no such joint; {nearest(name, names, 'its joints')}")
-    own = [actuator.target for actuator in spec.actuators if holds(actuator)] if how == "servos" else []
+            raise InputError(f"--release {name}: {path} has no such joint; {nearest(name, names, 'its joints')}")
+    on_servos = [actuator.target for actuator in spec.actuators if holds(actuator)] if hold == "servos" else []
     ties = {joint: tie for tie in spec.equalities if (joint := joint_held(spec, tie))}
-    already = set(ties)
-    for name in already & {*moving, *loose}:
-        if ties[name].name.startswith(held_name(name)):  # the user's own is the user's
+    already, free = set(ties), {*moving, *released}
+    for name in already & free:
+        if ties[name].name.startswith(constraint_name(name)):  # the user's own is the user's
             spec.delete(ties[name])
-    for name in already - {*moving, *loose}:
+    for name in already - free:
         _check_stands(model, pose, name, ties[name], path)
     taken = {tie.name for tie in spec.equalities}
-    held = [name for name in names if name not in {*moving, *loose, *own, *already}]
+    held = [name for name in names if name not in {*free, *on_servos, *already}]
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
     for name in held:
-        joint = model.joint(name)
-        kind = int(joint.type[0])
+        kind = int(model.joint(name).type[0])
         if kind == int(mujoco.mjtJoint.mjJNT_FREE):
+            body = model.body(int(model.joint(name).bodyid[0])).name
             raise InputError(
-                f"{path}: body {model.body(int(joint.bodyid[0])).name!r} is free and carries no pair: give --free "
-                f"{name} if it is to move"
+                f"{path}: body {body!r} is free and carries no pair: give --release {name} if it is to move"
             )
-        if kind == int(mujoco.mjtJoint.mjJNT_BALL):
-            body = int(joint.bodyid[0])
-            parent = int(model.body_parentid[body])
-            turn = data.xmat[parent].reshape(3, 3).T
-            relative = np.empty(4)
-            inverse = data.xquat[parent] * [1.0, -1.0, -1.0, -1.0]
-            mujoco.mju_mulQuat(relative, inverse, data.xquat[body])
-            tie = spec.add_equality(
-                name=free_name(held_name(name), taken),
-                type=mujoco.mjtEq.mjEQ_WELD,
-                active=True,
-                objtype=mujoco.mjtObj.mjOBJ_BODY,
-                name1=model.body(parent).name,
-                name2=model.body(body).name,
-            )
-            at = turn @ (data.xpos[body] - data.xpos[parent])
-            tie.data[:11] = [0.0, 0.0, 0.0, *at, *relative, 1.0]
-        else:
-            tie = spec.add_equality(
-                name=free_name(held_name(name), taken),
-                type=mujoco.mjtEq.mjEQ_JOINT,
-                active=True,
-                objtype=mujoco.mjtObj.mjOBJ_JOINT,
-                name1=name,
-            )
-            address = int(joint.qposadr[0])
-            tie.data[:] = 0.0
-            tie.data[0] = pose[address] - model.qpos0[address]
+        add = _weld_ball if kind == int(mujoco.mjtJoint.mjJNT_BALL) else _fix_joint
+        tie = add(spec, model, data, name, unused_name(constraint_name(name), taken))
         tie.solimp[:2] = IMPEDANCE
     return held
+
+
+def _weld_ball(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, joint: str, name: str
+) -> mujoco.MjsEquality:
+    """Weld a ball joint's body to its parent, as they stand."""
+    body = int(model.joint(joint).bodyid[0])
+    parent = int(model.body_parentid[body])
+    turn = data.xmat[parent].reshape(3, 3).T
+    relative = np.empty(4)
+    inverse = data.xquat[parent] * [1.0, -1.0, -1.0, -1.0]
+    mujoco.mju_mulQuat(relative, inverse, data.xquat[body])
+    tie = spec.add_equality(
+        name=name,
+        type=mujoco.mjtEq.mjEQ_WELD,
+        active=True,
+        objtype=mujoco.mjtObj.mjOBJ_BODY,
+        name1=model.body(parent).name,
+        name2=model.body(body).name,
+    )
+    place = turn @ (data.xpos[body] - data.xpos[parent])
+    tie.data[:11] = [0.0, 0.0, 0.0, *place, *relative, 1.0]
+    return tie
+
+
+def _fix_joint(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, joint: str, name: str
+) -> mujoco.MjsEquality:
+    """Fix a hinge or a slide where it stands."""
+    tie = spec.add_equality(
+        name=name, type=mujoco.mjtEq.mjEQ_JOINT, active=True, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=joint
+    )
+    address = int(model.joint(joint).qposadr[0])
+    tie.data[:] = 0.0
+    tie.data[0] = data.qpos[address] - model.qpos0[address]
+    return tie

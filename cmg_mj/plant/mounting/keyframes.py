@@ -1,4 +1,4 @@
-"""The keyframe that a rig starts from, and the robot's own, which get more joints than they had."""
+"""The keyframe that a run starts from, and the robot's own keyframes, extended by the new joints."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ import mujoco
 import numpy as np
 
 from cmg_mj.plant.mounting.robot import joint_sizes
-from cmg_mj.plant.mounting.servos import at_rest
+from cmg_mj.plant.mounting.servos import rest_controls
 from cmg_mj.plant.parts import EQUILIBRIUM_KEY
 
 Poses = Mapping[str, np.ndarray]
-"""Where each joint stands, by its name."""
+"""Joint -> its position in qpos."""
 
 
 def poses_of(model: mujoco.MjModel, qpos: np.ndarray) -> dict[str, np.ndarray]:
-    """Where each joint of a compiled model stands, by its name."""
-    found = {}
+    """Return the position of each joint of a compiled model, by its name."""
+    poses = {}
     for i in range(model.njnt):
         address = int(model.jnt_qposadr[i])
-        found[model.joint(i).name] = qpos[address : address + joint_sizes(int(model.jnt_type[i]))[0]].copy()
-    return found
+        poses[model.joint(i).name] = qpos[address : address + joint_sizes(int(model.jnt_type[i]))[0]].copy()
+    return poses
 
 
 def as_qpos(model: mujoco.MjModel, poses: Poses) -> np.ndarray:
-    """The same as a vector; joints that are left out stand where the model's reference has them."""
+    """Return poses as a vector qpos, with the model's reference for joints that have none."""
     qpos = model.qpos0.copy()
     for name, values in poses.items():
         address = int(model.joint(name).qposadr[0])
@@ -46,15 +46,15 @@ def write_keyframe(
     Args:
         spec: The model, which gets the keyframe.
         model: The same, compiled.
-        name: The keyframe's.
-        qpos: Where the joints stand, (nq,).
-        speeds: Of the joints that turn, by name [rad/s].
-        ctrl: Of the actuators that are driven, by name. Position servos hold where their joints stand.
+        name: Name of the keyframe.
+        qpos: Joint positions, (nq,).
+        speeds: Joint -> speed, for those that turn [rad/s].
+        ctrl: Actuator -> control. Other position servos hold their joints in place.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_forward(model, data)
-    qvel, (act, controls) = np.zeros(model.nv), at_rest(model, data)
+    qvel, (act, controls) = np.zeros(model.nv), rest_controls(model, data)
     for joint, speed in speeds.items():
         qvel[int(model.joint(joint).dofadr[0])] = speed
     for i in range(model.nu):
@@ -63,11 +63,10 @@ def write_keyframe(
 
 
 def pop_keyframes(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[tuple[str, dict[str, np.ndarray]]]:
-    """Take a robot's own keyframes out, before it gets more joints: their names, and where the joints stand."""
-    kept = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
-    kept = [
-        (name, poses) for name, poses in kept if name != EQUILIBRIUM_KEY
-    ]  # of an axis mounted earlier: written anew
+    """Remove a robot's own keyframes before it gets more joints, and return their names and poses."""
+    keyframes = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
+    # The equilibrium of an axis mounted earlier is written anew.
+    keyframes = [(name, poses) for name, poses in keyframes if name != EQUILIBRIUM_KEY]
     for key in list(spec.keys):
         spec.delete(key)
-    return kept
+    return keyframes

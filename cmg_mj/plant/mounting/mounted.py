@@ -1,4 +1,4 @@
-"""A robot with a pair on it, and its file."""
+"""A robot with a pair mounted on it, and its file."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class MountedRobot:
 
     Attributes:
         spec: The model, which can be edited further.
-        path: What to call the robot it was made from.
+        path: File of the robot, or a name for messages.
         held: Joints that an equality constraint holds where they stand.
-        notes: What was changed in the robot besides, in clauses.
+        notes: Other changes to the robot, in clauses.
     """
 
     spec: mujoco.MjSpec
@@ -33,22 +33,22 @@ class MountedRobot:
     notes: tuple[str, ...]
 
     def save(self, path: str | Path) -> Path:
-        """Write it as MJCF, which plain MuJoCo loads and `plant.model` takes; whole or not at all.
+        """Write the robot as MJCF, which plain MuJoCo loads and `plant.model` takes; whole or not at all.
 
         Args:
-            path: The file. Meshes and textures are not copied: it names them from where it lies.
+            path: The file. It refers to meshes and textures by relative paths; they are not copied.
 
         Returns:
             The file.
 
         Raises:
-            InputError: It cannot be written, is no .xml, or would lie in place of the robot itself or of what it names.
+            InputError: The file cannot be written, is no .xml, or would replace the robot or a file that it names.
         """
         target = Path(path).expanduser()
         check_target(target, self.path)
         spec = self.spec.copy()
         for field in ("meshdir", "texturedir"):
-            setattr(spec, field, _seen_from(target.resolve().parent, spec.modelfiledir, getattr(spec, field)))
+            setattr(spec, field, _relative_assets(target.resolve().parent, spec.modelfiledir, getattr(spec, field)))
         try:
             with whole_file(target, ".xml") as temporary:
                 temporary.write_text(spec.to_xml(), encoding="utf-8")
@@ -59,15 +59,15 @@ class MountedRobot:
 
 
 def check_target(target: Path, robot: Path) -> None:
-    """See that a mounted robot may be written somewhere.
+    """Check that a mounted robot may be written to a file.
 
     Args:
-        target: The file that it is to be.
-        robot: What it is made from, if that is a file.
+        target: The file to write.
+        robot: The robot's own file, if there is one.
 
     Raises:
-        InputError: It is no .xml file, has no folder, or it or the scenario beside it would lie in the place of the
-            robot's file or of one that this names.
+        InputError: The target is no .xml file, has no folder, or would replace a file of the robot's; or the scenario
+            beside it would.
     """
     if target.suffix != ".xml":
         raise InputError(
@@ -75,11 +75,11 @@ def check_target(target: Path, robot: Path) -> None:
         )
     if not target.parent.is_dir():
         raise InputError(f"-o {target}: cannot be written: there is no folder {target.parent}")
-    own = check_files(robot) if robot.is_file() else []
+    originals = check_files(robot) if robot.is_file() else []
     for path in (target, target.with_suffix(".toml")):
         if path.is_dir():
             raise InputError(f"-o {target}: {path} is a folder")
-        if path.exists() and any(file.exists() and path.samefile(file) for file in own):
+        if path.exists() and any(file.exists() and path.samefile(file) for file in originals):
             raise InputError(f"-o {target}: {path} is the robot's own file, or one that it names; give another name")
 
 
@@ -94,7 +94,7 @@ def with_scenario(target: Path) -> Iterator[Path]:
         A temporary name for the model; both files are renamed at the end, or removed if something failed.
 
     Raises:
-        InputError: What the writing raises, the files called by their names; or they cannot be renamed.
+        InputError: As raised while writing, with the final file names; or the files cannot be renamed.
     """
     temporary = target.with_name(f".{target.stem}.{os.getpid()}.partial.xml")
     files = [(temporary.with_suffix(suffix), target.with_suffix(suffix)) for suffix in (".xml", ".toml")]
@@ -112,6 +112,6 @@ def with_scenario(target: Path) -> Iterator[Path]:
                 written.unlink()
 
 
-def _seen_from(folder: Path, model_folder: str, assets: str) -> str:
-    """A folder of assets, which the robot's file names from where it lies, from another folder."""
+def _relative_assets(folder: Path, model_folder: str, assets: str) -> str:
+    """Return the path of a robot's folder of assets, relative to another folder."""
     return os.path.relpath(Path(model_folder or ".").resolve() / assets, folder)

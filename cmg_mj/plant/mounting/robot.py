@@ -1,4 +1,4 @@
-"""A user's robot, made ready to carry modules: read, looked at, its joints named."""
+"""A user's robot made ready to carry modules: read, checked, its joints named, its physics options set."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.plant.mjcf import compile_model, parse
-from cmg_mj.plant.mounting.element_names import free_name, name_all
-from cmg_mj.plant.mounting.held_joints import joint_held
+from cmg_mj.plant.mounting.held_joints import joint_held, unused_name
 
 BAD_CONNECTIONS = {
     int(mujoco.mjtEq.mjEQ_CONNECT): "connect",
@@ -28,19 +27,23 @@ NEEDED = {
     "mjDSBL_SENSOR": "sensor",
 }
 """What must not be switched off, and what MJCF's <flag> calls it."""
+LARGEST_STEP_S = 0.005
+"""Largest physics step; the gimbals' servos need it [s]."""
+ITERATIONS, TOLERANCE = 100, 1e-8
+"""MuJoCo's defaults for the solver; with less, held joints creep."""
 
 
 def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
-    """A model of the caller's own, which can be changed.
+    """Read a robot into a model that can be changed.
 
     Args:
         robot: A file, or a model being edited, of which a copy is taken.
 
     Returns:
-        The model, every joint of which has a name, and what to call it in messages.
+        The model, all joints named, and the path to call it by in messages.
 
     Raises:
-        InputError: It is no MJCF, does not compile, or has something switched off that mounting needs.
+        InputError: The file is no MJCF, does not compile, or disables a feature that mounting needs.
     """
     if isinstance(robot, (str, Path)):
         path = Path(robot).expanduser()
@@ -61,8 +64,8 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
             f'{path}: <flag {off[0]}="disable"/> switches off what a mounted pair needs; take it out of the file'
         )
     if not spec.option.gravity[2] < 0.0:
-        said = " ".join(f"{part:g}" for part in spec.option.gravity)
-        raise InputError(f'{path}: <option gravity="{said}"/> does not pull down: there is nothing to balance')
+        gravity = " ".join(f"{part:g}" for part in spec.option.gravity)
+        raise InputError(f'{path}: <option gravity="{gravity}"/> does not pull down: there is nothing to balance')
     _bake_masses(spec, path)
     name_all(spec)
     return spec, path
@@ -88,11 +91,53 @@ def _bake_masses(spec: mujoco.MjSpec, path: Path) -> None:
             body.explicitinertial = True
 
 
+def name_all(spec: mujoco.MjSpec) -> None:
+    """Name every body and every joint; a constraint that holds a ball joint needs the names of its bodies.
+
+    Args:
+        spec: The compiled model, which is changed.
+    """
+    bodies, joints = ({element.name for element in kind} for kind in (spec.bodies, spec.joints))
+    for body in spec.bodies:
+        if not body.name:
+            body.name = unused_name(f"body{body.id}", bodies)
+            bodies.add(body.name)
+        for i, joint in enumerate(body.joints):
+            if not joint.name:
+                joint.name = unused_name(f"{body.name}_joint{i or ''}", joints)
+                joints.add(joint.name)
+
+
+def set_physics_options(spec: mujoco.MjSpec) -> list[str]:
+    """Set the integrator, solver and step that a pair needs, and return the changes as clauses.
+
+    Fast flywheels need RK4, and servos need small steps.
+    """
+    notes = []
+    option = spec.option
+    gravity = np.asarray(option.gravity)
+    down = [0.0, 0.0, -float(np.linalg.norm(gravity))]
+    if gravity.tolist() != down and gravity[2] < 0.0 and np.linalg.norm(gravity[:2]) < 1e-3 * -gravity[2]:
+        notes.append(f"its gravity of {' '.join(f'{part:g}' for part in gravity)} is now straight down")
+        option.gravity = down
+    if int(option.integrator) != int(mujoco.mjtIntegrator.mjINT_RK4):
+        option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        notes.append("its integrator is now RK4, which fast flywheels need")
+    if int(option.solver) != int(mujoco.mjtSolver.mjSOL_NEWTON):
+        option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        notes.append("its solver is now Newton: another does not hold joints stiffly")
+    option.iterations, option.tolerance = max(option.iterations, ITERATIONS), min(option.tolerance, TOLERANCE)
+    if option.timestep > LARGEST_STEP_S:
+        notes.append(f"its physics steps of {option.timestep * 1e3:g} ms are now {LARGEST_STEP_S * 1e3:g} ms")
+        option.timestep = LARGEST_STEP_S
+    return notes
+
+
 def body_of(spec: mujoco.MjSpec, name: str, path: Path) -> mujoco.MjsBody:
-    """The body that is to carry the modules.
+    """Return the body that carries the modules.
 
     Raises:
-        InputError: There is none of that name, it is the world, or it weighs nothing.
+        InputError: There is no such body, or it is the world.
     """
     body = spec.body(name) if name != "world" else None
     if body is None:
@@ -102,10 +147,10 @@ def body_of(spec: mujoco.MjSpec, name: str, path: Path) -> mujoco.MjsBody:
 
 
 def check_names(spec: mujoco.MjSpec, names: Sequence[str], path: Path) -> None:
-    """What is added must not bear a name that is taken.
+    """Check that no new element has a name that is taken.
 
     Raises:
-        InputError: One is.
+        InputError: A name is taken.
     """
     taken = {
         element.name
@@ -118,7 +163,7 @@ def check_names(spec: mujoco.MjSpec, names: Sequence[str], path: Path) -> None:
 
 
 def check_chains(spec: mujoco.MjSpec, path: Path) -> None:
-    """What carries the modules must be a tree: of a closed chain no rigid body is left if its joints are held.
+    """Check that the robot is a tree: the joints of a closed chain cannot be held one by one.
 
     Raises:
         InputError: Two bodies are tied together by a constraint.
@@ -144,7 +189,7 @@ def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> str:
         The free joint's name.
 
     Raises:
-        InputError: Something else in the file speaks of a joint that goes.
+        InputError: Another element of the file refers to a joint that is removed.
     """
     root = body
     while root.parent.name != "world":
@@ -153,31 +198,31 @@ def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> str:
     if len(joints) == 1 and int(joints[0].type) == int(mujoco.mjtJoint.mjJNT_FREE):
         return joints[0].name
     names = {joint.name for joint in joints}
-    for kind, elements, of in (
+    for kind, elements, field in (
         ("actuator", spec.actuators, "target"),
         ("sensor", spec.sensors, "objname"),
         ("equality", spec.equalities, "name1"),
     ):
         for element in elements:
-            if getattr(element, of) in names:
+            if getattr(element, field) in names:
                 raise InputError(
-                    f"{path}: {kind} {element.name!r} speaks of the joint {getattr(element, of)!r}, which a free base "
-                    "takes the place of: take it out of the file"
+                    f"{path}: {kind} {element.name!r} refers to the joint {getattr(element, field)!r}, which a free "
+                    "base replaces: take it out of the file"
                 )
     model = compile_model(spec, path)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    at = data.xpos[model.body(root.name).id].copy(), data.xquat[model.body(root.name).id].copy()
+    place = data.xpos[model.body(root.name).id].copy(), data.xquat[model.body(root.name).id].copy()
     for joint in joints:
         spec.delete(joint)
-    name = free_name(f"{root.name}_free", {joint.name for joint in spec.joints})
+    name = unused_name(f"{root.name}_free", {joint.name for joint in spec.joints})
     root.add_freejoint(name=name)
-    _place(spec, root, *at, path)
+    _place(spec, root, *place, path)
     return name
 
 
 def _place(spec: mujoco.MjSpec, root: mujoco.MjsBody, pos: np.ndarray, quat: np.ndarray, path: Path) -> None:
-    """Put a body of the world's where it is to be, in the world: a <frame> that it is in is taken off first."""
+    """Place a child of the world in world coordinates, whatever <frame> it is in."""
     for key in list(spec.keys):  # they have the joints that are gone
         spec.delete(key)
     root.pos, root.quat, root.alt.type = np.zeros(3), [1.0, 0.0, 0.0, 0.0], mujoco.mjtOrientation.mjORIENTATION_QUAT
@@ -190,12 +235,12 @@ def _place(spec: mujoco.MjSpec, root: mujoco.MjsBody, pos: np.ndarray, quat: np.
 
 
 def joint_sizes(kind: int) -> tuple[int, int]:
-    """Of a joint's kind, how many numbers it has in qpos and in qvel."""
+    """Return how many numbers a joint of a kind has in qpos and in qvel."""
     return {0: (7, 6), 1: (4, 3)}.get(kind, (1, 1))
 
 
 def pose_of(model: mujoco.MjModel, keyframe: str | None, path: Path) -> np.ndarray:
-    """The joints' positions that a robot is to stand in.
+    """Return the joint positions in which a robot stands.
 
     Args:
         model: The robot.

@@ -1,4 +1,4 @@
-"""Position servos of a robot's own: what to tell them so that they hold it where it stands."""
+"""Controls with which a robot's own position servos hold it where it stands."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ _FILTERS = int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
 
 
 def holds(actuator: mujoco.MjsActuator) -> bool:
-    """Whether an actuator pulls a joint back to where it is told: its force has a part that goes by its position."""
+    """Return whether an actuator is a position servo of a joint: its force depends on the joint's position."""
     return int(actuator.trntype) in ON_A_JOINT and _pulls_back(int(actuator.biastype), actuator.biasprm)
 
 
-def at_rest(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
-    """What position servos are told, and the states of their filters, so that they exert no force where they are.
+def rest_controls(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """Return the controls and filter states with which position servos exert no force where they are.
 
-    The force of a servo of gain k is k a + b0 + b1 l, with l its length, gear times the joint's position, and a what it
-    is told, or its filter's or integrator's state.
+    The force of a servo of gain k is k a + b0 + b1 l. Its length l is the gear times the joint's position, and a is its
+    control, or the state of its filter or integrator.
 
     Args:
         model: The robot.
         data: The same where it is to be held, after a forward pass.
 
     Returns:
-        act (na,) and ctrl (nu,), 0 for what is no position servo.
+        act (na,) and ctrl (nu,); 0 for other actuators.
     """
     act, ctrl = np.zeros(model.na), np.zeros(model.nu)
     for i in range(model.nu):
@@ -40,14 +40,14 @@ def at_rest(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.
             gain += float(model.actuator_gainprm[i, 1]) * length
         if gain == 0.0:
             continue
-        told, dynamics = -(float(bias[0]) + float(bias[1]) * length) / gain, int(model.actuator_dyntype[i])
+        target, dynamics = -(float(bias[0]) + float(bias[1]) * length) / gain, int(model.actuator_dyntype[i])
         state = int(model.actuator_actadr[i])
         if dynamics == _INTEGRATOR:
-            act[state] = told
+            act[state] = target
         elif dynamics in _FILTERS:
-            act[state] = ctrl[i] = told
+            act[state] = ctrl[i] = target
         elif state < 0:
-            ctrl[i] = told
+            ctrl[i] = target
     return act, ctrl
 
 

@@ -1,4 +1,4 @@
-"""A free robot put on its feet: kept from tilting until it rests on the floor, it shows what it stands on."""
+"""Settling of a free robot on the floor: kept from tilting until it rests, its contacts show the line."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.plant.mounting.servos import at_rest
+from cmg_mj.plant.mounting.servos import rest_controls
 
 LONGEST_S = 10.0
-"""So long a robot may take to come to rest [s]."""
+"""Longest time for a robot to come to rest [s]."""
 AT_REST = 1e-4
-"""Rates below which it rests [m/s, rad/s]."""
+"""Rates below which a robot rests [m/s, rad/s]."""
 UPRIGHT_DEG = 0.005
-"""So near above the line its mass is brought [deg]."""
+"""Largest lean of the mass from above the line [deg]."""
 LARGEST_LEAN_DEG = 20.0
 """A robot whose mass lies farther off what it stands on has fallen, whatever holds it [deg]."""
 STANDS_DEG = 2.0
@@ -28,10 +28,10 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class Support(NamedTuple):
-    """What a robot stands on."""
+    """The stance of a robot and the line that it stands on."""
 
     pose: np.ndarray
-    """Where its joints stand, (nq,)."""
+    """Joint positions, (nq,)."""
     point: np.ndarray
     """A point of the line, in the world (3,) [m]."""
     direction: np.ndarray
@@ -43,17 +43,17 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
 
     Args:
         model: The robot with its modules, all joints held that are to be.
-        pose: Where its joints are at first, (nq,).
-        joint: Its free joint.
-        direction: Along the line that it tilts about, nearly, horizontal, in the world. What it stands on says it
-            better, if that is long.
+        pose: Joint positions at first, (nq,).
+        joint: The robot's free joint.
+        direction: Approximate direction of the line, horizontal, in the world. Contacts far apart determine the line
+            better.
         path: The file, for messages.
 
     Returns:
-        Where it stands, and the line.
+        The stance and the line.
 
     Raises:
-        InputError: It has nothing to stand on, falls over, or stands by itself.
+        InputError: The robot has nothing to stand on, falls over, or stands by itself.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = pose
@@ -81,25 +81,25 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
 
 
 def _keep_servos(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Position servos keep the joints where they are; nothing else is driven."""
+    """Let position servos keep the joints where they are, and drive nothing else."""
     mujoco.mj_forward(model, data)
-    data.act[:], data.ctrl[:] = at_rest(model, data)
+    data.act[:], data.ctrl[:] = rest_controls(model, data)
 
 
-def _of_tree(model: mujoco.MjModel, joint: int) -> np.ndarray:
-    """Which bodies hang on a free joint, (nbody,)."""
+def _bodies_on(model: mujoco.MjModel, joint: int) -> np.ndarray:
+    """Return which bodies hang on a free joint, (nbody,)."""
     root = int(model.jnt_bodyid[joint])
     return model.body_rootid == model.body_rootid[root]
 
 
 def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, joint: int, path: Path) -> None:
-    """Lower it, or lift it, until it touches what does not move."""
-    tree = _of_tree(model, joint)
-    own = [geom for geom in range(model.ngeom) if tree[model.geom_bodyid[geom]]]
+    """Lower or lift the robot until it touches the fixed world."""
+    tree = _bodies_on(model, joint)
+    robot = [geom for geom in range(model.ngeom) if tree[model.geom_bodyid[geom]]]
     floor = [geom for geom in range(model.ngeom) if model.body_weldid[model.geom_bodyid[geom]] == 0]
     gaps = [
         mujoco.mj_geomDistance(model, data, here, there, 100.0, None)
-        for here in own
+        for here in robot
         for there in floor
         if model.geom_contype[here] & model.geom_conaffinity[there]
         or model.geom_contype[there] & model.geom_conaffinity[here]
@@ -121,7 +121,7 @@ def _rest(
     target: np.ndarray,
     path: Path,
 ) -> None:
-    """Let it come to rest, kept from tilting by a torque that is none where its mass is above the line."""
+    """Let the robot come to rest, kept from tilting by a torque that vanishes where its mass is above the line."""
     body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
     mass = float(model.body_subtreemass[body])
     height = max(float(data.subtree_com[body][2] - data.xipos[body][2] + 1.0), 0.1)
@@ -156,8 +156,8 @@ def _rest(
 def _support(
     model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.ndarray, path: Path
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The middle of what it stands on, (3,) [m], and along it, (3,)."""
-    tree = _of_tree(model, joint)
+    """Return the middle of the contacts, (3,) [m], and the direction of their line, (3,)."""
+    tree = _bodies_on(model, joint)
     points, loads = [], []
     for i in range(data.ncon):
         contact = data.contact[i]
@@ -169,14 +169,14 @@ def _support(
             loads.append(force[0])
     if not points:
         raise InputError(f"{path}: does not come to rest on anything")
-    at = np.array(points)
-    middle = np.average(at, axis=0, weights=loads)
-    ends = at[np.argmax(at @ direction)] - at[np.argmin(at @ direction)]
+    places = np.array(points)
+    middle = np.average(places, axis=0, weights=loads)
+    ends = places[np.argmax(places @ direction)] - places[np.argmin(places @ direction)]
     ends[2] = 0.0
     length = float(np.linalg.norm(ends))
     if length > LONG_M and float(ends @ direction) > math.cos(math.radians(LARGEST_LEAN_DEG)) * length:
         direction = ends / length
-    width = float(np.ptp(at @ np.cross(direction, UP)))
+    width = float(np.ptp(places @ np.cross(direction, UP)))
     height = float(data.subtree_com[int(model.jnt_bodyid[joint])][2] - middle[2])
     if math.degrees(math.atan2(0.5 * width, max(height, 1e-9))) > STANDS_DEG:
         raise InputError(
@@ -189,7 +189,7 @@ def _support(
 def _turn(
     model: mujoco.MjModel, data: mujoco.MjData, joint: int, point: np.ndarray, direction: np.ndarray, lean: float
 ) -> None:
-    """Turn it back about the line by the angle that its mass leans, at rest."""
+    """Turn the robot back about the line by the angle that its mass leans, and stop it."""
     address = int(model.jnt_qposadr[joint])
     quaternion = np.empty(4)
     mujoco.mju_axisAngle2Quat(quaternion, direction, -lean)

@@ -1,4 +1,4 @@
-"""Where a robot stands upright: its mass above the hinge, or above what it stands on."""
+"""The upright stance of a robot: its mass above the hinge, or above its contacts."""
 
 from __future__ import annotations
 
@@ -13,51 +13,51 @@ import numpy as np
 from cmg_mj.errors import InputError
 from cmg_mj.plant.checks import TRUE_DEG
 from cmg_mj.plant.mjcf import compile_model
-from cmg_mj.plant.mounting.attach import place_cubes
+from cmg_mj.plant.mounting.attach import place_modules
 from cmg_mj.plant.mounting.axes import hinge_or_direction
 from cmg_mj.plant.mounting.keyframes import as_qpos
 from cmg_mj.plant.mounting.request import MountRequest
 from cmg_mj.plant.mounting.settling import UP, Support, stand
 
 SMALLEST_HEIGHT_M = 1e-3
-"""Less far above the line a robot's mass is not above it [m]."""
+"""Smallest height of a robot's mass above the line [m]."""
 MOST_TRIES = 5
-"""So often a robot is put on the floor, its modules turned along the line that it then stands on."""
+"""Most rounds of settling on the floor and turning the modules along the contact line."""
 
 
 class Place(NamedTuple):
-    """Where on a robot modules go, and about what it tilts."""
+    """Where the modules go on a robot, and the line that it tilts about."""
 
     joint: str
-    """The hinge that it tilts about, or its free joint."""
+    """The hinge that the robot tilts about, or its free joint."""
     free: bool
     direction: np.ndarray
-    """Along the line, nearly, in the world, (3,)."""
+    """Approximate direction of the line in the world, (3,)."""
     middle: np.ndarray
-    """Of the row of modules, in the body's frame, (3,) [m]."""
+    """Middle of the row of modules in the body frame, (3,) [m]."""
 
 
-def find_place(model: mujoco.MjModel, pose: np.ndarray, asked: MountRequest, path: Path) -> Place:
-    """Look up what is asked for on a robot.
+def find_place(model: mujoco.MjModel, pose: np.ndarray, request: MountRequest, path: Path) -> Place:
+    """Find the requested axis and position on a robot.
 
     Args:
         model: The robot.
-        pose: Where its joints stand, (nq,).
-        asked: The body, the axis, the place of the modules.
+        pose: Joint positions, (nq,).
+        request: The body, the axis, the position of the modules.
         path: The file, for messages.
 
     Returns:
-        Where they go.
+        The place of the modules.
 
     Raises:
         InputError: The body has no mass, or there is no such axis.
     """
-    body = model.body(asked.body).id
+    body = model.body(request.body).id
     if not model.body_subtreemass[body] > 0.0:
-        raise InputError(f"--body {asked.body}: {path}: has no mass, nor has anything on it")
-    hinge, direction = hinge_or_direction(model, posed(model, pose), body, asked.axis, path)
+        raise InputError(f"--body {request.body}: {path}: has no mass, nor has anything on it")
+    hinge, direction = hinge_or_direction(model, posed(model, pose), body, request.axis, path)
     joint = int(model.body_jntadr[int(model.body_rootid[body])]) if hinge is None else hinge  # the free one
-    middle = model.body_ipos[body].copy() if asked.at is None else np.array(asked.at, dtype=float)
+    middle = model.body_ipos[body].copy() if request.position is None else np.array(request.position, dtype=float)
     return Place(model.joint(joint).name, hinge is None, direction, middle)
 
 
@@ -67,13 +67,13 @@ def stand_upright(
     place: Place,
     mounts: Sequence[mujoco.MjsFrame],
     others: Sequence[str],
-    asked: MountRequest,
+    request: MountRequest,
     path: Path,
 ) -> tuple[mujoco.MjModel, Support]:
     """Place the modules along the line, and stand the robot up with them.
 
-    What it stands on says better how the line lies than what was asked for, and modules along another line stand
-    otherwise: it is put down until both agree.
+    The contacts determine the line better than the request, and modules along another line shift the contacts.
+    The robot settles on the floor until both agree.
 
     Args:
         spec: The robot with its modules, all joints held that are to be; the modules are placed in it.
@@ -81,33 +81,33 @@ def stand_upright(
         place: Where the modules go.
         mounts: What each module hangs on.
         others: The hinges of other axes, which are to stand upright too.
-        asked: The body, the modules' scale.
+        request: The body, the modules' scale.
         path: The file, for messages.
 
     Returns:
-        The model, compiled, and where it stands.
+        The compiled model and its support.
 
     Raises:
-        InputError: It cannot stand upright, or stands by itself.
+        InputError: The robot cannot stand upright, or stands by itself.
     """
     model = compile_model(spec, path)
-    support, stood = Support(as_qpos(model, poses), np.zeros(3), place.direction), False
-    for left in reversed(range(MOST_TRIES + 1)):
-        turn = posed(model, support.pose).xmat[model.body(asked.body).id].reshape(3, 3)
-        along = place_cubes(mounts, place.middle, turn.T @ axes_along(support.direction), asked.scale)
-        if along and stood:
+    support, settled = Support(as_qpos(model, poses), np.zeros(3), place.direction), False
+    for tries_left in reversed(range(MOST_TRIES + 1)):
+        turn = posed(model, support.pose).xmat[model.body(request.body).id].reshape(3, 3)
+        unchanged = place_modules(mounts, place.middle, turn.T @ axes_along(support.direction), request.scale)
+        if unchanged and settled:
             break
         model = compile_model(spec, path)
         if not place.free:
             return model, _all_balanced(model, support, place.joint, others, path)
-        if left:
+        if tries_left:
             joint = model.joint(place.joint).id
-            support, stood = stand(model, support.pose, joint, support.direction, path), True
+            support, settled = stand(model, support.pose, joint, support.direction, path), True
     return model, support
 
 
 def _all_balanced(model: mujoco.MjModel, start: Support, hinge: str, others: Sequence[str], path: Path) -> Support:
-    """Turn the line's hinge, and those of other axes, so that the mass on each is above it."""
+    """Turn the hinges of all axes so that the mass on each hinge is above it."""
     line = model.joint(hinge).id
     pose = start.pose
     for joint in [*(model.joint(other).id for other in others), line] * (2 if others else 0):
@@ -119,37 +119,37 @@ def _all_balanced(model: mujoco.MjModel, start: Support, hinge: str, others: Seq
 def check_unturned(
     model: mujoco.MjModel, poses: Mapping[str, np.ndarray], qpos: np.ndarray, hinges: Sequence[str], path: Path
 ) -> None:
-    """Where axes meet, the modules of one are square to its hinge as long as the others' hinges stay where they were.
+    """Check that no hinge turned: the modules of one axis are square to its hinge only while the other hinges rest.
 
     Raises:
-        InputError: One has to turn for the robot to stand upright.
+        InputError: A hinge has to turn for the robot to stand upright.
     """
     for name in hinges:
         turned = math.degrees(float(qpos[int(model.joint(name).qposadr[0])] - poses[name][0]))
         if abs(turned) > TRUE_DEG:
             raise InputError(
                 f"{path}: to stand upright on all axes the hinge {name!r} has to turn by {turned:.3g} deg, and the "
-                "modules of another axis would stand crooked: place the modules above both hinges (--at), or mount "
-                "the first axis in a keyframe in which its mass is above both"
+                "modules of another axis would stand crooked: place the modules above both hinges (--position), or "
+                "mount the first axis in a keyframe in which its mass is above both"
             )
 
 
 def under_and_height(
     model: mujoco.MjModel, data: mujoco.MjData, joint: int, point: np.ndarray, direction: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """The point of a line under a robot's mass, in the world (3,) [m], and how high the robot is above the line [m]."""
+    """Return the line's point under a robot's mass, in the world (3,) [m], and the robot's height above it [m]."""
     root = int(model.jnt_bodyid[joint])
     under = point + ((data.subtree_com[root] - point) @ direction) * direction
     return under, _top(model, data, root) - float(point[2])
 
 
 def axes_along(direction: np.ndarray) -> np.ndarray:
-    """A line's axes in the world, by columns: y along it, z upward."""
+    """Return a line's axes in the world, by columns: y along the line, z upward."""
     return np.stack([np.cross(direction, UP), direction, UP], axis=1)
 
 
 def posed(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
-    """A model with its joints somewhere, after a forward pass."""
+    """Return a model's data with given joint positions, after a forward pass."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_forward(model, data)
@@ -157,7 +157,7 @@ def posed(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
 
 
 def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np.ndarray, path: Path) -> Support:
-    """Turn a hinge so that the mass on it is above it."""
+    """Turn a hinge so that the mass it carries is above it."""
     data = posed(model, qpos)
     point = data.xanchor[joint].copy()
     arm = data.subtree_com[int(model.jnt_bodyid[joint])] - point
@@ -182,7 +182,7 @@ def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np
 
 
 def _top(model: mujoco.MjModel, data: mujoco.MjData, root: int) -> float:
-    """The highest point of all that a body carries [m]."""
+    """Return the highest point of everything that a body carries [m]."""
     highest = -math.inf
     for geom in range(model.ngeom):
         body = int(model.geom_bodyid[geom])

@@ -1,6 +1,6 @@
-"""A user's own log, CSV or Parquet -> evenly sampled signals in SI and radians, with a word on all that was done."""
+"""A user's own log, CSV or Parquet, read into evenly sampled signals in SI and radians."""
 
-from cmg_mj.replay.logs.log import Log
+from cmg_mj.replay.logs.log import Log, ReadOptions
 from cmg_mj.replay.logs.reading import read_log
 
-__all__ = ["Log", "read_log"]
+__all__ = ["Log", "ReadOptions", "read_log"]

@@ -1,8 +1,9 @@
-"""What of a log cannot be, or has nothing to say: refused in one line."""
+"""Checks that refuse an impossible or an uninformative log in one line."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -15,16 +16,28 @@ from cmg_mj.scenario.disturbances import Window, inside
 from cmg_mj.sensors.tilt import RadialTilt
 
 LARGEST = 1e12
-"""Of anything measured, times since 1970 included [rad, rad/s, m/s^2, s]."""
+"""Largest value of a signal, times since 1970 included [rad, rad/s, m/s^2, s]."""
 SLOW_HZ = 5.0
-"""No rate of anything that balances; rows in milliseconds taken as seconds have at most this, from 5 kHz down [Hz]."""
+"""Rate below which nothing balances; rows in milliseconds taken as seconds have at most this, up to 5 kHz [Hz]."""
 FARTHEST_M = 10.0
-"""Of an accelerometer from the pivot: nothing so large is balanced, and millimetres taken as metres are larger [m]."""
+"""Largest distance of an accelerometer from the pivot; millimetres taken as metres are larger [m]."""
 
 
-def accelerometer_geometry(found: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:
-    """Where the accelerometers are."""
-    if "inner_x" not in found:
+def check_distinct_logs(paths: Sequence[str]) -> None:
+    """Refuse a log that is named twice: it would count twice in means and intervals."""
+    names: dict[Path, str] = {}
+    for name in paths:
+        path = Path(os.path.realpath(name))
+        path = path.parent if path.name == "trajectory.parquet" else path
+        if path in names:
+            message = f"{name}: the same log as {names[path]}" if name != names[path] else f"{name}: given twice"
+            raise InputError(message)
+        names[path] = name
+
+
+def accelerometer_geometry(columns: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:
+    """Return the geometry of the accelerometers; None if there are none."""
+    if "inner_x" not in columns:
         if radii is not None:
             raise InputError("--radii: there are no accelerometers; name inner_x, inner_z, outer_x, outer_z")
         return None
@@ -39,7 +52,7 @@ def accelerometer_geometry(found: Mapping[str, Column], radii: tuple[float, floa
 
 
 def windows_inside(path: Path, windows: Sequence[Window], time: np.ndarray) -> tuple[Window, ...]:
-    """The windows, in each of which there is a sample."""
+    """Check that each window holds a sample, and return the windows."""
     for start, end in windows:
         if not inside(time, [(start, end)]).any():
             ends = f"{time[0]:.6g} to {time[-1]:.6g} s"
@@ -47,25 +60,25 @@ def windows_inside(path: Path, windows: Sequence[Window], time: np.ndarray) -> t
     return tuple(windows)
 
 
-def check_sizes(path: Path, found: Mapping[str, Column], raw: Mapping[str, np.ndarray]) -> None:
-    """Refuse numbers so large that formulas overflow; nothing measured has them."""
-    for role, values in raw.items():
+def check_sizes(path: Path, columns: Mapping[str, Column], signals: Mapping[str, np.ndarray]) -> None:
+    """Refuse numbers so large that formulas overflow."""
+    for role, values in signals.items():
         beyond = np.abs(values) > LARGEST
         if beyond.any():
             row = int(np.argmax(beyond))
-            where = f"{path}: row {row + 1}, column {found[role].name!r}"
+            where = f"{path}: row {row + 1}, column {columns[role].name!r}"
             raise InputError(f"{where}: {values[row]:.3g} in SI units is no {role}; at most {LARGEST:g}")
 
 
-def check_numbers(path: Path, found: Mapping[str, Column], raw: Mapping[str, np.ndarray]) -> None:
+def check_numbers(path: Path, columns: Mapping[str, Column], signals: Mapping[str, np.ndarray]) -> None:
     """Refuse a column without a number."""
-    for role, values in raw.items():
+    for role, values in signals.items():
         if not np.isfinite(values).any():
-            raise InputError(f"{path}: column {found[role].name!r}, the {role}, has no number at all")
+            raise InputError(f"{path}: column {columns[role].name!r}, the {role}, has no number at all")
 
 
 def check_assumed(path: Path, name: str, time: np.ndarray) -> None:
-    """Refuse times whose unit nobody says and that would be slow in seconds: milliseconds of a quick log are."""
+    """Refuse times of unknown unit that would be slow in seconds: they are probably milliseconds."""
     steps = np.abs(np.diff(time[np.isfinite(time)]))
     usual = float(np.median(steps)) if len(steps) else 0.0
     if usual * SLOW_HZ > 1.0:
@@ -76,7 +89,7 @@ def check_assumed(path: Path, name: str, time: np.ndarray) -> None:
 
 
 def check_motion(path: Path, columns: Mapping[str, np.ndarray], referred: bool) -> None:
-    """Refuse what nothing can be learnt from."""
+    """Refuse a log without motion."""
     tilt, reference = columns["y1_rad"], columns[REFERENCE]
     if np.ptp(tilt) == 0.0:
         raise InputError(f"{path}: the tilt is {tilt[0]:g} rad in every row: nothing moves")

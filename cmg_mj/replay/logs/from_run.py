@@ -1,4 +1,4 @@
-"""A run's own recording as a log: its columns, pushes and scenario are known."""
+"""A run's own recording as a log, whose columns, pushes and scenario are known."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from cmg_mj.scenario.disturbances import Push, push_windows
 SAY_COLUMNS = "say which columns are what, --columns tilt=HEADING,rate=HEADING,..."
 
 
-def of_trajectory(path: Path) -> Log:
-    """A run's own recording, whose columns are known."""
+def log_of_trajectory(path: Path) -> Log:
+    """Read a run's own recording, whose columns are known."""
     if not path.is_file() or _begins(path) != b"PAR1":
         if not path.exists():
             raise InputError(f"{path}: no such file; name a CSV or Parquet file, or the folder of a run")
@@ -46,7 +46,7 @@ def of_trajectory(path: Path) -> Log:
     has = frozenset({"gimbals", "acceleration", "reference"})
     name = path.parent.name if path.stem == "trajectory" and path.parent.name else path.stem
     everything = [slice(0, len(trajectory))]
-    return Log(name, 1.0 / rate, columns, everything, has, None, push_windows(pushes), (), {}, scenario)
+    return Log(name, 1.0 / rate, columns, everything, has, None, push_windows(pushes), scenario=scenario)
 
 
 def _begins(path: Path) -> bytes:

@@ -17,23 +17,72 @@ REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
 
 
+TomlValue = str | float | dict[str, str] | dict[str, float] | list[float] | list[list[float]]
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """Options with which a log is read; the command line has one option for each.
+
+    Attributes:
+        columns: Role -> heading, such as `{"tilt": "pitch_deg", "rate": "gyro_dps"}`; the roles: `ROLES`. Empty for a
+            run's own recording.
+        units: Role -> unit, for headings that do not end in theirs.
+        scale: Role -> factor.
+        offset: Role -> addend after the scale, in the column's unit.
+        rate_hz: Rate of rows without a time; rows with a time are resampled to this rate [Hz].
+        max_gap_s: Longer gaps part the log; by default those of more than five rows [s].
+        delay_s: Lag of the reference behind the other signals [s].
+        radii_m: Distances of two accelerometers from the pivot, the inner first [m].
+        time_range_s: Start and end of the part to read, from the first row on [s].
+        windows_s: Windows that are scored separately, in the log's own time [s].
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    scale: Mapping[str, float] = field(default_factory=dict)
+    offset: Mapping[str, float] = field(default_factory=dict)
+    rate_hz: float | None = None
+    max_gap_s: float | None = None
+    delay_s: float = 0.0
+    radii_m: tuple[float, float] | None = None
+    time_range_s: tuple[float, float] | None = None
+    windows_s: Sequence[Window] = ()
+
+    def as_toml(self) -> dict[str, TomlValue]:
+        """Return the options that are not the defaults, as TOML holds them."""
+        options: dict[str, TomlValue | None] = {
+            "columns": dict(self.columns),
+            "units": dict(self.units),
+            "scale": dict(self.scale),
+            "offset": dict(self.offset),
+            "rate_hz": self.rate_hz,
+            "max_gap_s": self.max_gap_s,
+            "delay_s": self.delay_s or None,
+            "radii_m": list(self.radii_m) if self.radii_m else None,
+            "time_range_s": list(self.time_range_s) if self.time_range_s else None,
+            "windows_s": [list(window) for window in self.windows_s],
+        }
+        return {name: value for name, value in options.items() if value not in (None, {}, [])}
+
+
 @dataclass(frozen=True)
 class Log:
     """One log.
 
     Attributes:
-        name: Of the file, without its ending.
+        name: Name of the file, without its ending.
         dt: Sample period [s].
-        columns: `time_s`, `y1_rad`, `y2_rad`, `u_rad_s`, `acceleration_rad_s2`, `reference_rad_s`, each (n,). Of what
-            the log does not have, y2 and u are zero, the others NaN.
-        parts: Where no gap is in between: the observers start at the beginning of each.
-        has: What the log has of "gimbals" (y2 and u), "acceleration" and "reference".
-        tilt: Where the two accelerometers are, if the tilt is theirs.
-        windows: What is scored on its own as well [s].
-        notes: What was done to the rows that nobody has asked for, and what seems mistaken, a line each.
-        given: From what it was read, for a file to tell.
-        scenario: Of a trajectory the scenario, resolved.
-        rows_s: Between the file's own rows, whatever the samples' period [s]; None of a trajectory.
+        columns: `time_s`, `y1_rad`, `y2_rad`, `u_rad_s`, `acceleration_rad_s2`, `reference_rad_s`, each (n,). Where
+            the log lacks a signal, y2 and u are zero, the others NaN.
+        parts: Slices without a gap; the observers start at the beginning of each.
+        has: Those of "gimbals" (y2 and u), "acceleration" and "reference" that the log has.
+        tilt: Geometry of the two accelerometers, if they measure the tilt.
+        windows: Windows that are scored separately [s].
+        notes: Changes to the rows that were not requested, and likely mistakes, a line each.
+        options: Options with which it was read, the units of all columns among them.
+        scenario: The resolved scenario of a run's recording.
+        row_period_s: Period of the file's own rows, whatever the sample period [s]; None for a run's recording.
     """
 
     name: str
@@ -44,9 +93,9 @@ class Log:
     tilt: RadialTilt | None = None
     windows: Sequence[Window] = ()
     notes: Sequence[str] = ()
-    given: Mapping[str, Any] = field(default_factory=dict)
+    options: ReadOptions = ReadOptions()
     scenario: Mapping[str, Any] | None = None
-    rows_s: float | None = None
+    row_period_s: float | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -56,28 +105,28 @@ class Log:
 
     @property
     def duration_s(self) -> float:
-        """Without the gaps [s]."""
+        """Duration without the gaps [s]."""
         return sum(part.stop - part.start - 1 for part in self.parts) * self.dt
 
     def trajectory(self, part: slice) -> Trajectory:
-        """One part, as `cmg_mj.replay.replay` takes it."""
+        """Return one part, as `cmg_mj.replay.replay` takes it."""
         return Trajectory({name: values[part] for name, values in self.columns.items()})
 
-    def scored(self, skip_s: float) -> np.ndarray:
-        """Which samples count: those from so long after the start of a part, (n,)."""
+    def scored(self, settle_s: float) -> np.ndarray:
+        """Return which samples count: those from `settle_s` after the start of a part on, (n,)."""
         counted = np.zeros(len(self), dtype=bool)
         for part in self.parts:
-            counted[part.start + math.ceil(skip_s / self.dt - 1e-9) : part.stop] = True
+            counted[part.start + math.ceil(settle_s / self.dt - 1e-9) : part.stop] = True
         return counted
 
     def broken(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Times and values with a NaN between two parts, so that no line is drawn across a gap."""
+        """Return times and values with a NaN between two parts, so that no line is drawn across a gap."""
         time = [np.append(self["time_s"][part], self["time_s"][part][-1] + self.dt) for part in self.parts]
         drawn = [np.append(values[part], np.nan) for part in self.parts]
         return np.concatenate(time)[:-1], np.concatenate(drawn)[:-1]
 
     def cut(self, rows: slice) -> Log:
-        """A piece of it."""
+        """Return the log's part in a range of rows."""
         start, stop, _ = rows.indices(len(self))
         parts = [slice(max(p.start, start) - start, min(p.stop, stop) - start) for p in self.parts]
         columns = {name: values[start:stop] for name, values in self.columns.items()}

@@ -1,15 +1,16 @@
-"""A file -> a log: its columns converted, checked, sampled evenly and joined."""
+"""Reading of a log: a file's columns are converted, checked, sampled evenly and joined."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from cmg_mj.errors import InputError
+from cmg_mj.replay.logs.acceleration_checks import implausible_acceleration
 from cmg_mj.replay.logs.checks import (
     accelerometer_geometry,
     check_assumed,
@@ -19,166 +20,184 @@ from cmg_mj.replay.logs.checks import (
     windows_inside,
 )
 from cmg_mj.replay.logs.columns import ACCELEROMETERS, Column, columns_of
-from cmg_mj.replay.logs.from_run import of_trajectory
-from cmg_mj.replay.logs.log import REFERENCE, Log
+from cmg_mj.replay.logs.from_run import log_of_trajectory
+from cmg_mj.replay.logs.log import REFERENCE, Log, ReadOptions
 from cmg_mj.replay.logs.resampling import sampled_where_known
 from cmg_mj.replay.logs.sampling import SAME_TIME, Part, Sampler
-from cmg_mj.replay.logs.swapped_accelerometers import HINT, interchanged
 from cmg_mj.replay.logs.table import read_table
-from cmg_mj.replay.logs.unit_checks import beside_the_tilt, of_gravity
 from cmg_mj.replay.logs.units import in_si
-from cmg_mj.replay.logs.unwrapping import turned
-from cmg_mj.scenario.disturbances import Window
 from cmg_mj.sensors.tilt import RadialTilt
 
+UNWRAP_STEP = 1.5 * math.pi
+"""A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
+FLICKER = 0.2
+"""Noise makes an angle near the end of its turn wrap and return at once, within this of a full turn [rad]."""
 
-def read_log(
-    path: Path | str,
-    columns: Mapping[str, str] | None = None,
-    *,
-    units: Mapping[str, str] | None = None,
-    scale: Mapping[str, float] | None = None,
-    offset: Mapping[str, float] | None = None,
-    rate_hz: float | None = None,
-    max_gap_s: float | None = None,
-    delay_s: float = 0.0,
-    radii_m: tuple[float, float] | None = None,
-    between_s: tuple[float, float] | None = None,
-    windows_s: Sequence[Window] = (),
-) -> Log:
+
+def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     """Read a log.
 
     Args:
         path: A CSV with a heading, a Parquet file, or a run's folder or `trajectory.parquet`, whose columns are known.
-        columns: Role -> heading, such as `{"tilt": "pitch_deg", "rate": "gyro_dps"}`; the roles: `ROLES`.
-        units: Role -> unit, for headings that do not end in theirs.
-        scale: Role -> factor.
-        offset: Role -> what is added after that, in the column's unit.
-        rate_hz: The rate of rows without a time; of rows with one, that to resample to [Hz].
-        max_gap_s: Longer gaps part the log; by default those of more than five rows [s].
-        delay_s: How far the reference lags behind the rest [s].
-        radii_m: Of two accelerometers, the distances from the pivot, the inner first [m].
-        between_s: From when to when, from the first row on [s].
-        windows_s: What is scored on its own as well, in the log's own time [s].
+        options: The columns of the file, and how to convert and sample them; none for a run's own recording.
 
     Returns:
         The log.
 
     Raises:
-        InputError: Something is wrong with the file or the arguments.
+        InputError: Something is wrong with the file or the options.
     """
-    path = Path(path)
+    path, options = Path(path), options or ReadOptions()
     if path.is_dir() and (path / "trajectory.parquet").is_file():
         path = path / "trajectory.parquet"
-    if not columns:
-        log = of_trajectory(path)
-        told = {"--units": units, "--scale": scale, "--offset": offset, "--rate": rate_hz, "--max-gap": max_gap_s}
-        told |= {"--delay": delay_s, "--radii": radii_m, "--between": between_s}
-        for option, value in told.items():
-            if value not in (None, 0.0, {}):
-                raise InputError(f"{option}: {path} is a run's own recording; read it with --columns for that")
-        return log if not windows_s else replace(log, windows=windows_inside(path, windows_s, log["time_s"]))
-    found = columns_of(columns, units, scale, offset)
-    tilt = accelerometer_geometry(found, radii_m)
-    if not math.isfinite(delay_s):
-        raise InputError(f"--delay {delay_s:g}: must be a finite number of seconds")
-    if delay_s and "rate" not in found:
-        raise InputError("--delay: there is no reference to shift; name it, --columns rate=...")
-    headings = [column.name for column in found.values()]
-    table, notes, dated = read_table(path, headings, found["time"].name if "time" in found else None)
-    if dated:  # seconds already, whatever the heading ends in
-        clock = found["time"]
-        found["time"] = replace(clock, unit="s", factor=clock.factor / in_si("time", clock.unit), told=True)
-    with np.errstate(over="ignore"):
-        raw = {role: table[column.name.strip()] * column.factor + column.offset for role, column in found.items()}
-    check_sizes(path, found, raw)
-    check_numbers(path, found, raw)
-    time = raw.pop("time", None)
-    if time is not None and not found["time"].told:
-        check_assumed(path, found["time"].name, time)
-        notes.append(f"the time {found['time'].name!r} is taken as seconds")
-    reference = raw.pop("rate", None)
-    if between_s is not None:
-        time, raw, reference = _between(path, time, raw, reference, between_s, rate_hz)
-    measured = _measured(raw, tilt, notes)
-    sampler = Sampler(str(path), rate_hz, max_gap_s, notes)
-    dt, parts = sampler.parts(time, measured, held=("u_rad_s",))
-    stamps = np.arange(len(measured["y1_rad"])) / (rate_hz or 1.0) if time is None else time
-    joined = _joined(parts, stamps, reference, delay_s)
-    check_motion(path, joined, reference is not None)
-    has = {"gimbals"} if "u_rad_s" in measured and "y2_rad" in measured else set()
-    has |= {"acceleration"} if "acceleration_rad_s2" in measured else set()
-    has |= {"reference"} if reference is not None else set()
-    _say_halves(found, has, notes)
-    ends = np.cumsum([len(part.time) for part in parts]).tolist()
-    given = {
-        "columns": {role: column.name for role, column in found.items()},
-        "units": {role: column.unit for role, column in found.items()},
-        **({"scale": dict(scale)} if scale else {}),
-        **({"offset": dict(offset)} if offset else {}),
-        **({"rate_hz": rate_hz} if rate_hz else {}),
-        **({"max_gap_s": max_gap_s} if max_gap_s is not None else {}),
-        **({"delay_s": delay_s} if delay_s else {}),
-        **({"radii_m": list(radii_m)} if radii_m else {}),
-        **({"between_s": list(between_s)} if between_s else {}),
-        **({"windows_s": [list(window) for window in windows_s]} if windows_s else {}),
-    }
-    if windows_s and reference is None:
+    if not options.columns:
+        return _read_run(path, options)
+    rows = _convert(path, options)
+    if options.time_range_s is not None:
+        rows = _cut(path, rows, options.time_range_s, options.rate_hz)
+    sampler = Sampler(str(path), options.rate_hz, options.max_gap_s, rows.notes)
+    measured = _measured(rows)
+    dt, parts = sampler.parts(rows.time, measured, held=("u_rad_s",))
+    joined = _join(parts, rows, options)
+    check_motion(path, joined, rows.reference is not None)
+    has = _signals_in(measured, rows)
+    if options.windows_s and rows.reference is None:
         raise InputError("--window: there is no reference to score against; name it, --columns rate=...")
-    windows = windows_inside(path, windows_s, joined["time_s"])
+    windows = windows_inside(path, options.windows_s, joined["time_s"])
+    ends = np.cumsum([len(part.time) for part in parts]).tolist()
     slices = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
+    notes = list(rows.notes)
     if "acceleration" in has:
-        notes += _implausible(found, raw, joined, slices, dt, tilt)
-    return Log(path.stem, dt, joined, slices, frozenset(has), tilt, windows, tuple(notes), given, None, sampler.period)
+        tilt, acceleration = joined["y1_rad"], joined["acceleration_rad_s2"]
+        notes += implausible_acceleration(rows.columns, rows.signals, tilt, acceleration, slices, dt, rows.tilt)
+    units = {role: column.unit for role, column in rows.columns.items()}
+    options = replace(options, units=units)
+    return Log(path.stem, dt, joined, slices, has, rows.tilt, windows, tuple(notes), options, None, sampler.period)
 
 
-def _between(
-    path: Path,
-    time: np.ndarray | None,
-    raw: dict[str, np.ndarray],
-    reference: np.ndarray | None,
-    between: tuple[float, float],
-    rate: float | None,
-) -> tuple[np.ndarray | None, dict[str, np.ndarray], np.ndarray | None]:
-    """The rows between two times, counted from the earliest."""
-    n = len(next(iter(raw.values())))
-    clock = (
-        np.arange(n) / (rate or 1.0) if time is None else time - np.nanmin(np.where(np.isfinite(time), time, np.inf))
-    )
-    with np.errstate(invalid="ignore"):
-        kept = (clock >= between[0] - 1e-9) & (clock <= between[1] + 1e-9)
-    if not kept.any():
-        raise InputError(
-            f"--between {between[0]:g}:{between[1]:g}: {path} has no row there; it lasts {np.nanmax(clock):.6g} s"
-        )
-    cut = {role: values[kept] for role, values in raw.items()}
-    return None if time is None else time[kept], cut, None if reference is None else reference[kept]
+def _read_run(path: Path, options: ReadOptions) -> Log:
+    log = log_of_trajectory(path)
+    refused = {
+        "--units": options.units,
+        "--scale": options.scale,
+        "--offset": options.offset,
+        "--rate": options.rate_hz,
+        "--max-gap": options.max_gap_s,
+        "--delay": options.delay_s,
+        "--radii": options.radii_m,
+        "--time-range": options.time_range_s,
+    }
+    for option, value in refused.items():
+        if value not in (None, 0.0, {}):
+            raise InputError(f"{option}: {path} is a run's own recording; read it with --columns for that")
+    if not options.windows_s:
+        return log
+    return replace(log, windows=windows_inside(path, options.windows_s, log["time_s"]))
 
 
-def _measured(raw: Mapping[str, np.ndarray], tilt: RadialTilt | None, notes: list[str]) -> dict[str, np.ndarray]:
-    """Row by row what the observers are given, by its name in a trajectory."""
-    found: dict[str, np.ndarray] = {}
-    if tilt is not None:
-        forces = [raw[role] for role in ACCELEROMETERS]
-        found["y1_rad"] = turned(np.asarray(tilt(*forces)), notes)
-        found["acceleration_rad_s2"] = np.asarray(tilt.acceleration(raw["inner_x"], raw["outer_x"]))
+@dataclass(frozen=True)
+class _Rows:
+    """The rows of a file in SI units and radians.
+
+    Attributes:
+        columns: Role -> column.
+        tilt: Geometry of the accelerometers, if they measure the tilt.
+        time: Stamps, (n_rows,) [s]; None without a time column.
+        signals: Role -> values, (n_rows,), without time and reference.
+        reference: The reference rate, (n_rows,) [rad/s].
+        notes: Changes to the rows, a line each; reading adds more.
+    """
+
+    columns: Mapping[str, Column]
+    tilt: RadialTilt | None
+    time: np.ndarray | None
+    signals: Mapping[str, np.ndarray]
+    reference: np.ndarray | None
+    notes: list[str]
+
+
+def _convert(path: Path, options: ReadOptions) -> _Rows:
+    """Read the columns of a file, convert them, and check them one by one."""
+    columns = columns_of(options.columns, options.units, options.scale, options.offset)
+    tilt = accelerometer_geometry(columns, options.radii_m)
+    if not math.isfinite(options.delay_s):
+        raise InputError(f"--delay {options.delay_s:g}: must be a finite number of seconds")
+    if options.delay_s and "rate" not in columns:
+        raise InputError("--delay: there is no reference to shift; name it, --columns rate=...")
+    headings = [column.name for column in columns.values()]
+    table, notes, dated = read_table(path, headings, columns["time"].name if "time" in columns else None)
+    if dated:  # seconds already, whatever the heading ends in
+        clock = columns["time"]
+        columns["time"] = replace(clock, unit="s", factor=clock.factor / in_si("time", clock.unit), unit_known=True)
+    with np.errstate(over="ignore"):
+        signals = {role: table[column.name.strip()] * column.factor + column.offset for role, column in columns.items()}
+    check_sizes(path, columns, signals)
+    check_numbers(path, columns, signals)
+    time = signals.pop("time", None)
+    if time is not None and not columns["time"].unit_known:
+        check_assumed(path, columns["time"].name, time)
+        notes.append(f"the time {columns['time'].name!r} is taken as seconds")
+    reference = signals.pop("rate", None)
+    return _Rows(columns, tilt, time, signals, reference, notes)
+
+
+def _cut(path: Path, rows: _Rows, time_range: tuple[float, float], rate: float | None) -> _Rows:
+    """Return the rows between two times, counted from the earliest."""
+    n = len(next(iter(rows.signals.values())))
+    if rows.time is None:
+        clock = np.arange(n) / (rate or 1.0)
     else:
-        found["y1_rad"] = turned(raw["tilt"], notes)
-        if "acceleration" in raw:
-            found["acceleration_rad_s2"] = raw["acceleration"]
-    if "gimbal" in raw:
-        found["y2_rad"] = raw["gimbal"]
-    elif "gimbal1" in raw:
-        found["y2_rad"] = (raw["gimbal1"] - raw["gimbal2"]) / 2.0
-    if "command" in raw:
-        found["u_rad_s"] = raw["command"]
-    return found
+        clock = rows.time - np.nanmin(np.where(np.isfinite(rows.time), rows.time, np.inf))
+    start, end = time_range
+    with np.errstate(invalid="ignore"):
+        inside = (clock >= start - 1e-9) & (clock <= end + 1e-9)
+    if not inside.any():
+        raise InputError(f"--time-range {start:g}:{end:g}: {path} has no row there; it lasts {np.nanmax(clock):.6g} s")
+    return replace(
+        rows,
+        time=None if rows.time is None else rows.time[inside],
+        signals={role: values[inside] for role, values in rows.signals.items()},
+        reference=None if rows.reference is None else rows.reference[inside],
+    )
 
 
-def _joined(
-    parts: Sequence[Part], stamps: np.ndarray, reference: np.ndarray | None, delay: float
-) -> dict[str, np.ndarray]:
-    """All parts, one behind the other, with every column of a log."""
+def _measured(rows: _Rows) -> dict[str, np.ndarray]:
+    """Return row by row the observers' measurements, by their names in a trajectory."""
+    signals = rows.signals
+    measured: dict[str, np.ndarray] = {}
+    if rows.tilt is not None:
+        forces = [signals[role] for role in ACCELEROMETERS]
+        measured["y1_rad"] = unwrapped(np.asarray(rows.tilt(*forces)), rows.notes)
+        measured["acceleration_rad_s2"] = np.asarray(rows.tilt.acceleration(signals["inner_x"], signals["outer_x"]))
+    else:
+        measured["y1_rad"] = unwrapped(signals["tilt"], rows.notes)
+        if "acceleration" in signals:
+            measured["acceleration_rad_s2"] = signals["acceleration"]
+    if "gimbal" in signals:
+        measured["y2_rad"] = signals["gimbal"]
+    elif "gimbal1" in signals:
+        measured["y2_rad"] = (signals["gimbal1"] - signals["gimbal2"]) / 2.0
+    if "command" in signals:
+        measured["u_rad_s"] = signals["command"]
+    return measured
+
+
+def _signals_in(measured: Mapping[str, np.ndarray], rows: _Rows) -> frozenset[str]:
+    """Return which signals a log has, and note a gimbal without command or a command without gimbal."""
+    gimbal, command = "y2_rad" in measured, "u_rad_s" in measured
+    if gimbal != command:
+        present, absent = ("gimbal", "command") if gimbal else ("command", "gimbal")
+        rows.notes.append(f"there is a {present} and no {absent}: observers that need the gimbals need both")
+    present = {
+        "gimbals": gimbal and command,
+        "acceleration": "acceleration_rad_s2" in measured,
+        "reference": rows.reference is not None,
+    }
+    return frozenset(name for name, known in present.items() if known)
+
+
+def _join(parts: Sequence[Part], rows: _Rows, options: ReadOptions) -> dict[str, np.ndarray]:
+    """Join all parts, with every column of a log."""
     time = np.concatenate([part.time for part in parts])
     columns = {"time_s": time - parts[0].time[0] if abs(parts[0].time[0]) > 1e6 else time}
     absent = {"y2_rad": 0.0, "u_rad_s": 0.0, "acceleration_rad_s2": math.nan}
@@ -186,7 +205,9 @@ def _joined(
         values = [part.values.get(name, np.full(len(part.time), absent.get(name, 0.0))) for part in parts]
         columns[name] = np.concatenate(values)
     columns[REFERENCE] = np.full(len(time), np.nan)
+    reference = rows.reference
     if reference is not None:
+        stamps = np.arange(len(reference)) / (options.rate_hz or 1.0) if rows.time is None else rows.time
         known = np.isfinite(stamps)
         stamps, reference = stamps[known], reference[known]
         order = np.argsort(stamps, kind="stable")
@@ -194,32 +215,42 @@ def _joined(
         first = np.concatenate([[True], np.diff(stamps) > SAME_TIME * parts[0].step])
         stamps, reference = stamps[first], reference[first]
         columns[REFERENCE] = np.concatenate(
-            [sampled_where_known(part.time, part.when(stamps) - delay, reference) for part in parts]
+            [sampled_where_known(part.time, part.when(stamps) - options.delay_s, reference) for part in parts]
         )
     return columns
 
 
-def _implausible(
-    found: Mapping[str, Column],
-    raw: Mapping[str, np.ndarray],
-    joined: Mapping[str, np.ndarray],
-    parts: Sequence[slice],
-    dt: float,
-    places: RadialTilt | None,
-) -> list[str]:
-    """What the accelerations cannot be; of several mistakes that hang together, the first."""
-    y, a = joined["y1_rad"], joined["acceleration_rad_s2"]
-    if places is not None:
-        said = of_gravity(found, raw, places)
-        if said or interchanged(y, a, parts, dt, places):
-            return [said or HINT]
-    said = beside_the_tilt(y, a, parts, dt, found)
-    return [said] if said else []
+def unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
+    """Unwrap an angle that starts again after a turn; a single row that leaps out and back is a spike, and stays."""
+    known = np.flatnonzero(np.isfinite(angle))
+    spikes = _spikes(angle[known])
+    if len(spikes):
+        rows = f"row {known[spikes[0]] + 1}"
+        where = f"in {rows} alone" if len(spikes) == 1 else f"in {len(spikes):,} single rows, first {rows}"
+        size = math.degrees(angle[known[spikes[0]]] - angle[known[spikes[0] - 1]])
+        notes.append(f"the tilt leaps by {size:.4g} deg and back {where}: a spike, kept as it is")
+    smooth = np.delete(known, spikes)
+    jumps = int((np.abs(np.diff(angle[smooth])) > UNWRAP_STEP).sum())
+    if not jumps:
+        return angle
+    notes.append(f"the tilt jumps by a turn {jumps:,} time{'' if jumps == 1 else 's'}: made to run on")
+    out = angle.copy()
+    out[smooth] = np.unwrap(angle[smooth])
+    before = known[spikes - 1]
+    out[known[spikes]] += out[before] - angle[before]
+    return out
 
 
-def _say_halves(found: Mapping[str, Column], has: set[str], notes: list[str]) -> None:
-    """What is named, but not enough to be used."""
-    gimbal = "gimbal" in found or "gimbal1" in found
-    if gimbal != ("command" in found):
-        there, lacks = ("gimbal", "command") if gimbal else ("command", "gimbal")
-        notes.append(f"there is a {there} and no {lacks}: observers that need the gimbals need both")
+def _spikes(angle: np.ndarray) -> np.ndarray:
+    """Return the places of single values that leap out and back and are no flicker near the end of a turn."""
+    steps = np.diff(angle)
+    out, back = steps[:-1], steps[1:]
+    leaps = (np.abs(out) > UNWRAP_STEP) & (np.abs(back) > UNWRAP_STEP) & (out * back < 0.0)
+    if not leaps.any():
+        return np.flatnonzero(leaps)
+    # Angles that start again lie within one turn; a leap out of that range, or by less than a turn, is a spike.
+    others, middle = np.delete(angle, np.flatnonzero(leaps) + 1), angle[1:-1]
+    reach = np.maximum(middle, others.max()) - np.minimum(middle, others.min())
+    short = np.abs(np.abs(out) - 2.0 * math.pi) > 5.0 * np.median(np.abs(steps)) + FLICKER
+    flickers = (reach < 2.0 * math.pi + 1e-6) & ~short
+    return np.flatnonzero(leaps & ~flickers) + 1

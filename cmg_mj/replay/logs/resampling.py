@@ -1,24 +1,26 @@
-"""Values at other times than their own."""
+"""Resampling of rows: whether their stamps are even, and values at other times."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.replay.logs.timestamps import A_GAP
-
+EVEN = 0.02
+"""Deviation from an even grid, in periods, up to which stamps count as even."""
+GAP_PERIODS = 1.5
+"""A gap is longer than so many periods."""
 FEWEST = 20
-"""A part with fewer rows is left out."""
+"""A part with fewer rows is discarded."""
 
 
 def resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float, held: bool = False) -> np.ndarray:
-    """Values at other times: by a cubic spline, in gaps by straight lines; held ones by the last before.
+    """Interpolate by a cubic spline, in gaps by straight lines; held values by the last one before.
 
     Args:
         grid: Wanted times, (n,), within those there are [s].
         time: Times there are, growing, (m,) [s].
         values: (m,).
         gap: More between two of them is a gap [s].
-        held: Whether a value counts until the next.
+        held: Whether a value holds until the next.
 
     Returns:
         (n,).
@@ -34,7 +36,7 @@ def resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float,
 
 
 def sampled_where_known(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """A reference at the samples' times; NaN before, after and in its gaps.
+    """Interpolate a reference at the samples' times; NaN before it, after it and in its gaps.
 
     Args:
         grid: The samples' times, (n,) [s].
@@ -48,7 +50,7 @@ def sampled_where_known(grid: np.ndarray, time: np.ndarray, values: np.ndarray) 
     time, values = time[known], values[known]
     if len(time) < FEWEST:
         return np.full(len(grid), np.nan)
-    gap = A_GAP * float(np.median(np.diff(time)))
+    gap = GAP_PERIODS * float(np.median(np.diff(time)))
     slack = 1e-6 * gap
     inside = (grid >= time[0] - slack) & (grid <= time[-1] + slack)
     after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
@@ -58,5 +60,34 @@ def sampled_where_known(grid: np.ndarray, time: np.ndarray, values: np.ndarray) 
 
 
 def bridge(grid: np.ndarray, time: np.ndarray, values: np.ndarray, held: bool) -> np.ndarray:
-    """Rows that are missing, from those before and after by straight lines; held ones by the last before."""
+    """Fill missing rows by straight lines; held values by the last one before."""
     return resample(grid, time, values, 0.0, held) if held else np.interp(grid, time, values)
+
+
+def rounded_period(period: float) -> float:
+    """Return the period of a round rate, if the period is one to the stamps' accuracy."""
+    rate = float(f"{1.0 / period:.6g}")
+    return 1.0 / rate if abs(period * rate - 1.0) < 1e-9 else period
+
+
+def resolution_of(time: np.ndarray) -> float:
+    """Return the largest of 1, 0.1, 0.01 ... s that divides all stamps from the first on [s]; 0 if none does."""
+    for power in range(0, 8):
+        counts = (time - time[0]) * 10.0**power
+        if np.abs(counts - np.rint(counts)).max() < 1e-3:
+            return 10.0**-power
+    return 0.0
+
+
+def is_even(time: np.ndarray, period: float, resolution: float) -> bool:
+    """Return whether the rows are on an even grid, as far as stamps of this resolution show."""
+    if len(time) < 3:
+        return True
+    places = np.rint((time - time[0]) / period)
+    slack = max(EVEN * period, 0.75 * resolution if resolution < period else 0.0)
+    if np.ptp(np.diff(time)) < EVEN * period:
+        return True
+    order = np.arange(len(time)) if np.diff(time).max() < GAP_PERIODS * period else places
+    fit = np.polynomial.polynomial.polyfit(order, time - time[0], 1)
+    off = time - time[0] - (fit[0] + fit[1] * order)
+    return bool(np.abs(off).max() <= slack and abs(fit[1] / period - 1.0) < 1e-3)

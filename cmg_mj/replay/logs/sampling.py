@@ -1,4 +1,4 @@
-"""Rows at whatever times -> parts sampled evenly. Whatever is done is said."""
+"""Rows at any times -> evenly sampled parts, with a note on every change."""
 
 from __future__ import annotations
 
@@ -9,16 +9,24 @@ from itertools import pairwise
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.replay.logs.resampling import FEWEST, bridge, resample
+from cmg_mj.replay.logs.resampling import (
+    EVEN,
+    FEWEST,
+    GAP_PERIODS,
+    bridge,
+    is_even,
+    resample,
+    resolution_of,
+    rounded_period,
+)
 from cmg_mj.replay.logs.table import MOST_ROWS
-from cmg_mj.replay.logs.timestamps import A_GAP, EVEN, is_even, resolution_of, rounded
 
 BRIDGED = 5
-"""By default, so many missing rows in a gap are bridged."""
+"""Longest gap that is bridged by default, in rows."""
 FEW_REPEATED = 0.05
-"""More rows than this share with the stamp of the row before are a mistake, fewer are left out."""
+"""Share of rows with the stamp of the row before, up to which these rows are discarded; more are a mistake."""
 SAME_TIME = 1e-6
-"""Rows so small a part of the usual step apart are of the same time."""
+"""Distance of two rows, in usual steps, up to which they have the same time."""
 SLOWEST_HZ, FASTEST_HZ = 0.1, 1e6
 
 
@@ -30,7 +38,7 @@ class Part:
         time: (n,) [s].
         values: Name -> (n,).
         stamps: The rows' own times, (m,) [s].
-        placed: Where those rows are in `time`; elsewhere than their stamps say if these are rounded, (m,) [s].
+        placed: The rows' times in `time`, which differ from rounded stamps, (m,) [s].
     """
 
     time: np.ndarray
@@ -40,11 +48,11 @@ class Part:
 
     @property
     def step(self) -> float:
-        """Between samples [s]."""
+        """Sample period [s]."""
         return float(self.time[1] - self.time[0])
 
     def when(self, stamps: np.ndarray) -> np.ndarray:
-        """Times in this part of what other rows' stamps say, beyond its ends too, (k,) [s]."""
+        """Convert other rows' stamps to times in this part, beyond its ends too, (k,) [s]."""
         before, after = self.stamps[0] - self.placed[0], self.stamps[-1] - self.placed[-1]
         inside = np.interp(stamps, self.stamps, self.placed)
         return np.where(
@@ -54,14 +62,14 @@ class Part:
 
 @dataclass
 class Sampler:
-    """From rows to parts.
+    """Divides rows into parts and samples them evenly.
 
     Attributes:
         where: The file, for messages.
-        rate_hz: The rate of the rows, if they have no times; else that to resample to, or None for the rows' own.
+        rate_hz: Rate of rows without times; else the rate to resample to, or None for the rows' own.
         max_gap_s: Longer gaps part the log; None for `BRIDGED` periods.
-        notes: What was done.
-        period: Between the file's own rows, once they have been read [s].
+        notes: Changes to the rows.
+        period: Period of the file's own rows, once they are read [s].
     """
 
     where: str
@@ -73,18 +81,18 @@ class Sampler:
     def parts(
         self, time: np.ndarray | None, measured: Mapping[str, np.ndarray], held: Sequence[str] = ()
     ) -> tuple[float, list[Part]]:
-        """Cut out what is missing, and resample the rest if it is uneven.
+        """Discard incomplete rows, and resample the others if they are uneven.
 
         Args:
             time: Stamps, (n_rows,) [s]; None for rows that are even.
-            measured: Name -> values, (n_rows,), all of which a row must have.
-            held: Names of those that are held until the next row, such as a command.
+            measured: Name -> values, (n_rows,); a row must have all of them.
+            held: Names of signals that hold until the next row, such as a command.
 
         Returns:
             The sample period [s], and the parts.
 
         Raises:
-            InputError: Times that run backward or stand still, nothing to work on, or an impossible rate.
+            InputError: Times run backward or stand still, too few rows are complete, or the rate is impossible.
         """
         n = len(next(iter(measured.values())))
         if time is None:
@@ -96,14 +104,13 @@ class Sampler:
             raise InputError(f"{self.where}: no row has a number in each of its columns")
         if not present.all():
             self.notes.append(_missing(present, time, measured))
-        time, kept = time[present], {name: values[present] for name, values in measured.items()}
-        time, kept = self._forward(time, kept)
+        time, values = self._forward(time[present], {name: column[present] for name, column in measured.items()})
         if len(time) < FEWEST:
             raise InputError(f"{self.where}: {_rows(len(time))} with all that is needed; at least {FEWEST}")
-        return self._on_a_grid(time, kept, held)
+        return self._on_a_grid(time, values, held)
 
     def _forward(self, time: np.ndarray, values: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Times that only grow."""
+        """Return the rows with growing times."""
         steps = np.diff(time)
         if len(steps) and (steps <= 0.0).all() and (steps < 0.0).any():
             self.notes.append("the time runs backward from the first row to the last: read from its end")
@@ -124,7 +131,7 @@ class Sampler:
             )
         if again.any():
             first = time[1:][again][0]
-            self.notes.append(f"{_rows(again.sum())} with the time of the row before left out, first at {first:.6g} s")
+            self.notes.append(f"{_rows(again.sum())} with the time of the row before discarded, first at {first:.6g} s")
             kept = np.concatenate([[True], ~again])
             time, values = time[kept], {name: column[kept] for name, column in values.items()}
         return time, values
@@ -134,23 +141,23 @@ class Sampler:
     ) -> tuple[float, list[Part]]:
         steps = np.diff(time)
         usual = float(np.median(steps))
-        period = float(steps[steps <= A_GAP * usual].mean())
+        period = float(steps[steps <= GAP_PERIODS * usual].mean())
         if not 1.0 / FASTEST_HZ <= period <= 1.0 / SLOWEST_HZ:
             raise InputError(
                 f"{self.where}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz; a log has "
                 f"{SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz: is the time's unit right? (--units time=ms)"
             )
-        self.period = period = rounded(period)
+        self.period = period = rounded_period(period)
         longest = BRIDGED * period if self.max_gap_s is None else self.max_gap_s
-        ends = np.flatnonzero(steps > max(A_GAP * period, longest + period))
+        ends = np.flatnonzero(steps > max(GAP_PERIODS * period, longest + period))
         bounds = [0, *(ends + 1), len(time)]
         stretches = [slice(a, b) for a, b in pairwise(bounds)]
         resolution = resolution_of(time)
         even = all(is_even(time[s], period, resolution) for s in stretches)
         dt = period if self.rate_hz is None else 1.0 / self.rate_hz
         resampled = not even or abs(dt - period) > 1e-6 * dt
-        self._say_how(time, steps[steps <= A_GAP * period], period, dt, even, resampled, resolution)
-        bridged = (steps > A_GAP * period) & (steps <= max(A_GAP * period, longest + period))
+        self._say_how(time, steps[steps <= GAP_PERIODS * period], period, dt, even, resampled, resolution)
+        bridged = (steps > GAP_PERIODS * period) & (steps <= max(GAP_PERIODS * period, longest + period))
         if bridged.any():
             self.notes.append(_gaps("bridged by straight lines", time, steps, bridged, period))
         if len(ends):
@@ -166,7 +173,7 @@ class Sampler:
             if (time[s][-1] - time[s][0]) / dt >= FEWEST - 1.5
         ]
         if len(parts) < len(stretches):
-            self.notes.append(f"{len(stretches) - len(parts)} parts with fewer than {FEWEST} samples left out")
+            self.notes.append(f"{len(stretches) - len(parts)} parts with fewer than {FEWEST} samples discarded")
         if not parts and not len(ends):
             n, rate = int((time[-1] - time[0]) / dt + 1e-6) + 1, f"{time[-1] - time[0]:.4g} s at {1.0 / dt:g} Hz"
             raise InputError(f"{self.where}: {rate} are {n} sample{'' if n == 1 else 's'}; at least {FEWEST}")
@@ -217,17 +224,19 @@ class Sampler:
             kept = np.concatenate([[True], np.diff(places) > 0])
             time, places = time[kept], places[kept]
             values = {name: column[kept] for name, column in values.items()}
-            own, grid = places * dt, dt * np.arange(places[-1] + 1)
-            filled = {name: bridge(grid, own, column, name in held) for name, column in values.items()}
-            return Part(time[0] + grid, filled, time, time[0] + own)
+            stamps, grid = places * dt, dt * np.arange(places[-1] + 1)
+            filled = {name: bridge(grid, stamps, column, name in held) for name, column in values.items()}
+            return Part(time[0] + grid, filled, time, time[0] + stamps)
         grid = dt * np.arange(int((time[-1] - time[0]) / dt + 1e-6) + 1)
-        own = time - time[0]
-        sampled = {name: resample(grid, own, column, A_GAP * period, name in held) for name, column in values.items()}
+        stamps = time - time[0]
+        sampled = {
+            name: resample(grid, stamps, column, GAP_PERIODS * period, name in held) for name, column in values.items()
+        }
         return Part(time[0] + grid, sampled, time, time)
 
 
 def _missing(present: np.ndarray, time: np.ndarray, measured: Mapping[str, np.ndarray]) -> str:
-    """Rows that lack something, in words."""
+    """Describe the incomplete rows."""
     lacks = {name: int((~np.isfinite(values)).sum()) for name, values in measured.items()}
     lacks["time"] = int((~np.isfinite(time)).sum())
     named = ", ".join(f"{name} in {count:,}" for name, count in lacks.items() if count)
@@ -235,13 +244,13 @@ def _missing(present: np.ndarray, time: np.ndarray, measured: Mapping[str, np.nd
     edges = np.flatnonzero(np.diff(missing) > 1)
     runs = np.diff(np.concatenate([[0], edges + 1, [len(missing)]]))
     return (
-        f"{_rows(len(missing))} of {len(present):,} without a number ({named}) left out: the first is row "
+        f"{_rows(len(missing))} of {len(present):,} without a number ({named}) discarded: the first is row "
         f"{missing[0] + 1}, the longest run {_rows(int(runs.max()))}"
     )
 
 
 def _gaps(what: str, time: np.ndarray, steps: np.ndarray, which: np.ndarray, period: float) -> str:
-    """Gaps in words."""
+    """Describe gaps."""
     longest = int(np.argmax(np.where(which, steps, 0.0)))
     count = int(which.sum())
     return (

@@ -1,4 +1,4 @@
-"""A CSV or Parquet file -> some of its columns as numbers. What cannot be read is said in one line."""
+"""Reading of some columns of a CSV or Parquet file as numbers; a failure is a message of one line."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +15,13 @@ from cmg_mj.errors import InputError, nearest, shown
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    import pyarrow.csv as pacsv
 
 MOST_ROWS = 5_000_000
-"""More take hours and gigabytes."""
+"""Most rows of a log; more take hours and gigabytes."""
 DELIMITERS = (",", ";", "\t", "|")
 HEAD = 1 << 16
-"""So much of a CSV is looked at for its heading, which must end in it [bytes]."""
+"""Size of the part of a CSV that is searched for its heading, which must end in it [bytes]."""
 MISSING = [
     "",
     "nan",
@@ -39,24 +40,24 @@ MISSING = [
     "Inf",
     "-Inf",
 ]
-"""What stands for no number."""
+"""Cells that hold no number."""
 COMMENTS = ("#", "%", "//")
 
 
-def read_table(path: Path, wanted: Sequence[str], time: str | None) -> tuple[dict[str, np.ndarray], list[str], bool]:
+def read_table(path: Path, headings: Sequence[str], time: str | None) -> tuple[dict[str, np.ndarray], list[str], bool]:
     """Read columns of a log.
 
     Args:
         path: A CSV (with a heading) or a Parquet file.
-        wanted: Headings of the columns.
+        headings: Headings of the columns.
         time: The heading among them that may also hold dates, which become seconds from the first.
 
     Returns:
-        Heading -> numbers, (n_rows,), NaN where there is none; what was done that nobody has asked for; whether the
-        time is of dates.
+        Heading -> numbers, (n_rows,), NaN where there is none; changes that were not requested; whether the time
+        holds dates.
 
     Raises:
-        InputError: It cannot be read, lacks a column, or has text among the numbers.
+        InputError: The file cannot be read, lacks a column, or has text among the numbers.
     """
     try:
         regular, there = path.is_file(), path.exists()
@@ -76,34 +77,34 @@ def read_table(path: Path, wanted: Sequence[str], time: str | None) -> tuple[dic
     notes: list[str] = []
     dated: list[str] = []
     columns = (
-        _of_parquet(path, wanted, time, dated)
+        _of_parquet(path, headings, time, dated)
         if head[:4] == b"PAR1"
-        else _of_csv(path, head, wanted, time, notes, dated)
+        else _of_csv(path, head, headings, time, notes, dated)
     )
     if not len(next(iter(columns.values()))):
         raise InputError(f"{path}: has a heading and no row")
     return columns, notes, bool(dated)
 
 
-def _of_parquet(path: Path, wanted: Sequence[str], time: str | None, dated: list[str]) -> dict[str, np.ndarray]:
+def _of_parquet(path: Path, headings: Sequence[str], time: str | None, dated: list[str]) -> dict[str, np.ndarray]:
     import pyarrow.parquet as pq
 
-    with _arrows_complaints(path), path.open("rb") as source:
+    with _arrow_errors(path), path.open("rb") as source:
         file = pq.ParquetFile(source)
         names = file.schema_arrow.names
-        _check_columns(path, wanted, [name.strip() for name in names])
+        _check_columns(path, headings, [name.strip() for name in names])
         spelled = {name.strip(): name for name in names}
         if file.metadata.num_rows > MOST_ROWS:
             raise _too_long(path, file.metadata.num_rows)
-        table = file.read(columns=list(dict.fromkeys(spelled[name.strip()] for name in wanted)))
+        table = file.read(columns=list(dict.fromkeys(spelled[name.strip()] for name in headings)))
     return {
         name.strip(): _numbers(path, name, table[spelled[name.strip()]], dated if name == time else None)
-        for name in wanted
+        for name in headings
     }
 
 
 def _of_csv(
-    path: Path, head: bytes, wanted: Sequence[str], time: str | None, notes: list[str], dated: list[str]
+    path: Path, head: bytes, headings: Sequence[str], time: str | None, notes: list[str], dated: list[str]
 ) -> dict[str, np.ndarray]:
     import pyarrow as pa
     import pyarrow.csv as pacsv
@@ -114,50 +115,52 @@ def _of_csv(
     read = pacsv.ReadOptions(skip_rows=skipped, encoding=encoding, use_threads=False)
     torn: list[str] = []
 
-    def leave_out(row: Any) -> str:
+    def discard(row: pacsv.InvalidRow) -> str:
         torn.append(f"{row.actual_columns} cells instead of {row.expected_columns}: {shown(row.text)}")
         return "skip"
 
-    parse = pacsv.ParseOptions(delimiter=delimiter, invalid_row_handler=leave_out)
+    parse = pacsv.ParseOptions(delimiter=delimiter, invalid_row_handler=discard)
 
-    def convert(kind: Any) -> pacsv.ConvertOptions:
+    def convert(kind: pa.DataType) -> pacsv.ConvertOptions:
         return pacsv.ConvertOptions(
-            include_columns=list(dict.fromkeys(wanted)),
-            column_types=dict.fromkeys(wanted, kind),
+            include_columns=list(dict.fromkeys(headings)),
+            column_types=dict.fromkeys(headings, kind),
             null_values=MISSING,
             strings_can_be_null=True,
             decimal_point="," if comma else ".",
         )
 
-    with _arrows_complaints(path):
+    with _arrow_errors(path):
         with path.open("rb") as file:
             names = pacsv.open_csv(file, read, parse).schema.names
-        _check_columns(path, wanted, [name.strip() for name in names])
+        _check_columns(path, headings, [name.strip() for name in names])
         spelled = {name.strip(): name for name in names}
-        wanted = [spelled[name.strip()] for name in wanted]
+        headings = [spelled[name.strip()] for name in headings]
         time = spelled.get(time.strip()) if time else None
         try:
             torn.clear()
-            table = _batches(path, pacsv, read, parse, convert(pa.float64()))
+            table = _batches(path, read, parse, convert(pa.float64()))
         except pa.ArrowInvalid as error:
             if "onversion error" not in str(error):
                 raise
             torn.clear()
-            table = _batches(path, pacsv, read, parse, convert(pa.string()))
+            table = _batches(path, read, parse, convert(pa.string()))
     if torn and not len(table):
         raise InputError(f"{path}: no line has as many cells as the heading; the first, {torn[0]}")
     if torn:
         one = len(torn) == 1
         lines = f"{len(torn)} {'line has' if one else 'lines have'} another number of cells"
-        notes.append(f"{lines} and {'was' if one else 'were'} left out; {'' if one else 'the first, '}{torn[0]}")
+        notes.append(f"{lines} and {'was' if one else 'were'} discarded; {'' if one else 'the first, '}{torn[0]}")
     return {
-        name.strip(): _numbers(path, name, table[name], dated if name == time else None, comma=comma) for name in wanted
+        name.strip(): _numbers(path, name, table[name], dated if name == time else None, comma=comma)
+        for name in headings
     }
 
 
-def _batches(path: Path, pacsv: Any, read: Any, parse: Any, convert: Any) -> pa.Table:
-    """All batches of a CSV, as long as it is not too long."""
+def _batches(path: Path, read: pacsv.ReadOptions, parse: pacsv.ParseOptions, convert: pacsv.ConvertOptions) -> pa.Table:
+    """Read all batches of a CSV, and refuse one that is too long."""
     import pyarrow as pa
+    import pyarrow.csv as pacsv
 
     rows, batches = 0, []
     with path.open("rb") as file, pacsv.open_csv(file, read, parse, convert) as reader:
@@ -170,7 +173,7 @@ def _batches(path: Path, pacsv: Any, read: Any, parse: Any, convert: Any) -> pa.
 
 
 def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
-    """The encoding, how many lines stand above the heading (comments, empty ones), and the heading."""
+    """Return the encoding, the number of lines above the heading (comments, empty ones), and the heading."""
     encoding = "utf-8"
     if head.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
         raise InputError(f"{path}: is written in UTF-32; save it as UTF-8")
@@ -189,7 +192,7 @@ def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
 
 
 def _is_utf8(path: Path) -> bool:
-    """Whether all of a file is."""
+    """Return whether all of a file is UTF-8."""
     decoder = codecs.getincrementaldecoder("utf-8")()
     with path.open("rb") as file:
         try:
@@ -201,8 +204,8 @@ def _is_utf8(path: Path) -> bool:
     return True
 
 
-def _check_columns(path: Path, wanted: Sequence[str], names: Sequence[str]) -> None:
-    for name in wanted:
+def _check_columns(path: Path, headings: Sequence[str], names: Sequence[str]) -> None:
+    for name in headings:
         if name.strip() not in [known.strip() for known in names]:
             few = [shown(known) for known in names]
             raise InputError(f"{path}: has no column {name!r}; {nearest(name, few, 'it has')}"[:600])
@@ -210,8 +213,10 @@ def _check_columns(path: Path, wanted: Sequence[str], names: Sequence[str]) -> N
             raise InputError(f"{path}: has the column {name!r} {list(names).count(name)} times: rename all but one")
 
 
-def _numbers(path: Path, name: str, column: Any, dated: list[str] | None, *, comma: bool = False) -> np.ndarray:
-    """A column as floats; of the one that may hold dates it is noted whether it does."""
+def _numbers(
+    path: Path, name: str, column: pa.ChunkedArray, dated: list[str] | None, *, comma: bool = False
+) -> np.ndarray:
+    """Convert a column to floats; `dated`, of the time alone, gets its name if it holds dates."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -241,13 +246,13 @@ def _numbers(path: Path, name: str, column: Any, dated: list[str] | None, *, com
         try:
             values[i] = np.nan if cell is None or cell in MISSING else float(cell.replace(",", ".") if comma else cell)
         except ValueError:
-            wanted = "a number or a date" if dated is not None else "a number"
-            raise InputError(f"{path}: row {i + 1}, column {name!r}: {shown(cell)} is not {wanted}") from None
+            expected = "a number or a date" if dated is not None else "a number"
+            raise InputError(f"{path}: row {i + 1}, column {name!r}: {shown(str(cell))} is not {expected}") from None
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _seconds(column: Any) -> np.ndarray:
-    """Dates, or spans of time, as seconds from the first; whole nanoseconds are subtracted before they are floats."""
+def _seconds(column: pa.ChunkedArray) -> np.ndarray:
+    """Convert dates, or spans of time, to seconds from the first; nanoseconds are subtracted as integers."""
     import pyarrow as pa
 
     kind = pa.duration("ns") if pa.types.is_duration(column.type) else pa.timestamp("ns")
@@ -266,8 +271,8 @@ def _too_long(path: Path, rows: int | None) -> InputError:
 
 
 @contextmanager
-def _arrows_complaints(path: Path) -> Iterator[None]:
-    """What Arrow finds wrong with a file, in one line."""
+def _arrow_errors(path: Path) -> Iterator[None]:
+    """Raise Arrow's errors as messages of one line."""
     import pyarrow as pa
 
     try:

@@ -1,4 +1,4 @@
-"""Units by the end of a column's name, `pitch_deg`, `Gyro [deg/s]`, or told; all into SI and radians."""
+"""Units of columns, given or at the end of a heading (`pitch_deg`, `Gyro [deg/s]`), and their SI sizes."""
 
 from __future__ import annotations
 
@@ -73,66 +73,66 @@ _SAME = {
 
 
 def _plain(text: str) -> str:
-    """`Deg/s^2`, `deg.s-2` and `deg_s2` alike."""
+    """Spell `Deg/s^2`, `deg.s-2` and `deg_s2` alike."""
     text = text.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
     text = re.sub(r"[\s./*·]+", "_", text).replace("_s-1", "_s").replace("_s-2", "_s2").strip("_")
     return _SAME.get(text, text)
 
 
 def unit(quantity: Quantity, text: str, where: str) -> str:
-    """A unit as a user writes it.
+    """Return the name in `UNITS` of a unit as a user writes it.
 
     Args:
-        quantity: What is measured.
+        quantity: The measured quantity.
         text: `deg`, `deg/s`, `rad_s`.
         where: The option, for the message.
 
     Returns:
-        Its name in `UNITS`.
+        The name.
 
     Raises:
-        InputError: It is none of this quantity's.
+        InputError: It is no unit of this quantity.
     """
-    found = _plain(text)
-    if found not in UNITS[quantity]:
-        raise InputError(f"{where}: {text!r} is no unit of {_an(quantity)}; {nearest(found, UNITS[quantity])}")
-    return found
+    name = _plain(text)
+    if name not in UNITS[quantity]:
+        raise InputError(f"{where}: {text!r} is no unit of {_an(quantity)}; {nearest(name, UNITS[quantity])}")
+    return name
 
 
 def unit_of_name(quantity: Quantity, name: str) -> str | None:
-    """The unit that a column's name ends in, after `_`, a space, or in brackets; None if it ends in none.
+    """Return the unit that a column's name ends in, after `_`, a space, or in brackets; None if it ends in none.
 
     A name that is a unit and nothing else, such as `ms`, is one too.
     """
     bracketed = re.search(r"[\[({]([^\[\](){}]+)[\])}]\s*$", name)
     if bracketed:
-        found = _plain(bracketed[1])
-        return found if found in UNITS[quantity] else None
+        unit = _plain(bracketed[1])
+        return unit if unit in UNITS[quantity] else None
     whole = _plain(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name))
     parts = whole.split("_")
     for start in range(len(parts)):  # the longest first: deg_s before s
-        found = _plain("_".join(parts[start:]))
-        if found in UNITS[quantity]:
-            return found
+        unit = _plain("_".join(parts[start:]))
+        if unit in UNITS[quantity]:
+            return unit
     return None
 
 
 def in_si(quantity: Quantity, unit: str) -> float:
-    """The size of a unit in rad, rad/s, rad/s^2, m/s^2 or s."""
+    """Return the size of a unit in rad, rad/s, rad/s^2, m/s^2 or s."""
     return UNITS[quantity][unit]
 
 
 def unit_of_factor(quantity: Quantity, unit: str, factor: float, near: tuple[float, float]) -> str | None:
-    """The unit that makes numbers said to be in another one so many times as large.
+    """Return the unit that makes numbers, given in another unit, larger by a factor.
 
     Args:
-        quantity: What is measured.
-        unit: The unit they were said to be in.
-        factor: By what they must be multiplied to be right.
-        near: By how much that may miss, as a factor.
+        quantity: The measured quantity.
+        unit: The given unit.
+        factor: The factor.
+        near: Tolerance of the factor, as two factors.
 
     Returns:
-        The nearest; None if there is none, or it is the same.
+        The nearest unit; None if there is none but the given one.
     """
     size = in_si(quantity, unit)
     misses = {name: factor * size / other for name, other in UNITS[quantity].items() if other != size}

@@ -70,7 +70,7 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
 
 
 def table(figures: dict[str, Any]) -> Table:
-    """The table that `cmg-mj bench --sweep` prints."""
+    """The table that `cmg-mj bench sweep` prints."""
     found = Table(
         title=f"{figures['scenario']}, {figures['duration_s']:g} s, on one thread: processor time of all by that "
         "in MuJoCo's batch",

@@ -1,7 +1,7 @@
 """An observer's parameters fitted to the gyro, as section V of aranovskiy2020 does.
 
-The loop is closed on the gyro, what was measured and commanded is replayed through the observer, and its parameters
-are fitted on one set of worlds and scored on another.
+The loop is closed on the gyro, its recording is replayed through the observer, and the observer's parameters are
+fitted on one set of worlds and scored on another.
 """
 
 from cmg_mj.studies.tuning.on_logs import LogStudy, tune_on_logs

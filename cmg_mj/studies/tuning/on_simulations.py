@@ -1,4 +1,4 @@
-"""The tuning experiment recorded: the loop closed on the gyro, and the part of it that is scored."""
+"""Recordings of the tuning experiment: the loop closed on the gyro, and the windows that are scored."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 from cmg_mj.simulation.experiment import Experiment, prepare
 
 WARM_UP_S = 2.0
-"""So much of the recording before the window is replayed as well, for the observer to settle [s]."""
+"""Time before the window that is replayed as well, for the observer to settle [s]."""
 
 
 def windows_of(scenario: Scenario) -> list[Window]:
-    """What is scored: from each push to one second after its end, as in a summary; the whole run if there is no push.
+    """Return the scored windows: from each push to one second after its end; the whole run without a push.
 
-    Over a whole run with a push the best differentiator would be none at all: outside that second the rig hardly
-    moves, and an estimate of zero has the smallest error.
+    Over a whole run with a push, an estimate of zero would have the smallest error: outside that second the plant
+    hardly moves.
     """
     end = scenario.duration_s
     windows = push_windows(scenario.push) or [(0.0, end)]
@@ -38,20 +38,20 @@ def windows_of(scenario: Scenario) -> list[Window]:
 
 
 def window_of(scenario: Scenario) -> Window:
-    """From the start of the first of the windows to the end of the last [s]."""
+    """Return the start of the first window and the end of the last [s]."""
     windows = windows_of(scenario)
     return windows[0][0], windows[-1][1]
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """What was measured and commanded in some worlds, all of which stood.
+    """Measurements and commands of some worlds, all of which stood.
 
     Attributes:
-        trajectory: From the warm-up to the window's end.
-        window: What is scored, from its start to its end [s].
-        fell: How many more worlds there were, which fell.
-        windows: The parts of it that are scored, if not all of it is [s].
+        trajectory: Trajectory from the warm-up to the window's end.
+        window: Start and end of the scored time [s].
+        fell: Number of worlds that fell and are discarded.
+        windows: Parts of the window that are scored, if not all of it is [s].
     """
 
     trajectory: Trajectory
@@ -61,27 +61,27 @@ class Recorded:
 
     @property
     def worlds(self) -> int:
-        """How many."""
+        """Number of worlds."""
         return self.trajectory["y1_rad"].shape[1]
 
     @property
     def largest_acceleration(self) -> float:
-        """Of the tilt, by differences of its true rate, which a differentiator has to follow [rad/s^2]."""
+        """Largest acceleration of the tilt, by differences of its true rate [rad/s^2]."""
         steps = np.diff(self.trajectory["x2_rad_s"], axis=0) / np.diff(self.trajectory["time_s"])[:, None]
         return float(np.abs(steps).max())
 
     @property
     def zero_rms(self) -> float:
-        """The error of an estimate of zero: the RMS of the gyro's rate over the window, mean of the worlds [rad/s]."""
+        """Error of an estimate of zero: RMS of the gyro's rate over the window, mean of the worlds [rad/s]."""
         return float(np.sqrt(np.mean(self.trajectory["fog_rad_s"][self._scored] ** 2, axis=0)).mean())
 
     @property
     def _scored(self) -> np.ndarray:
-        """Which rows are scored, (n_ticks,)."""
+        """Mask of the scored rows, (n_ticks,)."""
         return inside(self.trajectory["time_s"], self.windows or [self.window])
 
     def errors(self, observer: Observer) -> np.ndarray:
-        """RMS over the window of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN where it is lost."""
+        """Return the RMS over the window of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN on failure."""
         scored = self._scored
         with np.errstate(all="ignore"):
             difference = replay(observer, self.trajectory).x2[scored] - self.trajectory["fog_rad_s"][scored]
@@ -89,9 +89,9 @@ class Recorded:
 
 
 def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> Scenario:
-    """The scenario as the observers are tuned in it: the law fed by the gyro and the measured angles.
+    """Return the scenario of the tuning experiment: the law fed by the gyro and the measured angles.
 
-    No observer takes part in that loop, so one recording serves them all; it ends with the window.
+    No observer takes part in that loop, so one recording serves all observers; it ends with the window.
 
     Args:
         scenario: The experiment.
@@ -121,37 +121,42 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     )
 
 
-Wanted = tuple[Scenario, Sequence[int], float | None]
+RecordingRequest = tuple[Scenario, Sequence[int], float | None]
 """A scenario, the worlds' numbers, and another noise density of the accelerometers [ug/sqrt(Hz)]."""
 
 
 def record_all(
-    wanted: Sequence[Wanted], *, warm_up_s: float = WARM_UP_S, on_share: Callable[[float], None] | None = None
+    requests: Sequence[RecordingRequest],
+    *,
+    warm_up_s: float = WARM_UP_S,
+    on_share: Callable[[float], None] | None = None,
 ) -> list[Recorded]:
-    """Run tuning experiments, those that can in one batch.
+    """Run tuning experiments, in one batch where possible.
 
     Args:
-        wanted: The scenarios, whose noise depends on (seed, world's number) alone; `tuning_scenario` says what is
-            changed in them.
-        warm_up_s: How much of the time before the window is kept [s].
-        on_share: Called now and then with the share done.
+        requests: The recordings; `tuning_scenario` changes their scenarios.
+        warm_up_s: Time before the window that is kept [s].
+        on_share: Called now and then with the completed share.
 
     Returns:
-        The worlds that stood, of each.
+        The worlds that stood, request by request.
 
     Raises:
-        InputError: Fewer than two did.
+        InputError: Fewer than two worlds of a request stood.
         KeyboardInterrupt: The user interrupted.
     """
-    experiments = [prepare(tuning_scenario(scenario, noise)) for scenario, _, noise in wanted]
-    runs = [BatchJob([each] * len(worlds), worlds) for each, (_, worlds, _) in zip(experiments, wanted, strict=True)]
-    duration = max(each.scenario.duration_s for each in experiments)
+    experiments = [prepare(tuning_scenario(scenario, noise)) for scenario, _, noise in requests]
+    runs = [
+        BatchJob([experiment] * len(worlds), worlds)
+        for experiment, (_, worlds, _) in zip(experiments, requests, strict=True)
+    ]
+    duration = max(experiment.scenario.duration_s for experiment in experiments)
     results = run_side_by_side(runs, on_progress=on_share and (lambda time: on_share(min(time / duration, 1.0))))
-    return [_kept(*each, warm_up_s) for each in zip(wanted, experiments, results, strict=True)]
+    return [_recorded(*run, warm_up_s) for run in zip(requests, experiments, results, strict=True)]
 
 
-def _kept(wanted: Wanted, experiment: Experiment, result: Result, warm_up_s: float) -> Recorded:
-    scenario, duration = wanted[0], experiment.scenario.duration_s
+def _recorded(request: RecordingRequest, experiment: Experiment, result: Result, warm_up_s: float) -> Recorded:
+    scenario, duration = request[0], experiment.scenario.duration_s
     if any(outcome.kind == "interrupted" for outcome in result.outcomes):
         raise KeyboardInterrupt
     stood = np.array([outcome.kind == "done" for outcome in result.outcomes])
@@ -162,8 +167,8 @@ def _kept(wanted: Wanted, experiment: Experiment, result: Result, warm_up_s: flo
         )
     window = window_of(scenario)
     assert result.trajectory is not None
-    kept = result.trajectory.of_worlds(stood).between(window[0] - warm_up_s, window[1])
-    return Recorded(kept, window, int((~stood).sum()), windows_of(scenario))
+    trajectory = result.trajectory.of_worlds(stood).between(window[0] - warm_up_s, window[1])
+    return Recorded(trajectory, window, int((~stood).sum()), windows_of(scenario))
 
 
 def record(
@@ -174,35 +179,35 @@ def record(
     warm_up_s: float = WARM_UP_S,
     on_share: Callable[[float], None] | None = None,
 ) -> Recorded:
-    """The same for one experiment."""
+    """Run one tuning experiment; see `record_all`."""
     return record_all([(scenario, worlds, noise_ug_rthz)], warm_up_s=warm_up_s, on_share=on_share)[0]
 
 
-def recorder(wanted: Sequence[Wanted], *, warm_up_s: float = WARM_UP_S) -> Callable[..., Recorded]:
-    """Recordings made once, all that several calls of `tune` will ask for: it takes this as `recorded`.
+def recorder(requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP_S) -> Callable[..., Recorded]:
+    """Make the recordings of several calls of `tune` at once.
 
     Args:
-        wanted: The recordings; the observer takes no part in them.
-        warm_up_s: How much of the time before the window is kept [s].
+        requests: The recordings; the observer takes no part in them.
+        warm_up_s: Time before the window that is kept [s].
 
     Returns:
-        What hands them out.
+        A function that returns them, the `recorded` of `tune`.
     """
-    once = list({_key(*each): each for each in wanted}.values())
-    kept = {_key(*each): made for each, made in zip(once, record_all(once, warm_up_s=warm_up_s), strict=True)}
+    distinct = {_key(*request): request for request in requests}
+    recordings = dict(zip(distinct, record_all(list(distinct.values()), warm_up_s=warm_up_s), strict=True))
 
     def recorded(scenario: Scenario, worlds: Sequence[int], *, noise_ug_rthz: float, warm_up_s: float) -> Recorded:
-        return kept[_key(scenario, worlds, noise_ug_rthz)]
+        return recordings[_key(scenario, worlds, noise_ug_rthz)]
 
     return recorded
 
 
-def halves(scenario: Scenario, worlds: int, noise_ug_rthz: Sequence[float]) -> list[Wanted]:
-    """What `tune` records: worlds that are fitted and as many that are held out, at every noise."""
+def halves(scenario: Scenario, worlds: int, noise_ug_rthz: Sequence[float]) -> list[RecordingRequest]:
+    """Return the requests of `tune`: worlds to fit and as many held out, at every noise."""
     spans = range(worlds), range(worlds, 2 * worlds)
     return [(scenario, span, density) for density in noise_ug_rthz for span in spans]
 
 
 def _key(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None) -> tuple:
-    """What a recording depends on: the scenario that is recorded, whole, and the worlds."""
+    """Return what a recording depends on: the whole recorded scenario, and the worlds."""
     return tuple(worlds), repr(tuning_scenario(scenario, noise_ug_rthz))

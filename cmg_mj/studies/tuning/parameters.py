@@ -1,4 +1,4 @@
-"""Which numbers of an observer can be tuned, and how far each may go. The observer's class declares nothing for it."""
+"""The numbers of an observer that can be tuned, and their ranges; the observer's class declares nothing for it."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.observers import BENCH_PARAMETERS, Observer, observer_class
+from cmg_mj.replay.parameter_options import ParameterValue
 
 SPAN = 1000.0
-"""A parameter is searched up to so many times its given value, and down to as small a part of it."""
+"""Range of the search: from the given value divided by this to the given value times this."""
 
-Make = Callable[..., Observer]
-"""Parameters by name -> the observer; raises InputError for what it refuses."""
+MakeObserver = Callable[..., Observer]
+"""Makes an observer from its parameters; raises InputError for those that it refuses."""
+ParameterValues = Mapping[str, ParameterValue]
+"""Parameter -> value."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +27,8 @@ class TunedScalar:
     """One number that can be tuned.
 
     Attributes:
-        parameter: The observer's parameter that it is, or is an element of.
-        place: Where in it: `(1,)` for the second element, `()` for the parameter itself.
+        parameter: The observer's parameter that contains the number.
+        place: Indices in the parameter: `(1,)` for the second element, `()` for the parameter itself.
         given: Its value before the tuning, not zero. Its sign is kept.
         low: Smallest size.
         high: Largest size.
@@ -40,36 +42,38 @@ class TunedScalar:
 
     @property
     def name(self) -> str:
-        """As the user writes it: `tau`, `Q[1]`."""
+        """Name as the user writes it: `tau`, `Q[1]`."""
         return self.parameter + "".join(f"[{i}]" for i in self.place)
 
 
-def parameters_of(kind: str, observer: Observer, given: Mapping[str, Any]) -> dict[str, Any]:
-    """An observer's parameters with the values it has.
+def parameters_of(kind: str, observer: Observer, given: ParameterValues) -> dict[str, ParameterValue]:
+    """Return an observer's parameters with their values.
 
     Args:
-        kind: Its name.
+        kind: The observer's name.
         observer: The observer.
-        given: What it was constructed from.
+        given: Parameters that it was constructed from.
 
     Returns:
-        Values by name; without those that cannot be read off the observer.
+        Name -> value, without those that cannot be read off the observer.
     """
     signature = inspect.signature(observer_class(kind)).parameters.values()
     defaults = {p.name: p.default for p in signature if p.name not in BENCH_PARAMETERS}
     values = {name: getattr(observer, name, default) for name, default in {**defaults, **given}.items()}
-    return {name: _plain(value) for name, value in values.items() if value is not inspect.Parameter.empty}
+    return {name: _as_tuples(value) for name, value in values.items() if value is not inspect.Parameter.empty}
 
 
-def _plain(value: Any) -> Any:
-    """Arrays and lists as tuples."""
+def _as_tuples(value: ParameterValue | np.ndarray) -> ParameterValue:
+    """Convert arrays and lists to tuples."""
     if isinstance(value, np.ndarray):
-        value = value.tolist()
-    return tuple(_plain(item) for item in value) if isinstance(value, (list, tuple)) else value
+        return _as_tuples(value.tolist())
+    return tuple(_as_tuples(item) for item in value) if isinstance(value, (list, tuple)) else value
 
 
-def replaced(values: Mapping[str, Any], numbers: Sequence[TunedScalar], sizes: Sequence[float]) -> dict[str, Any]:
-    """The parameters with other sizes for some numbers."""
+def replaced(
+    values: ParameterValues, numbers: Sequence[TunedScalar], sizes: Sequence[float]
+) -> dict[str, ParameterValue]:
+    """Return the parameters with other sizes for some numbers."""
     changed = dict(values)
     for number, size in zip(numbers, sizes, strict=True):
         changed[number.parameter] = _put(
@@ -78,54 +82,54 @@ def replaced(values: Mapping[str, Any], numbers: Sequence[TunedScalar], sizes: S
     return changed
 
 
-def _put(value: Any, place: tuple[int, ...], new: float) -> Any:
-    if not place:
+def _put(value: ParameterValue, place: tuple[int, ...], new: float) -> ParameterValue:
+    if not place or not isinstance(value, Sequence):
         return new
     return tuple(_put(item, place[1:], new) if i == place[0] else item for i, item in enumerate(value))
 
 
-def numbers_of(kind: str, values: Mapping[str, Any], make: Make, chosen: Sequence[str] = ()) -> list[TunedScalar]:
-    """The numbers to tune: every real number that is not zero, also inside tuples.
+def numbers_of(kind: str, values: ParameterValues, make: MakeObserver, chosen: Sequence[str] = ()) -> list[TunedScalar]:
+    """Return the numbers to tune: every real number that is not zero, also inside tuples.
 
     Args:
         kind: The observer's name, for messages.
         values: Its parameters.
-        make: Constructs it. What it refuses bounds the search.
-        chosen: Names of parameters, or of elements such as `Q[1]`; all that there are if none is chosen.
+        make: Makes the observer; the values that it refuses bound the search.
+        chosen: Names of parameters, or of elements such as `Q[1]`; by default all.
 
     Returns:
         The numbers.
 
     Raises:
-        InputError: A chosen name is none, or there is nothing to tune.
+        InputError: A chosen name does not exist, or there is nothing to tune.
     """
-    whole = {
+    integers = {
         p.name
         for p in inspect.signature(observer_class(kind)).parameters.values()
         if p.annotation in (int, bool, "int", "bool")
     }
-    found = [
+    candidates = [
         (name, place, number)
         for name, value in values.items()
-        if name not in whole
+        if name not in integers
         for place, number in _leaves(value, ())
     ]
-    if not found:
+    if not candidates:
         raise InputError(f"observer {kind} has no number to tune")
-    names = {name + "".join(f"[{i}]" for i in place): name for name, place, _ in found}
+    names = {name + "".join(f"[{i}]" for i in place): name for name, place, _ in candidates}
     for name in chosen:
         if name not in names and name not in names.values():
             allowed = list(dict.fromkeys([*names.values(), *names]))
             raise InputError(f"--parameters {name}: {kind} has no such number to tune; {nearest(name, allowed)}")
-    wanted = [
+    selected = [
         (name, place, number)
-        for (name, place, number), label in zip(found, names, strict=True)
+        for (name, place, number), label in zip(candidates, names, strict=True)
         if not chosen or name in chosen or label in chosen
     ]
-    return [_bounded(name, place, number, values, make) for name, place, number in wanted]
+    return [_bounded(name, place, number, values, make) for name, place, number in selected]
 
 
-def _leaves(value: Any, place: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
+def _leaves(value: ParameterValue, place: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
     if isinstance(value, tuple):
         for i, item in enumerate(value):
             yield from _leaves(item, (*place, i))
@@ -133,8 +137,10 @@ def _leaves(value: Any, place: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...
         yield place, float(value)
 
 
-def _bounded(name: str, place: tuple[int, ...], given: float, values: Mapping[str, Any], make: Make) -> TunedScalar:
-    """Find by bisection how far the observer lets a number go while the others stay."""
+def _bounded(
+    name: str, place: tuple[int, ...], given: float, values: ParameterValues, make: MakeObserver
+) -> TunedScalar:
+    """Find by bisection the range of a number that the observer accepts while the others stay."""
     unbounded = TunedScalar(name, place, given, 0.0, math.inf)
     size = abs(given)
 
@@ -160,10 +166,10 @@ def _bounded(name: str, place: tuple[int, ...], given: float, values: Mapping[st
 def narrowed(
     numbers: Sequence[TunedScalar], ranges: Mapping[str, tuple[float, float]], option: str
 ) -> list[TunedScalar]:
-    """The same numbers within ranges that the user gave.
+    """Narrow numbers to the user's ranges.
 
     Args:
-        numbers: What is tuned.
+        numbers: The tuned numbers.
         ranges: Number -> smallest and largest size.
         option: The option's name, for messages.
 
@@ -171,17 +177,29 @@ def narrowed(
         The numbers.
 
     Raises:
-        InputError: A range is of no number that is tuned, or the observer refuses it, or it is empty.
+        InputError: A range belongs to no tuned number, or is empty.
     """
     names = [number.name for number in numbers]
     for name in ranges:
         if name not in names:
             raise InputError(f"{option} {name}: not tuned; {nearest(name, names, 'tuned')}")
-    kept = []
+    bounded = []
     for number in numbers:
         low, high = ranges.get(number.name, (number.low, number.high))
         if not 0.0 < low < high < math.inf:
-            given = f"{number.name}={low:g}:{high:g}"
-            raise InputError(f"{option} {given}: must be two positive numbers, the smaller first")
-        kept.append(replace(number, low=low, high=high))
-    return kept
+            limits = f"{number.name}={low:g}:{high:g}"
+            raise InputError(f"{option} {limits}: must be two positive numbers, the smaller first")
+        bounded.append(replace(number, low=low, high=high))
+    return bounded
+
+
+def plain(parameters: ParameterValues) -> dict[str, ParameterValue]:
+    """Return parameters as JSON and TOML can hold them."""
+    return {name: _listed(value) for name, value in parameters.items() if value is not None}
+
+
+def _listed(value: ParameterValue) -> ParameterValue:
+    """Convert tuples to lists, and what JSON or TOML cannot hold to text."""
+    if isinstance(value, tuple):
+        return [_listed(item) for item in value]
+    return value if isinstance(value, (bool, int, float, str)) else str(value)

@@ -1,25 +1,27 @@
-"""A study as figures, as a table, and as files."""
+"""A tuning's figures, table and files."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from rich import box
 from rich.table import Table
 
+from cmg_mj.replay.report import JsonValue
 from cmg_mj.results.intervals import Interval
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
+from cmg_mj.results.summary_keys import finite
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.tuning.on_simulations import windows_of
+from cmg_mj.studies.tuning.parameters import plain
 from cmg_mj.studies.tuning.study import NoiseLevelResult, TuningResult, best_noise, tuned_scenario
 
 
-def figures_of(study: TuningResult) -> dict[str, Any]:
-    """What `cmg-mj tune --json` prints."""
+def figures_of(study: TuningResult) -> dict[str, JsonValue]:
+    """Return the figures that `cmg-mj tune --json` prints."""
     best = best_noise(study)
     return {
         "scenario": study.scenario.title,
@@ -37,19 +39,19 @@ def figures_of(study: TuningResult) -> dict[str, Any]:
     }
 
 
-def level_figures(level: NoiseLevelResult) -> dict[str, Any]:
-    """One level's figures."""
+def level_figures(level: NoiseLevelResult) -> dict[str, JsonValue]:
+    """Return one level's figures."""
     return {
         "noise_density_ug_rthz": level.noise_ug_rthz,
         "parameters": plain(level.parameters),
         "at_a_limit": list(level.edges),
-        "fit_rms_error_rad_s": _number(level.fit_rms),
-        "fit_given_rms_error_rad_s": _number(level.fit_given_rms),
+        "fit_rms_error_rad_s": finite(level.fit_rms),
+        "fit_given_rms_error_rad_s": finite(level.fit_given_rms),
         "held_out_worlds": len(level.rms),
-        "held_out_rms_error_rad_s": _number(float(level.rms.mean())),
-        "held_out_given_rms_error_rad_s": _number(float(level.given_rms.mean())),
-        "held_out_fit": _number(level.fit),
-        "held_out_given_fit": _number(level.given_fit),
+        "held_out_rms_error_rad_s": finite(float(level.rms.mean())),
+        "held_out_given_rms_error_rad_s": finite(float(level.given_rms.mean())),
+        "held_out_fit": finite(level.fit),
+        "held_out_given_fit": finite(level.given_fit),
         "held_out_ratio": _interval(level.ratio),
         "verdict": level.verdict,
         "zero_estimate_rms_error_rad_s": level.zero_rms,
@@ -58,28 +60,12 @@ def level_figures(level: NoiseLevelResult) -> dict[str, Any]:
     }
 
 
-def plain(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters as JSON and TOML can hold them."""
-    return {name: _listed(value) for name, value in parameters.items() if value is not None}
-
-
-def _listed(value: Any) -> Any:
-    """Tuples as lists, and nothing that JSON or TOML cannot hold."""
-    if isinstance(value, tuple):
-        return [_listed(item) for item in value]
-    return value if isinstance(value, (bool, int, float, str)) else str(value)
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
 def _interval(interval: Interval) -> list[float | None]:
-    return [_number(value) for value in interval]
+    return [finite(value) for value in interval]
 
 
 def tuning_table(study: TuningResult) -> Table:
-    """The table that `cmg-mj tune` prints."""
+    """Return the table that `cmg-mj tune` prints."""
     scenario = study.scenario
     title = f"{scenario.title or 'Tuning'}: {study.kind}, seed {scenario.seed}"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0), caption=_caption(study))
@@ -102,14 +88,14 @@ def tuning_table(study: TuningResult) -> Table:
             *sizes,
             f"{level.rms.mean():.4f}",
             f"{level.given_rms.mean():.4f}",
-            spread(level.ratio),
+            ratio_text(level.ratio),
             level.verdict,
         )
     return table
 
 
-def spread(ratio: Interval) -> str:
-    """To three decimals, or as many as show on which side of 1 an end lies."""
+def ratio_text(ratio: Interval) -> str:
+    """Format a ratio with three decimals, or as many as show on which side of 1 an end lies."""
     digits = 3
     while digits < 6 and any(value != 1.0 and round(value, digits) == 1.0 for value in ratio[1:]):
         digits += 1
@@ -118,7 +104,7 @@ def spread(ratio: Interval) -> str:
 
 
 def _caption(study: TuningResult) -> str:
-    """What the table does not say by itself."""
+    """Explain the figures of the table."""
     spans = ", ".join(f"{start:g} s to {end:g} s" for start, end in windows_of(study.scenario))
     lines = [f"RMS of the estimated rate less the gyro's, {spans}, on worlds that were not fitted."]
     if not study.scenario.push:
@@ -136,14 +122,14 @@ def _caption(study: TuningResult) -> str:
         lines.append("* at a limit of its range.")
     fell = sum(level.fell for level in study.levels)
     if fell:
-        lines.append(f"Left out: {fell} worlds that fell.")
+        lines.append(f"Discarded: {fell} worlds that fell.")
     if len(study.levels) > 1:
         lines.append(_best(study))
     return "\n".join(lines)
 
 
 def _best(study: TuningResult) -> str:
-    """At which noise the given parameters are the best ones, in words."""
+    """Describe the noise at which the given parameters are the best ones."""
     best = best_noise(study)
     if best.noise_ug_rthz is None:
         if best.where == "not bracketed":
@@ -155,18 +141,18 @@ def _best(study: TuningResult) -> str:
 
 
 def files_of_study(noises_ug_rthz: Sequence[float]) -> list[str]:
-    """Names of what a study writes: one noise makes scenario.toml, several make scenario-NOISE.toml."""
+    """Return the names of a study's files: one noise gives scenario.toml, several give scenario-NOISE.toml."""
     several = [f"scenario-{noise:g}.toml" for noise in noises_ug_rthz] if len(noises_ug_rthz) > 1 else ["scenario.toml"]
     return ["tuned.json", *several]
 
 
 def save_study(folder: RunFolder | Path, study: TuningResult, *, complete: bool = True) -> list[Path]:
-    """Write tuned.json and a scenario a sensor noise, which runs with the tuned observer.
+    """Write tuned.json, and for each sensor noise a scenario that runs with the tuned observer.
 
     Args:
-        folder: Where. What is there and was not written by cmg_mj stays.
-        study: What to write.
-        complete: Whether these are all noises that were asked for.
+        folder: The folder. Files in it that cmg_mj did not write stay.
+        study: The result.
+        complete: Whether these are all noises that were requested.
 
     Returns:
         The files.
@@ -179,6 +165,6 @@ def save_study(folder: RunFolder | Path, study: TuningResult, *, complete: bool 
         lambda path: write_text(path, json.dumps(figures_of(study), indent=2)),
         *(prepare(tuned_scenario(study, level)).save for level in study.levels),
     )
-    with claimed(folder) as it:
-        place = it.write(dict(zip(names, writers, strict=True)), complete=complete)
+    with claimed(folder) as claim:
+        place = claim.write(dict(zip(names, writers, strict=True)), complete=complete)
     return [place / name for name in names]

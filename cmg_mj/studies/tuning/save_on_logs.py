@@ -1,28 +1,29 @@
-"""A study on logs as figures, as a table, and as a file."""
+"""Figures, table and file of a tuning on logs."""
 
 from __future__ import annotations
 
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 from rich import box
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from cmg_mj.replay.report import JsonValue
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.studies.tuning.on_logs import SHORTEST_S, LogStudy
-from cmg_mj.studies.tuning.save import level_figures, plain, spread
+from cmg_mj.studies.tuning.parameters import plain
+from cmg_mj.studies.tuning.save import level_figures, ratio_text
 
 FILES = ("tuned.json",)
 
 
-def figures_of_logs(study: LogStudy) -> dict[str, Any]:
-    """What `cmg-mj tune --log ... --json` prints."""
+def figures_of_logs(study: LogStudy) -> dict[str, JsonValue]:
+    """Return the figures that `cmg-mj tune-log --json` prints."""
     level = level_figures(study.level)
-    left_out = ("noise_density_ug_rthz", "worlds_that_fell", "held_out_worlds")
+    only_of_scenarios = ("noise_density_ug_rthz", "worlds_that_fell", "held_out_worlds")
     return {
         "logs": list(study.names),
         "observer": study.kind,
@@ -35,21 +36,21 @@ def figures_of_logs(study: LogStudy) -> dict[str, Any]:
             for noise in study.noises
         ],
         "notes": [list(log) for log in study.remarks],
-        "reference": [found and found._asdict() for found in study.alignments],
+        "reference": [aligned and aligned._asdict() for aligned in study.alignments],
         "held_out_stretches": len(study.level.rms),
         "held_out_stretch_s": study.stretch_s,
-        **{key: value for key, value in level.items() if key not in left_out},
-        **({} if study.tells else {"held_out_ratio": None, "verdict": None}),
+        **{key: value for key, value in level.items() if key not in only_of_scenarios},
+        **({} if study.has_interval else {"held_out_ratio": None, "verdict": None}),
     }
 
 
 def logs_table(study: LogStudy) -> Group:
-    """The table that `cmg-mj tune --log` prints."""
+    """Return the table that `cmg-mj tune-log` prints."""
     level = study.level
     share = f"{study.split:.0%}"
     several = len(study.names) > 1
-    said = zip(study.names, study.remarks, strict=True)
-    lines = [f"{name}: {line}" if several else line for name, remarks in said for line in remarks]
+    logs = zip(study.names, study.remarks, strict=True)
+    lines = [f"{name}: {line}" if several else line for name, remarks in logs for line in remarks]
     lines += [
         f"RMS of the estimated rate less the reference. Fitted on the first {share} of each log, scored on the rest,",
         f"in {len(level.rms)} stretches. An estimate of zero: {level.zero_rms:.4f} rad/s. Fit {level.fit:.3f} tuned, "
@@ -57,7 +58,7 @@ def logs_table(study: LogStudy) -> Group:
     ]
     if study.insensitive_parameters:
         lines.append(f"Not tuned, because the rate does not depend on them: {', '.join(study.insensitive_parameters)}.")
-    if not study.tells:
+    if not study.has_interval:
         short = f"the scored stretches are {study.stretch_s:.2g} s short"
         lines.append(f"No interval: {short}; there is one from {SHORTEST_S:g} s on.")
     if level.edges:
@@ -70,8 +71,8 @@ def logs_table(study: LogStudy) -> Group:
         table.add_row(number.name, f"{number.given:.4g}", f"{size:.4g}{'*' if number.name in level.edges else ''}")
     table.add_section()
     table.add_row("held out [rad/s]", f"{level.given_rms.mean():.4f}", f"{level.rms.mean():.4f}")
-    table.add_row("given / tuned, 95 %", "", spread(level.ratio) if study.tells else "-")
-    table.add_row("tuned is", "", level.verdict if study.tells else "-")
+    table.add_row("given / tuned, 95 %", "", ratio_text(level.ratio) if study.has_interval else "-")
+    table.add_row("tuned is", "", level.verdict if study.has_interval else "-")
     return Group(table, Text("\n".join(lines)))
 
 
@@ -79,15 +80,15 @@ def save_log_study(folder: RunFolder | Path, study: LogStudy) -> Path:
     """Write tuned.json.
 
     Args:
-        folder: Where. What is there and was not written by cmg_mj stays.
-        study: What to write.
+        folder: The folder. Files in it that cmg_mj did not write stay.
+        study: The result.
 
     Returns:
-        Where it is.
+        The folder of the file.
 
     Raises:
-        InputError: It cannot be written.
+        InputError: The file cannot be written.
     """
     text = json.dumps(figures_of_logs(study), indent=2)
-    with claimed(folder) as it:
-        return it.write({FILES[0]: lambda path: write_text(path, text)})
+    with claimed(folder) as claim:
+        return claim.write({FILES[0]: lambda path: write_text(path, text)})

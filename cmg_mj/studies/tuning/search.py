@@ -25,21 +25,25 @@ FIRST_STEP = 0.4
 
 Loss = Callable[[Sequence[float]], float]
 """Sizes -> a positive loss; infinite where there is none."""
+Height = Callable[[np.ndarray], float]
+"""Logarithms of sizes -> logarithm of the loss."""
 
 
-def idle(loss: Loss, numbers: Sequence[TunedScalar], given: float, factor: float = 10.0) -> list[TunedScalar]:
-    """The numbers that do not matter: ten times as large or as small, the loss is the same to six digits.
+def insensitive_numbers(
+    loss: Loss, numbers: Sequence[TunedScalar], given: float, factor: float = 10.0
+) -> list[TunedScalar]:
+    """Return the numbers that the loss does not depend on: it is the same to six digits if they change tenfold.
 
     Args:
         loss: The loss.
-        numbers: What could be tuned.
+        numbers: The candidates.
         given: The loss of the given sizes.
-        factor: How far each is moved.
+        factor: Factor by which each is changed.
 
     Returns:
-        Those that need no tuning.
+        The numbers that need no tuning.
     """
-    found = []
+    insensitive = []
     for i, number in enumerate(numbers):
         sizes = [abs(other.given) for other in numbers]
         changes = []
@@ -47,12 +51,12 @@ def idle(loss: Loss, numbers: Sequence[TunedScalar], given: float, factor: float
             value = loss([*sizes[:i], moved, *sizes[i + 1 :]])
             changes.append(abs(value - given) if math.isfinite(value) else math.inf)
         if math.isfinite(given) and max(changes) <= 1e-6 * given:
-            found.append(number)
-    return found
+            insensitive.append(number)
+    return insensitive
 
 
 def evaluations(dimension: int) -> int:
-    """About how often `search` calls the loss, for a progress bar."""
+    """Estimate how often `search` calls the loss, for a progress bar."""
     return GRID + 15 if dimension == 1 else dimension * (SCATTER + 2 * 45)
 
 
@@ -63,12 +67,12 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
     More: Nelder and Mead's simplex from the given sizes, and from the best of points scattered around them.
 
     Args:
-        loss: What to minimise.
-        numbers: What is tuned.
-        starts: How many starts there are in several dimensions; one is the given sizes alone.
+        loss: The loss.
+        numbers: The tuned numbers.
+        starts: Number of starts in several dimensions; one is the given sizes alone.
 
     Returns:
-        The best sizes, and their loss, which is infinite if nothing worked.
+        The best sizes and their loss, which is infinite if there is none.
     """
     low, high = (np.log([getattr(number, end) for number in numbers]) for end in ("low", "high"))
     given = np.clip(np.log([abs(number.given) for number in numbers]), low, high)
@@ -89,7 +93,7 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
     return [float(size) for size in np.exp(np.clip(best[1], low, high))], math.exp(best[0])
 
 
-def _search_line(height: Callable, low: float, high: float) -> None:
+def _search_line(height: Height, low: float, high: float) -> None:
     points = np.linspace(low, high, GRID).tolist()
     heights = [height(np.array([point])) for point in points]
     lowest = int(np.argmin(heights))
@@ -104,7 +108,7 @@ def _search_line(height: Callable, low: float, high: float) -> None:
     )
 
 
-def _search_simplex(height: Callable, low: np.ndarray, high: np.ndarray, given: np.ndarray, starts: int) -> None:
+def _search_simplex(height: Height, low: np.ndarray, high: np.ndarray, given: np.ndarray, starts: int) -> None:
     n = len(given)
     first = [given]
     if starts > 1:
@@ -129,7 +133,7 @@ def _search_simplex(height: Callable, low: np.ndarray, high: np.ndarray, given: 
 
 
 def crossing(x: Sequence[float], y: Sequence[float]) -> float | None:
-    """Where a piecewise straight line through (x, y) first crosses zero; None if it does not."""
+    """Return where a piecewise straight line through (x, y) first crosses zero; None if it does not."""
     for (x0, y0), (x1, y1) in pairwise(zip(x, y, strict=True)):
         if y0 == 0.0:
             return x0

@@ -6,18 +6,27 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Generic, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.observers import Observer, make_observer
+from cmg_mj.observers import make_observer
+from cmg_mj.replay.parameter_options import ParameterValue
 from cmg_mj.results.intervals import Interval, PairedVerdict, paired_verdict, ratio_interval
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.tuning.on_simulations import WARM_UP_S, Recorded, Window, halves, recorder
-from cmg_mj.studies.tuning.parameters import TunedScalar, narrowed, numbers_of, parameters_of, replaced
-from cmg_mj.studies.tuning.search import crossing, evaluations, idle, search
+from cmg_mj.studies.tuning.parameters import (
+    MakeObserver,
+    ParameterValues,
+    TunedScalar,
+    narrowed,
+    numbers_of,
+    parameters_of,
+    replaced,
+)
+from cmg_mj.studies.tuning.search import crossing, evaluations, insensitive_numbers, search
 
 DIGITS = 4
 """Significant digits of the tuned parameters: what is written is what was scored."""
@@ -25,42 +34,41 @@ AT_A_LIMIT = 1.02
 """A number this close to a limit of its range is at the limit."""
 
 OnShare = Callable[[float], None]
+M = TypeVar("M")
+M_contra = TypeVar("M_contra", contravariant=True)
 
 
-class ScoringData(Protocol):
-    """What parameters are scored on: recorded worlds, or stretches of logs."""
+class ScoringData(Protocol[M_contra]):
+    """Data on which parameters are scored: recorded worlds, or stretches of logs."""
 
     @property
     def fell(self) -> int:
-        """How many more fell."""
+        """Number of worlds that fell and are not scored."""
         ...
 
     @property
     def worlds(self) -> int:
-        """How many."""
+        """Number of worlds or stretches."""
         ...
 
     @property
     def zero_rms(self) -> float:
-        """The error of an estimate of zero, their mean [rad/s]."""
+        """Error of an estimate of zero, the mean over worlds or stretches [rad/s]."""
         ...
 
     @property
     def largest_acceleration(self) -> float:
-        """Of the tilt [rad/s^2]."""
+        """Largest acceleration of the tilt [rad/s^2]."""
         ...
 
-    def errors(self, made: Any, /) -> np.ndarray:
-        """An observer's RMS error in each, (n,) [rad/s]; NaN where it is lost.
-
-        `made` is what `ParameterFit.make` gives.
-        """
+    def errors(self, observers: M_contra, /) -> np.ndarray:
+        """Return the RMS errors of what `ParameterFit.make` makes, (n,) [rad/s]; NaN where an observer fails."""
         ...
 
 
 @dataclass(frozen=True)
 class NoiseLevelResult:
-    """What came out at one sensor noise.
+    """Tuned parameters and their scores at one sensor noise.
 
     Attributes:
         noise_ug_rthz: Noise density of the accelerometers [ug/sqrt(Hz)].
@@ -68,16 +76,16 @@ class NoiseLevelResult:
         sizes: The tuned numbers among them, by name.
         edges: Names of those that ended at a limit of their range.
         fit_rms: Mean over the fitted worlds of the velocity RMS error, tuned [rad/s].
-        fit_given_rms: The same with the given parameters [rad/s].
+        fit_given_rms: Mean over the fitted worlds with the given parameters [rad/s].
         rms: On the held-out worlds, tuned, (n_worlds,) [rad/s].
         given_rms: On the held-out worlds, given, (n_worlds,) [rad/s].
-        zero_rms: What an estimate of zero would have there, mean over the held-out worlds [rad/s].
-        largest_acceleration: Of the tilt, in the fitted worlds [rad/s^2].
-        fell: Worlds that fell, and were left out.
+        zero_rms: Error of an estimate of zero, mean over the held-out worlds [rad/s].
+        largest_acceleration: Largest acceleration of the tilt in the fitted worlds [rad/s^2].
+        fell: Number of worlds that fell and are discarded.
     """
 
     noise_ug_rthz: float
-    parameters: Mapping[str, Any]
+    parameters: ParameterValues
     sizes: Mapping[str, float]
     edges: Sequence[str]
     fit_rms: float
@@ -90,17 +98,17 @@ class NoiseLevelResult:
 
     @property
     def ratio(self) -> Interval:
-        """Held-out error with the given parameters by that with the tuned ones, world by world."""
+        """Ratio of the held-out errors, given parameters by tuned ones, world by world."""
         return ratio_interval(self.given_rms, self.rms)
 
     @property
     def fit(self) -> float:
-        """Of the tuned parameters in what is scored, 1 - error/motion: 0 is what an estimate of zero has."""
+        """Fit of the tuned parameters on the held-out worlds, 1 - error/motion; 0 for an estimate of zero."""
         return self._fit(self.rms)
 
     @property
     def given_fit(self) -> float:
-        """The same of the given parameters."""
+        """Fit of the given parameters on the held-out worlds."""
         return self._fit(self.given_rms)
 
     def _fit(self, rms: np.ndarray) -> float:
@@ -108,9 +116,9 @@ class NoiseLevelResult:
 
     @property
     def verdict(self) -> PairedVerdict:
-        """The tuned parameters beside the given ones: is 1 below, inside or above the interval of the ratio?
+        """Compare the tuned parameters with the given ones, by the interval of the ratio.
 
-        Given ones that lose the observer are worse than any.
+        Given parameters with which the observer fails are worse than any.
         """
         if not np.isfinite(self.given_rms).all():
             return "better"
@@ -125,16 +133,16 @@ class TuningResult:
         scenario: The experiment.
         kind: The observer.
         given: Its parameters before.
-        numbers: What was tuned.
-        insensitive_parameters: Names of the numbers that were not, because the estimated rate does not depend on them.
-        worlds: How many were to be fitted, and as many to be scored.
-        window: What was scored [s].
-        levels: One a sensor noise, in ascending order.
+        numbers: The tuned numbers.
+        insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
+        worlds: Number of worlds to fit; as many are held out for scoring.
+        window: Start and end of the scored time [s].
+        levels: Results by sensor noise, in ascending order.
     """
 
     scenario: Scenario
     kind: str
-    given: Mapping[str, Any]
+    given: ParameterValues
     numbers: Sequence[TunedScalar]
     insensitive_parameters: Sequence[str]
     worlds: int
@@ -160,17 +168,17 @@ def tune(
 
     Args:
         scenario: The experiment, with the observer and the parameters to start from and to compare with.
-        worlds: How many are fitted, and as many held out.
+        worlds: Number of worlds to fit; as many are held out.
         parameters: Names to tune; by default every number of the observer.
         ranges: Number -> smallest and largest size, where the observer's own limits are not enough.
         noise_ug_rthz: Noise densities of the accelerometers; by default the scenario's [ug/sqrt(Hz)].
-        warm_up_s: How much is replayed before the window [s].
+        warm_up_s: Time replayed before the window [s].
         starts: Starts of a search in several dimensions.
-        recorded: Hands out the recordings, for those who keep them; left out, they are made here, all at once.
-        on_share: Called now and then with the share done.
+        recorded: Returns recordings made before; by default they are made here, all at once.
+        on_share: Called now and then with the completed share.
 
     Returns:
-        The study. If the user interrupted, with the noise densities that were done until then.
+        The result. After an interrupt, it has the noise densities done until then.
 
     Raises:
         InputError: A name or a range does not fit, nothing can be tuned, or too many worlds fell.
@@ -178,58 +186,49 @@ def tune(
     """
     if worlds < 2:
         raise InputError(f"--worlds {worlds}: at least 2, for an interval")
-    own = scenario.sensors.accelerometer.noise_density_ug_rthz
-    densities = sorted(dict.fromkeys(noise_ug_rthz or [own]))
-    kind, settings = scenario.observer.kind, scenario.observer
+    accelerometer = scenario.sensors.accelerometer
+    densities = sorted(dict.fromkeys(noise_ug_rthz or [accelerometer.noise_density_ug_rthz]))
+    kind = scenario.observer.kind
     experiment = prepare(scenario)
     experiment.require_single_axis("tuning")
     experiment.rehearse(worlds=2)
-    given = parameters_of(kind, experiment.design.observer(), settings.parameters)
+    given = parameters_of(kind, experiment.design.observer(), scenario.observer.parameters)
     numbers = numbers_of(kind, given, _maker(experiment), parameters)
     numbers = narrowed(numbers, ranges or {}, "--range")
+    recorded = recorded or recorder(halves(scenario, worlds, densities), warm_up_s=warm_up_s)
+    spans = range(worlds), range(worlds, 2 * worlds)
 
     levels: list[NoiseLevelResult] = []
-    still: list[TunedScalar] = []
+    insensitive: list[TunedScalar] = []
     window: Window = (0.0, 0.0)
-    recorded = recorded or recorder(halves(scenario, worlds, densities), warm_up_s=warm_up_s)
     for i, density in enumerate(densities):
 
         def share(done: float, i: int = i) -> None:
             if on_share:
                 on_share((i + min(done, 1.0)) / len(densities))
 
-        fit, held_out = (
-            recorded(scenario, span, noise_ug_rthz=density, warm_up_s=warm_up_s)
-            for span in (range(worlds), range(worlds, 2 * worlds))
-        )
+        fit, held_out = (recorded(scenario, span, noise_ug_rthz=density, warm_up_s=warm_up_s) for span in spans)
         fitter = ParameterFit(kind, _maker(experiment, density), given, fit, share)
         if not levels:
-            still, window = fitter.insensitive_parameters(numbers), fit.window
-            if len(still) == len(numbers):
-                raise InputError(f"the rate that {kind} estimates does not depend on {names_of(numbers)}")
-            numbers = [number for number in numbers if number not in still]
+            window = fit.window
+            numbers, insensitive = fitter.sensitive_parameters(numbers)
         fitter.expected = evaluations(len(numbers))
-        # What was best at the noise before is near the best at this one.
-        from_here = (
-            [replace(n, given=math.copysign(levels[-1].sizes[n.name], n.given)) for n in numbers] if levels else numbers
-        )
+        start = numbers
+        if levels:  # the best values at the level before are near the best at this one
+            start = [replace(n, given=math.copysign(levels[-1].sizes[n.name], n.given)) for n in numbers]
         try:
-            levels.append(level_of(density, fitter, from_here, held_out, starts))
+            levels.append(level_of(density, fitter, start, held_out, starts))
             share(1.0)
         except KeyboardInterrupt:
             if not levels:
                 raise
             break
-    return TuningResult(scenario, kind, given, numbers, [number.name for number in still], worlds, window, levels)
+    names = [number.name for number in insensitive]
+    return TuningResult(scenario, kind, given, numbers, names, worlds, window, levels)
 
 
-def names_of(numbers: Sequence[TunedScalar]) -> str:
-    """Numbers in a message."""
-    return ", ".join(number.name for number in numbers)
-
-
-def _maker(experiment: Experiment, noise_ug_rthz: float | None = None) -> Callable[..., Observer]:
-    """Makes the scenario's observer of its parameters, told the noise of the sensors it is tuned at."""
+def _maker(experiment: Experiment, noise_ug_rthz: float | None = None) -> MakeObserver:
+    """Return what makes the scenario's observer from its parameters, for the sensor noise of the tuning."""
     dt, model, noise = experiment.design.given
     if noise_ug_rthz is not None:
         sensors = experiment.scenario.sensors
@@ -238,68 +237,89 @@ def _maker(experiment: Experiment, noise_ug_rthz: float | None = None) -> Callab
     return partial(make_observer, experiment.scenario.observer.kind, dt, model, noise)
 
 
-class ParameterFit:
-    """Scores parameters on the fitted worlds, and counts how often."""
+class ParameterFit(Generic[M]):
+    """Scores parameters on the fitted worlds, and counts the evaluations.
+
+    Args:
+        kind: The observer's name.
+        make: Makes what is scored from parameters: an observer, or one for each log.
+        given: The given parameters.
+        data: The fitted worlds, or stretches of logs.
+        on_share: Called with the completed share of the evaluations.
+
+    Attributes:
+        expected: Expected number of evaluations.
+        given_loss: Loss of the given parameters [rad/s].
+    """
 
     def __init__(
-        self, kind: str, make: Callable[..., Any], given: Mapping[str, Any], recorded: ScoringData, on_share: OnShare
+        self, kind: str, make: Callable[..., M], given: ParameterValues, data: ScoringData[M], on_share: OnShare
     ) -> None:
-        self.kind, self.make, self.given, self.recorded = kind, make, given, recorded
+        self.kind, self.make, self.given, self.data = kind, make, given, data
         self.on_share = on_share
         self.expected = 1
         self.count = 0
-        self.given_loss = self._mean(given)
+        self.given_loss = self.mean_error(given)
 
-    def errors(self, parameters: Mapping[str, Any], recorded: ScoringData) -> np.ndarray:
-        """Velocity RMS errors, (n_worlds,) [rad/s]; not a number where the observer refuses or fails."""
+    def errors(self, parameters: ParameterValues, data: ScoringData[M]) -> np.ndarray:
+        """Return velocity RMS errors, (n_worlds,) [rad/s]; NaN where the observer refuses or fails."""
         try:
-            return recorded.errors(self.make(**parameters))
+            return data.errors(self.make(**parameters))
         except KeyboardInterrupt:
             raise
         except Exception:  # a user's observer may fail in any way, at parameters nobody has tried
-            return np.full(recorded.worlds, math.nan)
+            return np.full(data.worlds, math.nan)
 
-    def _mean(self, parameters: Mapping[str, Any]) -> float:
-        errors = self.errors(parameters, self.recorded)
+    def mean_error(self, parameters: ParameterValues) -> float:
+        """Return the mean velocity RMS error of the fitted worlds [rad/s]; infinite if one of them fails."""
+        errors = self.errors(parameters, self.data)
         return float(errors.mean()) if np.isfinite(errors).all() else math.inf
 
     def loss(self, numbers: Sequence[TunedScalar], sizes: Sequence[float]) -> float:
-        """Mean over the worlds of the velocity RMS error [rad/s]; infinite for one that is lost."""
+        """Return the mean error of parameters with some sizes [rad/s], and report the progress."""
         self.count += 1
         self.on_share(self.count / self.expected)
-        return self._mean(replaced(self.given, numbers, sizes))
+        return self.mean_error(replaced(self.given, numbers, sizes))
 
-    def insensitive_parameters(self, numbers: Sequence[TunedScalar]) -> list[TunedScalar]:
-        """Those that do not matter."""
-        return idle(lambda sizes: self.loss(numbers, sizes), numbers, self.given_loss)
+    def sensitive_parameters(self, numbers: Sequence[TunedScalar]) -> tuple[list[TunedScalar], list[TunedScalar]]:
+        """Divide numbers into those that the estimated rate depends on and the others.
+
+        Raises:
+            InputError: The rate depends on none of them.
+        """
+        insensitive = insensitive_numbers(lambda sizes: self.loss(numbers, sizes), numbers, self.given_loss)
+        if len(insensitive) == len(numbers):
+            names = ", ".join(number.name for number in numbers)
+            raise InputError(f"the rate that {self.kind} estimates does not depend on {names}")
+        return [number for number in numbers if number not in insensitive], insensitive
 
 
 def level_of(
-    noise: float, fitter: ParameterFit, numbers: Sequence[TunedScalar], held_out: ScoringData, starts: int
+    noise: float, fitter: ParameterFit[M], numbers: Sequence[TunedScalar], held_out: ScoringData[M], starts: int
 ) -> NoiseLevelResult:
-    """Search, and score what was found.
+    """Search for the best parameters, and score them on held-out data.
 
     Args:
-        noise: Noise density of the accelerometers, to be told [ug/sqrt(Hz)].
-        fitter: Scores on what is fitted.
-        numbers: What is tuned.
-        held_out: What is scored.
+        noise: Noise density of the accelerometers, for the result [ug/sqrt(Hz)].
+        fitter: Scores on the fitted data.
+        numbers: The tuned numbers.
+        held_out: The held-out data.
         starts: Starts of a search in several dimensions.
 
     Returns:
-        What came out.
+        The parameters and their scores.
 
     Raises:
         InputError: No parameters give an estimate that stays finite.
     """
     fitter.count = 0
-    sizes, found = search(lambda tried: fitter.loss(numbers, tried), numbers, starts=starts)
-    if not math.isfinite(found):
+    sizes, loss = search(lambda sizes: fitter.loss(numbers, sizes), numbers, starts=starts)
+    if not math.isfinite(loss):
         raise InputError(f"{fitter.kind}: no parameters give an estimate that stays finite")
-    before = [abs(_get(fitter.given[number.parameter], number.place)) for number in numbers]
-    inside = all(number.low <= size <= number.high for number, size in zip(numbers, before, strict=True))
-    if inside and fitter.given_loss <= found:  # a search stops within its tolerance
-        sizes = before
+    given_sizes = [abs(_get(fitter.given[number.parameter], number.place)) for number in numbers]
+    inside = all(number.low <= size <= number.high for number, size in zip(numbers, given_sizes, strict=True))
+    if inside and fitter.given_loss <= loss:  # a search stops within its tolerance
+        sizes = given_sizes
     else:
         rounded = [float(f"{size:.{DIGITS}g}") for size in sizes]
         if math.isfinite(fitter.loss(numbers, rounded)):  # not beyond an open limit
@@ -310,13 +330,13 @@ def level_of(
         parameters=tuned,
         sizes={n.name: size for n, size in zip(numbers, sizes, strict=True)},
         edges=[n.name for n, size in zip(numbers, sizes, strict=True) if _at_a_limit(n, size)],
-        fit_rms=fitter._mean(tuned),
+        fit_rms=fitter.mean_error(tuned),
         fit_given_rms=fitter.given_loss,
         rms=fitter.errors(tuned, held_out),
         given_rms=fitter.errors(fitter.given, held_out),
         zero_rms=held_out.zero_rms,
-        largest_acceleration=fitter.recorded.largest_acceleration,
-        fell=fitter.recorded.fell + held_out.fell,
+        largest_acceleration=fitter.data.largest_acceleration,
+        fell=fitter.data.fell + held_out.fell,
     )
 
 
@@ -324,9 +344,11 @@ def _at_a_limit(number: TunedScalar, size: float) -> bool:
     return not number.low * AT_A_LIMIT < size < number.high / AT_A_LIMIT
 
 
-def _get(value: Any, place: tuple[int, ...]) -> float:
+def _get(value: ParameterValue, place: tuple[int, ...]) -> float:
     for i in place:
+        assert isinstance(value, Sequence)
         value = value[i]
+    assert isinstance(value, (int, float))
     return float(value)
 
 
@@ -334,22 +356,23 @@ class BestNoise(NamedTuple):
     """The sensor noise at which the given parameters are the best ones."""
 
     where: Literal["found", "below", "above", "not bracketed"]
-    """Whether the noises tried have it between them; below or above them; or none of the three can be said."""
+    """Whether that noise lies between the levels, below or above them, or cannot be bracketed."""
     noise_ug_rthz: float | None
-    """If it was found [ug/sqrt(Hz)]."""
+    """The noise density, if it was found [ug/sqrt(Hz)]."""
 
 
 def best_noise(study: TuningResult) -> BestNoise:
-    """At which sensor noise the given parameters are the best ones.
+    """Find the sensor noise at which the given parameters are the best ones.
 
-    With one tuned number, where its best value crosses the given one, on straight lines between the levels, both in the
-    logarithm. With more, the level at which the given parameters lose least; at an end of the list it may lie beyond.
+    With one tuned number, it is the noise at which the best value crosses the given one, on straight lines between the
+    levels, both in the logarithm. With more, it is the level at which the given parameters lose least, unless that is
+    the first or the last.
 
     Args:
-        study: With several levels.
+        study: A result with several levels.
 
     Returns:
-        The noise density, or on which side of the levels it lies, if there is one.
+        The noise density, or the side of the levels on which it lies.
     """
     levels = [level for level in study.levels if level.noise_ug_rthz > 0.0 or len(study.numbers) > 1]
     if len(levels) < 2:
@@ -370,12 +393,13 @@ def best_noise(study: TuningResult) -> BestNoise:
         return BestNoise("below", None)
     if least == len(levels) - 1:
         return BestNoise("above", None)
-    found = len(study.numbers) > 1
-    return BestNoise("found", levels[least].noise_ug_rthz) if found else BestNoise("not bracketed", None)
+    if len(study.numbers) > 1:
+        return BestNoise("found", levels[least].noise_ug_rthz)
+    return BestNoise("not bracketed", None)
 
 
 def tuned_scenario(study: TuningResult, level: NoiseLevelResult) -> Scenario:
-    """The scenario with the tuned observer in the loop, at the level's sensor noise."""
+    """Return the scenario with the tuned observer in the loop, at the level's sensor noise."""
     sensors = study.scenario.sensors
     accelerometer = replace(sensors.accelerometer, noise_density_ug_rthz=level.noise_ug_rthz)
     return study.scenario.model_copy(

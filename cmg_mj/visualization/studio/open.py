@@ -17,22 +17,22 @@ HISTORY_S = 10.0
 
 
 def open_in_studio(
-    load: Callable[[str], Experiment], title: str, gfx: str = WEB, port: int = 0, browser: bool = False
+    load: Callable[[str], Experiment], title: str, viewer: str = WEB, port: int = 0, browser: bool = False
 ) -> None:
     """Open a scenario with its controller, and return when the viewer is closed or at Ctrl-C.
 
     Args:
         load: Prepares the scenario, at first and whenever the user reloads it: see `Stepping`.
         title: Title of the window.
-        gfx: `web`, `native`, or one of Studio's graphics modes.
+        viewer: `web`, `native`, or one of Studio's graphics modes.
         port: Port of the web view, on loopback; 0 for the first free one from 8080 on.
         browser: Whether to open the web view in a browser, if there is a screen.
 
     Raises:
         InputError: The graphics are not available, the port is in use, or the viewer fails.
     """
-    check_graphics(gfx)
-    mode = "" if gfx == NATIVE else gfx
+    check_graphics(viewer)
+    mode = "" if viewer == NATIVE else viewer
     config = viewer_protocol.ViewerConfig(title=title, gfx=mode, http_port=port, open_browser=browser)
     studio = app.App(app.Config(show_inspector=False))  # where the panel is; Shift+Tab shows it
     plugins = [studio, StudioPanel(), Stepping(load), sim_history.SimHistory(min_seconds=HISTORY_S)]
@@ -42,4 +42,4 @@ def open_in_studio(
                 handle.dispatch(messages.LoadModelEvent())
                 viewer_handle.run_sim_loop(handle)
         except ViewerFailed as error:
-            raise InputError(f"--gfx {gfx}: the viewer has failed: {' '.join(str(error).split())}") from error
+            raise InputError(f"--viewer {viewer}: the viewer has failed: {' '.join(str(error).split())}") from error

@@ -32,23 +32,23 @@ class LoopbackViewer(web_viewer.WebViewer):
         """Ignore the address that Studio sets, that of all interfaces."""
 
 
-def check_graphics(gfx: str) -> None:
+def check_graphics(viewer: str) -> None:
     """Reject graphics that are not available, before they end the process.
 
     Args:
-        gfx: `web`, `native`, or one of Studio's graphics modes.
+        viewer: `web`, `native`, or one of Studio's graphics modes.
 
     Raises:
         InputError: The graphics are not available.
     """
-    if gfx == WEB:
+    if viewer == WEB:
         return
     if sys.version_info < (3, 12):
         raise InputError(
-            f"--gfx {gfx}: MuJoCo Studio's windows need Python 3.12 or newer, and this is "
-            f"{sys.version_info.major}.{sys.version_info.minor}; take --gfx {WEB}"
+            f"--viewer {viewer}: MuJoCo Studio's windows need Python 3.12 or newer, and this is "
+            f"{sys.version_info.major}.{sys.version_info.minor}; take --viewer {WEB}"
         )
-    mode = "" if gfx == NATIVE else gfx
+    mode = "" if viewer == NATIVE else viewer
     try:
         process = subprocess.run(
             [sys.executable, "-m", "cmg_mj.visualization.studio.probe", mode],
@@ -63,7 +63,7 @@ def check_graphics(gfx: str) -> None:
             return
         lines = [line.strip() for line in process.stderr.splitlines() if _names_a_failure(line)]
         why = lines[-1] if lines else f"a window ends the process, status {process.returncode}"
-    raise InputError(f"--gfx {gfx}: MuJoCo Studio cannot draw with it here ({why}); take --gfx {WEB}")
+    raise InputError(f"--viewer {viewer}: MuJoCo Studio cannot draw with it here ({why}); take --viewer {WEB}")
 
 
 def _names_a_failure(line: str) -> bool:

@@ -34,8 +34,8 @@ class Robot(NamedTuple):
         for name, value in options.items():
             if name == "base":
                 words.append("--free-base")
-            elif name == "free":
-                words += [f"--free {joint}" for joint in value]
+            elif name == "release":
+                words += [f"--release {joint}" for joint in value]
             else:
                 words.append(f"--{name} " + (f"{value}" if not isinstance(value, tuple) else f"'{_spaced(value)}'"))
         return " ".join(words)
@@ -43,7 +43,7 @@ class Robot(NamedTuple):
 
 ROBOTS = {
     "inverted_pendulum on its free cart": Robot(
-        gymnasium_asset("inverted_pendulum.xml"), {"body": "pole", "axis": "hinge", "free": ["slider"]}
+        gymnasium_asset("inverted_pendulum.xml"), {"body": "pole", "axis": "hinge", "release": ["slider"]}
     ),
     "inverted_double_pendulum, its joint held": Robot(
         gymnasium_asset("inverted_double_pendulum.xml"), {"body": "pole", "scale": 1.1}
@@ -53,10 +53,10 @@ ROBOTS = {
     ),
     "walker2d, freed": Robot(
         gymnasium_asset("walker2d_v5.xml"),
-        {"body": "torso", "axis": "x", "base": "free", "scale": 1.6, "at": (0.15, 0.0, 0.0)},
+        {"body": "torso", "axis": "x", "base": "free", "scale": 1.6, "position": (0.15, 0.0, 0.0)},
         True,
     ),
     "humanoid": Robot(gymnasium_asset("humanoid.xml"), {"body": "torso", "axis": "y", "scale": 2.2}, True),
     "torso": Robot(EXAMPLES / "torso.xml", {"body": "torso", "axis": "x", "scale": 1.21}, True),
-    "bicycle": Robot(EXAMPLES / "bicycle.xml", {"body": "frame", "axis": "x", "at": (0.0, 0.0, 0.3)}, True),
+    "bicycle": Robot(EXAMPLES / "bicycle.xml", {"body": "frame", "axis": "x", "position": (0.0, 0.0, 0.3)}, True),
 }

@@ -12,7 +12,7 @@ from cmg_mj.plant.mounting import mount
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.gymnasium_env import ScissoredPairEnv
-from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.sweeps.api import sweep
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import ROBOTS

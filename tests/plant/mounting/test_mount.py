@@ -15,7 +15,7 @@ from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.plant.tilt_line import SupportLine
 from cmg_mj.simulation.experiment import prepare
-from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.push_limits.prospects import prospects
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import EXAMPLES, ROBOTS
@@ -99,7 +99,7 @@ def test_every_joint_is_held_where_it_stands() -> None:
 def test_servos_hold_what_they_drive() -> None:
     text = BALL.replace("</mujoco>", '<actuator><position joint="gripper" kp="2000" kv="20"/></actuator></mujoco>')
     assert mount(mujoco.MjSpec.from_string(text), "pole", hold="servos").held == ("shoulder",)
-    assert mount(mujoco.MjSpec.from_string(text), "pole", free=["gripper"]).held == ("shoulder",)
+    assert mount(mujoco.MjSpec.from_string(text), "pole", release=["gripper"]).held == ("shoulder",)
 
 
 def test_a_larger_module_has_more_momentum() -> None:
@@ -157,9 +157,11 @@ def test_meshes_are_found_from_another_folder(tmp_path: Path) -> None:
 
 def test_a_second_axis(tmp_path: Path) -> None:
     """A universal joint, mounted twice: the hinge that was held is let go, the first pair is kept, both stand."""
-    once = mount(mujoco.MjSpec.from_string(UNIVERSAL.format(0)), "trunk", axis="roll", name="roll", at=(0.0, 0.0, 0.15))
+    once = mount(
+        mujoco.MjSpec.from_string(UNIVERSAL.format(0)), "trunk", axis="roll", name="roll", position=(0.0, 0.0, 0.15)
+    )
     assert once.held == ("pitch",)
-    twice = mount(once.spec, "trunk", axis="pitch", name="pitch", at=(0.0, 0.0, 0.35))
+    twice = mount(once.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.35))
     assert twice.held == ()
     assert [equality.name for equality in twice.spec.equalities] == []
     model = twice.save("rig.xml")
@@ -169,10 +171,12 @@ def test_a_second_axis(tmp_path: Path) -> None:
     assert can.reduced == experiment.plant.single_axis("pitch").reduced != experiment.plant.single_axis("roll").reduced
     assert prepare(experiment.scenario).run_many(3, keep_trajectory=False).stood.all()
     with pytest.raises(InputError, match="no room: the modules overlap 'roll/cube1', which is there already"):
-        mount(once.spec, "trunk", axis="pitch", name="pitch", at=(0.0, 0.0, 0.15))
-    off = mount(mujoco.MjSpec.from_string(UNIVERSAL.format(0.01)), "trunk", axis="roll", name="roll", at=(0, 0, 0.15))
+        mount(once.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.15))
+    off = mount(
+        mujoco.MjSpec.from_string(UNIVERSAL.format(0.01)), "trunk", axis="roll", name="roll", position=(0, 0, 0.15)
+    )
     with pytest.raises(InputError, match=r"the hinge 'pitch' has to turn by .* deg, and the modules of another axis"):
-        mount(off.spec, "trunk", axis="pitch", name="pitch", at=(0.0, 0.0, 0.35))
+        mount(off.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.35))
 
 
 def test_keyframes_of_its_own_are_kept() -> None:
@@ -196,13 +200,13 @@ def test_the_command_prints_what_the_pair_can_do() -> None:
     assert said.status == 0, said.err
     figures = json.loads(said.out)
     assert figures["held"] == ["front_hip", "rear_hip"]
-    assert figures["ceiling_tilt_deg"] < 2.0
+    assert figures["limit_tilt_deg"] < 2.0
     assert figures["scale_that_suffices"] == 1.21
     assert (
         0.0
-        < figures["borne_impulse_least_n_m_s"]
+        < figures["push_margin_worst_impulse_n_m_s"]
         <= figures["push_margin_impulse_n_m_s"]
-        < figures["ceiling_impulse_n_m_s"]
+        < figures["limit_push_impulse_n_m_s"]
     )
     words = cmg_mj(*given, "-o", "b.xml")
     assert (words.status, "--scale 1.21 suffices" in words.out) == (0, True)

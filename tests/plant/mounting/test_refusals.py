@@ -64,12 +64,16 @@ REFUSED: dict[str, tuple[mujoco.MjSpec, dict[str, Any], str]] = {
     "no hinge there": (pole(), {"axis": "x"}, "hangs body 'pole' on no hinge along it.*--free-base"),
     "three numbers": (pole(), {"axis": (0.0, 0.0, 0.0)}, "must be x, y, three numbers that are not all 0"),
     "no numbers": (pole(), {"axis": ("a", "b", "c")}, "must be x, y, three numbers"),
-    "unknown free joint": (pole(), {"free": ["elbo"]}, "--free elbo: robot has no such joint; did you mean 'elbow'"),
+    "unknown released joint": (
+        pole(),
+        {"release": ["elbo"]},
+        "--release elbo: robot has no such joint; did you mean 'elbow'",
+    ),
     "an unknown keyframe": (pole(), {"keyframe": "home"}, "--keyframe home: robot has no such keyframe; it has: none"),
-    "cubes": (pole(), {"cubes": 0}, "--cubes 0: must be from 1 to 16"),
+    "modules": (pole(), {"modules": 0}, "--modules 0: must be from 1 to 16"),
     "scale": (pole(), {"scale": math.nan}, "--scale nan: must be from 0.05 to 20"),
     "name": (pole(), {"name": "a/b"}, "--name a/b: must be a word"),
-    "at": (pole(), {"at": (0.0, 0.0)}, "must be three numbers, a point in the body's frame"),
+    "position": (pole(), {"position": (0.0, 0.0)}, "must be three numbers, a point in the body's frame"),
     "hold": (pole(), {"hold": "constraint"}, "--hold constraint: did you mean 'constraints'"),
     "base": (pole(), {"base": "fre"}, "base='fre': did you mean 'free'"),
     "no inertia": (
@@ -111,7 +115,7 @@ REFUSED: dict[str, tuple[mujoco.MjSpec, dict[str, Any], str]] = {
     ),
     "no room above the floor": (
         torso(),
-        {"body": "torso", "axis": "x", "at": (0.0, 0.0, -0.7)},
+        {"body": "torso", "axis": "x", "position": (0.0, 0.0, -0.7)},
         "no room: the modules reach .* m below what it stands on",
     ),
 }

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from cmg_mj.plant.mounting import mount
-from cmg_mj.plant.mounting.fall_check import falls_with
+from cmg_mj.plant.mounting.fall_check import simulated_pole
 from cmg_mj.plant.tilt_line import HingeLine, SupportLine
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S
-from cmg_mj.studies.push_limits.mount_report import PUSHED_AT_S, write_scenario
+from cmg_mj.studies.push_limits.mount_files import PUSHED_AT_S, write_scenario
 from cmg_mj.studies.push_limits.prospects import Prospects, prospects, smallest_sufficient_scale
 from tests.plant.mounting.robots import ROBOTS
 
@@ -50,14 +50,14 @@ def pushed(
 def test_it_stands_thirty_seconds(mounted: tuple[Experiment, Prospects, str]) -> None:
     """Ten seeds, default sensors, `homogeneous`, from the smaller of a degree and a quarter of the ceiling."""
     experiment, can, _ = mounted
-    tilt = min(1.0, 0.25 * math.degrees(can.ceiling.tilt))
+    tilt = min(1.0, 0.25 * math.degrees(can.limit.tilt))
     assert pushed(experiment, 0.0, 30.0, tilt).all()
 
 
 def test_it_stands_thirty_seconds_with_a_push(mounted: tuple[Experiment, Prospects, str]) -> None:
     """The same with 0.6 E, once the gimbals have come back from the start: E is borne by gimbals that are upright."""
     experiment, can, _ = mounted
-    tilt = min(1.0, 0.25 * math.degrees(can.ceiling.tilt))
+    tilt = min(1.0, 0.25 * math.degrees(can.limit.tilt))
     assert pushed(experiment, 0.6 * can.push_margin.median_impulse / PUSH_S, 30.0, tilt, PUSHED_AT_S).all()
 
 
@@ -65,7 +65,7 @@ def test_it_bears_what_the_reduced_model_says(mounted: tuple[Experiment, Prospec
     """E is within 35 % of the simulation's: most stand 0.65 E and fall with E/0.65; all fall with 1.8 E."""
     experiment, can, _ = mounted
     torque = can.push_margin.median_impulse / PUSH_S
-    assert 0.0 < can.push_margin.median_impulse < can.ceiling_push
+    assert 0.0 < can.push_margin.median_impulse < can.limit_push_impulse
     assert pushed(experiment, 0.65 * torque, 8.0).sum() > WORLDS / 2
     assert pushed(experiment, torque / 0.65, 8.0).sum() < WORLDS / 2
     assert not pushed(experiment, 1.8 * torque, 8.0).any()
@@ -81,7 +81,7 @@ def test_it_starts_to_fall_as_its_reduced_model_does(mounted: tuple[Experiment, 
     plant = experiment.plant
     undamped = copy.copy(plant.model)
     undamped.dof_damping[:] = 0.0
-    assert falls_with(undamped, plant.key, plant.axis.line) == pytest.approx(can.ceiling.pole, rel=0.03)
+    assert simulated_pole(undamped, plant.key, plant.axis.line) == pytest.approx(can.limit.pole, rel=0.03)
     assert not can.hints
 
 
@@ -93,7 +93,7 @@ def test_plain_mujoco_loads_it_and_it_rests(mounted: tuple[Experiment, Prospects
     mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
     mujoco.mj_forward(model, data)
     tilting = experiment.plant.axis.line.motion(model, data) @ data.qacc
-    assert abs(tilting) < math.radians(0.05) * can.ceiling.pole**2
+    assert abs(tilting) < math.radians(0.05) * can.limit.pole**2
     assert isinstance(experiment.plant.axis.line, SupportLine if ROBOTS[name].on_contacts else HingeLine)
 
 
@@ -101,9 +101,9 @@ def test_where_the_pair_is_too_small_it_says_which_is_not(tmp_path: Path) -> Non
     """The scale that the tests use for the torso is the one that mount names for the papers' cube."""
     robot = ROBOTS["torso"]
 
-    def ceiling_at(scale: float) -> float:
+    def tilt_at(scale: float) -> float:
         model = mount(robot.path, **{**robot.options, "scale": scale}).save(tmp_path / f"{scale}.xml")
-        return prospects(write_scenario(model, model, "homogeneous")).ceiling.tilt
+        return prospects(write_scenario(model, model, "homogeneous")).limit.tilt
 
-    assert math.degrees(ceiling_at(1.0)) < 2.0
-    assert smallest_sufficient_scale(ceiling_at, 1.0) == robot.options["scale"]
+    assert math.degrees(tilt_at(1.0)) < 2.0
+    assert smallest_sufficient_scale(tilt_at, 1.0) == robot.options["scale"]

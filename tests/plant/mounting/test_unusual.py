@@ -11,7 +11,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mounting import MountedRobot, mount
-from cmg_mj.plant.mounting.fall_check import falls_with
+from cmg_mj.plant.mounting.fall_check import simulated_pole
 from cmg_mj.plant.plant import Plant, load_plant
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -57,7 +57,7 @@ def trunk(**changes: str) -> mujoco.MjSpec:
 
 def mounted(**options: Any) -> MountedRobot:
     changes = {name: options.pop(name) for name in list(options) if name in TRUNK and isinstance(options[name], str)}
-    return mount(trunk(**changes), **{"body": "trunk", "axis": "hip", "at": (0.0, 0.0, 0.5), **options})
+    return mount(trunk(**changes), **{"body": "trunk", "axis": "hip", "position": (0.0, 0.0, 0.5), **options})
 
 
 def rig(**options: Any) -> Plant:
@@ -82,7 +82,7 @@ def test_a_ball_that_is_held_is_rigid(plain: Plant, name: str, option: str) -> N
     made = rig(name=name, joint='<joint type="ball"/>', option=option)
     same(made, plain)
     pole = math.sqrt(made.reduced.gravity_torque / made.reduced.J1)
-    assert falls_with(made.model, made.key, made.axis.line, made.axis.bias) == pytest.approx(pole, rel=0.01)
+    assert simulated_pole(made.model, made.key, made.axis.line, made.axis.bias) == pytest.approx(pole, rel=0.01)
     assert 0 not in (int(made.model.eq_obj1id[0]), int(made.model.eq_obj2id[0]))
 
 
@@ -99,13 +99,13 @@ def test_a_ball_is_held_by_an_earlier_mount() -> None:
         "trunk",
         axis="roll",
         name="roll",
-        at=(0.0, 0.0, 0.15),
+        position=(0.0, 0.0, 0.15),
     )
     assert made.held == ("pitch", "body3_joint")
-    twice = mount(made.spec, "trunk", axis="pitch", name="pitch", at=(0.0, 0.0, 0.35))
+    twice = mount(made.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.35))
     assert [equality.name for equality in twice.spec.equalities] == ["body3_joint_held"]
     with pytest.raises(InputError, match="the hinge 'pitch' has an axis already: another one needs another hinge"):
-        mount(twice.spec, "trunk", axis="pitch", name="third", at=(0.0, 0.0, 0.55))
+        mount(twice.spec, "trunk", axis="pitch", name="third", position=(0.0, 0.0, 0.55))
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_a_servo_is_told_what_holds_it_where_it_stands(servo: str, told: float, 
     if state is not None:
         assert data.act[plant.model.actuator_actadr[servo_id]] == pytest.approx(state, abs=1e-5)
     pole = math.sqrt(plant.reduced.gravity_torque / plant.reduced.J1)
-    assert falls_with(plant.model, plant.key, plant.axis.line, plant.axis.bias) == pytest.approx(pole, rel=0.02)
+    assert simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias) == pytest.approx(pole, rel=0.02)
 
 
 @pytest.mark.parametrize("drive", ["motor", "velocity"])
@@ -202,7 +202,7 @@ def test_joints_without_a_name_get_one_that_is_free() -> None:
             {},
             "does not start to fall from a tilt of 0.05 deg: it stands by itself",
         ),
-        ({}, {"at": ("a", 0, 0)}, "must be three numbers, a point in the body's frame"),
+        ({}, {"position": ("a", 0, 0)}, "must be three numbers, a point in the body's frame"),
         ({"option": 'gravity="0 0 9.81"'}, {}, 'gravity="0 0 9.81"/> does not pull down: there is nothing to balance'),
         ({"option": 'gravity="0 0 0"'}, {}, 'gravity="0 0 0"/> does not pull down'),
     ],
@@ -227,7 +227,7 @@ def test_a_free_base_within_a_frame_stands_where_it_stood(frame: str, turned: st
     reference = mujoco.MjModel.from_xml_string(text)
     before = mujoco.MjData(reference)
     mujoco.mj_forward(reference, before)
-    made = mount(mujoco.MjSpec.from_string(text), "t", base="free", at=(0.0, 0.0, 0.1))
+    made = mount(mujoco.MjSpec.from_string(text), "t", base="free", position=(0.0, 0.0, 0.1))
     model = made.spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
@@ -242,7 +242,7 @@ def test_a_free_base_finds_a_name() -> None:
         mujoco.MjSpec.from_string(UPRIGHT.format(before="", turned="", more=more, after="")),
         "t",
         base="free",
-        at=(0.0, 0.0, 0.1),
+        position=(0.0, 0.0, 0.1),
     )
     assert made.spec.joint("t_free_2") is not None
     assert made.held == ("t_free",)

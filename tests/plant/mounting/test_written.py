@@ -61,7 +61,7 @@ def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.Monke
     def fails(*_: object, **__: object) -> None:
         raise InputError(f"{next(Path().glob('.a.*.partial.xml'))}: fails")
 
-    monkeypatch.setattr("cmg_mj.studies.push_limits.prospects.prospects", fails)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.prospects", fails)
     assert "a.xml: fails" in cmg_mj(*GIVEN, "-o", "a.xml", "--overwrite").complaint
     assert there() == ["a.toml", "a.xml"]
     assert [Path(name).read_text(encoding="utf-8") for name in there()] == ["mine", "mine"]
@@ -91,7 +91,7 @@ def test_what_mujoco_cannot_do_is_one_line(monkeypatch: pytest.MonkeyPatch) -> N
     def fails(*_: object, **__: object) -> None:
         raise ValueError("Error: repeated name 'x'\nin frame")
 
-    monkeypatch.setattr("cmg_mj.plant.mounting.mount", fails)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.mount_on_request", fails)
     said = cmg_mj(*GIVEN, "-o", "a.xml").complaint
     assert f"{TORSO}: MuJoCo cannot put a pair on it: repeated name 'x' in frame" in said
     assert there() == []
@@ -111,9 +111,9 @@ def test_a_command_of_the_document() -> None:
 
 
 def test_a_larger_pair_that_has_no_room_is_none_that_suffices() -> None:
-    def ceiling_at(scale: float) -> float:
+    def tilt_at(scale: float) -> float:
         if scale > 1.3:
             raise InputError("no room")
         return 0.01
 
-    assert smallest_sufficient_scale(ceiling_at, 1.0) is None
+    assert smallest_sufficient_scale(tilt_at, 1.0) is None

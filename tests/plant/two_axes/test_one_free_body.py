@@ -41,7 +41,9 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("post")
     (folder / "post.xml").write_text(POST, encoding="utf-8")
     one = mount(folder / "post.xml", body="post", axis="x", scale=1.3, name="roll").save(folder / "one.xml")
-    return mount(one, body="post", axis="y", scale=1.3, name="pitch", at=(0.0, 0.0, 0.55)).save(folder / "two.xml")
+    return mount(one, body="post", axis="y", scale=1.3, name="pitch", position=(0.0, 0.0, 0.55)).save(
+        folder / "two.xml"
+    )
 
 
 def pushed(model: Path, **torques: float) -> Experiment:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj import load_scenario, prepare, read_log
+from cmg_mj import ReadOptions, load_scenario, prepare, read_log
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
 from tests.replay.logs.motion import AMPLITUDE, DT, OMEGA, sine, write_csv
 from tests.replay.logs.test_interchanged import INNER_FIRST, readings
@@ -22,7 +22,9 @@ def of_two(
     scale: dict[str, float] | None = None,
 ) -> list[str]:
     units = {role: given.get(role, given.get("all", "m_s2")) for role in ACCELEROMETERS}
-    return list(read_log(path, {"time": "t_s"} | INNER_FIRST, units=units, radii_m=radii, scale=scale).notes)
+    return list(
+        read_log(path, ReadOptions({"time": "t_s"} | INNER_FIRST, units=units, radii_m=radii, scale=scale or {})).notes
+    )
 
 
 @pytest.mark.parametrize("swing", [1e-5, 0.02, 0.2, 0.5])
@@ -95,7 +97,7 @@ def test_a_given_acceleration(size: float, scale: float, says: str | None, tmp_p
     columns = {"t_s": log["t_s"], "tilt_rad": log["tilt_rad"] + 1e-3 * noise[0]}
     columns["a"] = size * (-AMPLITUDE * OMEGA**2 * np.sin(OMEGA * log["t_s"]) + 0.5 * noise[1])
     path = write_csv(tmp_path / "log.csv", columns)
-    notes = read_log(path, SECOND, units={"acceleration": "rad_s2"}, scale={"acceleration": scale}).notes
+    notes = read_log(path, ReadOptions(SECOND, units={"acceleration": "rad_s2"}, scale={"acceleration": scale})).notes
     if says is None:
         assert notes == ()
     else:
@@ -109,7 +111,7 @@ def test_noise_alone_says_nothing(tmp_path: Path) -> None:
         log = {"t_s": DT * np.arange(2000), "tilt_rad": 1e-3 * noise[0], "a": noise[1]}
         log["a"] += (0.0, 0.95, -0.95)[seed % 3] * 20.0 * noise[0]
         path = write_csv(tmp_path / "log.csv", log)
-        assert read_log(path, SECOND, units={"acceleration": "rad_s2"}).notes == ()
+        assert read_log(path, ReadOptions(SECOND, units={"acceleration": "rad_s2"})).notes == ()
 
 
 @pytest.mark.parametrize(
@@ -120,7 +122,7 @@ def test_the_runs_of_all_scenarios(scenario: str, tmp_path: Path) -> None:
     assert trajectory is not None
     trajectory.save(tmp_path / "run.parquet")
     columns = {"time": "time_s", "tilt": "y1_rad", "acceleration": "acceleration_rad_s2"}
-    assert read_log(tmp_path / "run.parquet", columns).notes == ()
+    assert read_log(tmp_path / "run.parquet", ReadOptions(columns)).notes == ()
 
 
 def test_a_run_whose_acceleration_is_turned_round(tmp_path: Path) -> None:
@@ -128,5 +130,5 @@ def test_a_run_whose_acceleration_is_turned_round(tmp_path: Path) -> None:
     assert trajectory.trajectory is not None
     trajectory.trajectory.save(tmp_path / "run.parquet")
     columns = {"time": "time_s", "tilt": "y1_rad", "acceleration": "acceleration_rad_s2"}
-    (note,) = read_log(tmp_path / "run.parquet", columns, scale={"acceleration": -1.0}).notes
+    (note,) = read_log(tmp_path / "run.parquet", ReadOptions(columns, scale={"acceleration": -1.0})).notes
     assert note.endswith("--scale acceleration=1")

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj import load_scenario, prepare, read_log
+from cmg_mj import ReadOptions, load_scenario, prepare, read_log
+from cmg_mj.replay.logs.acceleration_checks import SWAPPED, interchanged
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
-from cmg_mj.replay.logs.swapped_accelerometers import HINT, interchanged
 from cmg_mj.sensors.tilt import RadialTilt
 from tests.replay.logs.motion import DT, write_csv
 
@@ -36,7 +36,7 @@ def readings(seed: int, swing: float, noise: float = 0.04, n: int = 2000) -> dic
 
 def notes(path: Path, columns: dict[str, str]) -> list[str]:
     units: dict[str, str] = dict.fromkeys(ACCELEROMETERS, "m_s2")
-    log = read_log(path, {"time": "t_s", **columns}, units=units, radii_m=(PLACES.r_inner, PLACES.r_outer))
+    log = read_log(path, ReadOptions({"time": "t_s", **columns}, units=units, radii_m=(PLACES.r_inner, PLACES.r_outer)))
     return list(log.notes)
 
 
@@ -45,7 +45,7 @@ def test_a_known_motion(swing: float, tmp_path: Path) -> None:
     for seed in range(5):
         path = write_csv(tmp_path / "log.csv", readings(seed, swing))
         assert notes(path, INNER_FIRST) == []
-        assert notes(path, OUTER_FIRST) == [HINT]
+        assert notes(path, OUTER_FIRST) == [SWAPPED]
 
 
 def test_noise_alone_says_nothing(tmp_path: Path) -> None:

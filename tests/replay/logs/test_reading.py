@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.replay.logs import Log, read_log
+from cmg_mj.replay.logs import Log, ReadOptions, read_log
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
 from cmg_mj.replay.logs.units import unit_of_name
 from tests.replay.logs.motion import COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
@@ -22,7 +22,7 @@ SIGNALS = ("time_s", "y1_rad", "reference_rad_s")
 
 @pytest.fixture
 def plain(tmp_path: Path) -> Log:
-    return read_log(write_csv(tmp_path / "plain.csv", sine()), COLUMNS)
+    return read_log(write_csv(tmp_path / "plain.csv", sine()), ReadOptions(COLUMNS))
 
 
 def assert_same(log: Log, plain: Log, tolerance: float = 1e-9) -> None:
@@ -52,7 +52,7 @@ def test_the_plain_one(plain: Log) -> None:
 def test_units_by_their_names(heads: tuple, sizes: tuple, plain: Log, tmp_path: Path) -> None:
     columns = {h: v * s for h, v, s in zip(heads, sine().values(), sizes, strict=True)}
     path = write_csv(tmp_path / "other.csv", columns)
-    assert_same(read_log(path, dict(zip(COLUMNS, heads, strict=True))), plain)
+    assert_same(read_log(path, ReadOptions(dict(zip(COLUMNS, heads, strict=True)))), plain)
 
 
 def test_units_told(plain: Log, tmp_path: Path) -> None:
@@ -60,9 +60,11 @@ def test_units_told(plain: Log, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "told.csv", {"a": t * 1e3, "b": np.degrees(y), "c": -np.degrees(w)})
     log = read_log(
         path,
-        {"time": "a", "tilt": "b", "rate": "c"},
-        units={"time": "ms", "tilt": "degrees", "rate": "deg/s"},
-        scale={"rate": -1.0},
+        ReadOptions(
+            {"time": "a", "tilt": "b", "rate": "c"},
+            units={"time": "ms", "tilt": "degrees", "rate": "deg/s"},
+            scale={"rate": -1.0},
+        ),
     )
     assert_same(log, plain)
 
@@ -94,14 +96,14 @@ def test_parquet_with_dates(plain: Log, tmp_path: Path) -> None:
     t, y, w = sine().values()
     stamps = pa.array(1_790_000_000_000_000_000 + np.rint(t * 1e9).astype(int), pa.timestamp("ns", "UTC"))
     path = parquet(tmp_path / "log.parquet", {"t_s": stamps, "tilt_rad": y.astype("float32"), "gyro_rad_s": w})
-    assert_same(read_log(path, COLUMNS), plain, 1e-7)
+    assert_same(read_log(path, ReadOptions(COLUMNS)), plain, 1e-7)
 
 
 def test_dates_in_a_csv(plain: Log, tmp_path: Path) -> None:
     t, y, w = sine().values()
     stamps = [f"2026-11-22T06:{int(s // 60):02}:{s % 60:06.3f}" for s in t]
     path = write_csv(tmp_path / "dates.csv", {"when": stamps, "tilt_rad": y, "gyro_rad_s": w})
-    log = read_log(path, {**COLUMNS, "time": "when"})
+    log = read_log(path, ReadOptions({**COLUMNS, "time": "when"}))
     assert_same(log, plain)
 
 
@@ -110,33 +112,33 @@ def test_other_ways_to_write_a_csv(plain: Log, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "eu.csv", sine(), delimiter=";")
     text = path.read_text().replace(".", ",")
     path.write_bytes(b"\xef\xbb\xbf# a logger\r\n#\r\n\r\n" + text.replace("\n", "\r\n").encode() + b"20,0;0")
-    log = read_log(path, COLUMNS)
+    log = read_log(path, ReadOptions(COLUMNS))
     assert_same(log, plain)
     assert any("another number of cells" in note for note in log.notes)
 
 
 def test_a_rate_instead_of_times(plain: Log, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "rate.csv", sine())
-    assert_same(read_log(path, {"tilt": "tilt_rad", "rate": "gyro_rad_s"}, rate_hz=1.0 / DT), plain)
+    assert_same(read_log(path, ReadOptions({"tilt": "tilt_rad", "rate": "gyro_rad_s"}, rate_hz=1.0 / DT)), plain)
 
 
 def test_newest_first(plain: Log, tmp_path: Path) -> None:
-    log = read_log(write_csv(tmp_path / "r.csv", {k: v[::-1] for k, v in sine().items()}), COLUMNS)
+    log = read_log(write_csv(tmp_path / "r.csv", {k: v[::-1] for k, v in sine().items()}), ReadOptions(COLUMNS))
     assert_same(log, plain)
     assert "backward" in log.notes[0]
 
 
 def test_some_stamps_twice(plain: Log, tmp_path: Path) -> None:
     twice = np.sort(np.concatenate([np.arange(N), [100, 2000]]))
-    log = read_log(write_csv(tmp_path / "twice.csv", {k: v[twice] for k, v in sine().items()}), COLUMNS)
+    log = read_log(write_csv(tmp_path / "twice.csv", {k: v[twice] for k, v in sine().items()}), ReadOptions(COLUMNS))
     assert_same(log, plain)
-    assert log.notes == ("2 rows with the time of the row before left out, first at 0.5 s",)
+    assert log.notes == ("2 rows with the time of the row before discarded, first at 0.5 s",)
 
 
 def test_stamps_rounded_to_milliseconds_are_even(tmp_path: Path) -> None:
     t = np.arange(3000) * 0.0025
     path = write_csv(tmp_path / "ms.csv", {**sine(t), "t_s": np.round(t, 3)})
-    log = read_log(path, COLUMNS)
+    log = read_log(path, ReadOptions(COLUMNS))
     assert log.dt == pytest.approx(0.0025, rel=1e-4)
     np.testing.assert_array_equal(log["y1_rad"], tilt(t))
     np.testing.assert_allclose(log["reference_rad_s"], rate(t), atol=1e-12)
@@ -146,7 +148,7 @@ def test_stamps_rounded_to_milliseconds_are_even(tmp_path: Path) -> None:
 def test_uneven_times_are_resampled(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     t = np.arange(N) * DT + rng.uniform(-0.2, 0.2, N) * DT
-    log = read_log(write_csv(tmp_path / "uneven.csv", sine(t)), COLUMNS)
+    log = read_log(write_csv(tmp_path / "uneven.csv", sine(t)), ReadOptions(COLUMNS))
     assert "uneven sampling" in log.notes[0]
     assert "cubic" in log.notes[0]
     np.testing.assert_allclose(np.diff(log["time_s"]), log.dt, rtol=1e-6)
@@ -155,7 +157,7 @@ def test_uneven_times_are_resampled(tmp_path: Path) -> None:
 
 
 def test_to_another_rate(tmp_path: Path) -> None:
-    log = read_log(write_csv(tmp_path / "s.csv", sine()), COLUMNS, rate_hz=130.0)
+    log = read_log(write_csv(tmp_path / "s.csv", sine()), ReadOptions(COLUMNS, rate_hz=130.0))
     assert log.dt == 1.0 / 130.0
     np.testing.assert_allclose(log["y1_rad"], tilt(log["time_s"]), atol=1e-7)
 
@@ -164,7 +166,7 @@ def test_a_short_gap_is_bridged_and_a_long_one_parts(tmp_path: Path) -> None:
     kept = np.ones(N, dtype=bool)
     kept[1000:1003] = False
     kept[2000:2200] = False
-    log = read_log(write_csv(tmp_path / "gaps.csv", {k: v[kept] for k, v in sine().items()}), COLUMNS)
+    log = read_log(write_csv(tmp_path / "gaps.csv", {k: v[kept] for k, v in sine().items()}), ReadOptions(COLUMNS))
     assert [(p.start, p.stop) for p in log.parts] == [(0, 2000), (2000, 3800)]
     bridged, parted = log.notes
     assert "1 gap bridged by straight lines; the longest is 20 ms at 4.995 s" in bridged
@@ -175,7 +177,7 @@ def test_a_short_gap_is_bridged_and_a_long_one_parts(tmp_path: Path) -> None:
     np.testing.assert_allclose(log["y1_rad"], tilt(log["time_s"]), atol=3e-4)
     assert np.isnan(log["reference_rad_s"][1001])
     assert log.duration_s == pytest.approx((1999 + 1799) * DT)
-    longer = read_log(tmp_path / "gaps.csv", COLUMNS, max_gap_s=2.0)
+    longer = read_log(tmp_path / "gaps.csv", ReadOptions(COLUMNS, max_gap_s=2.0))
     assert len(longer.parts) == 1
 
 
@@ -184,8 +186,8 @@ def test_missing_numbers_are_gaps(tmp_path: Path) -> None:
     columns["tilt_rad"][100] = None
     columns["tilt_rad"][101] = float("nan")
     columns["gyro_rad_s"][500] = None
-    log = read_log(write_csv(tmp_path / "nan.csv", columns), COLUMNS)
-    assert "2 rows of 4,000 without a number (y1_rad in 2) left out: the first is row 101" in log.notes[0]
+    log = read_log(write_csv(tmp_path / "nan.csv", columns), ReadOptions(COLUMNS))
+    assert "2 rows of 4,000 without a number (y1_rad in 2) discarded: the first is row 101" in log.notes[0]
     assert len(log) == N
     assert np.isfinite(log["y1_rad"]).all()
     assert np.isnan(log["reference_rad_s"]).sum() == 1
@@ -197,7 +199,9 @@ def test_a_reference_at_times_of_its_own(tmp_path: Path) -> None:
     tilts, rates = list(tilt(t)), list(rate(t))
     for k in range(2 * N):
         (rates if k % 2 == 0 else tilts)[k] = None  # type: ignore[call-overload]
-    log = read_log(write_csv(tmp_path / "merged.csv", {"t_s": t, "tilt_rad": tilts, "gyro_rad_s": rates}), COLUMNS)
+    log = read_log(
+        write_csv(tmp_path / "merged.csv", {"t_s": t, "tilt_rad": tilts, "gyro_rad_s": rates}), ReadOptions(COLUMNS)
+    )
     assert log.dt == pytest.approx(DT)
     known = np.isfinite(log["reference_rad_s"])
     assert known.sum() >= N - 2
@@ -208,7 +212,8 @@ def test_a_tilt_that_starts_again_after_a_turn(tmp_path: Path) -> None:
     t = np.arange(N) * DT
     turning = (2.0 * t + math.pi) % (2.0 * math.pi) - math.pi
     log = read_log(
-        write_csv(tmp_path / "turns.csv", {"t_s": t, "tilt_rad": turning}), {"time": "t_s", "tilt": "tilt_rad"}
+        write_csv(tmp_path / "turns.csv", {"t_s": t, "tilt_rad": turning}),
+        ReadOptions({"time": "t_s", "tilt": "tilt_rad"}),
     )
     np.testing.assert_allclose(np.diff(log["y1_rad"]), 2.0 * DT, atol=1e-9)
     assert "jumps by a turn" in log.notes[0]
@@ -224,7 +229,7 @@ def test_two_accelerometers_give_tilt_and_acceleration(tmp_path: Path) -> None:
         columns[f"{place}_z_mg"] = (-r * w**2 + 9.80665 * np.cos(y)) / 9.80665e-3
     path = write_csv(tmp_path / "imu.csv", columns)
     roles = {"time": "t_ms", "inner_x": "in_x_g", "inner_z": "in_z_mg", "outer_x": "out_x_g", "outer_z": "out_z_mg"}
-    log = read_log(path, roles, radii_m=(0.05, 0.15))
+    log = read_log(path, ReadOptions(roles, radii_m=(0.05, 0.15)))
     np.testing.assert_allclose(log["y1_rad"], y, atol=1e-9)
     np.testing.assert_allclose(log["acceleration_rad_s2"], alpha, atol=1e-9)
     assert log.has == {"acceleration"}
@@ -236,18 +241,18 @@ def test_gimbals_and_command(tmp_path: Path) -> None:
     columns = {**sine(), "g1_deg": np.degrees(0.1 * t), "g2_deg": np.degrees(-0.1 * t), "u_rad_s": (t // 1.0) % 2.0}
     path = write_csv(tmp_path / "g.csv", columns)
     roles = {**COLUMNS, "gimbal1": "g1_deg", "gimbal2": "g2_deg", "command": "u_rad_s"}
-    log = read_log(path, roles)
+    log = read_log(path, ReadOptions(roles))
     assert log.has == {"reference", "gimbals"}
     np.testing.assert_allclose(log["y2_rad"], 0.1 * t, atol=1e-12)
-    assert set(read_log(path, roles, rate_hz=333.0)["u_rad_s"]) == {0.0, 1.0}
+    assert set(read_log(path, ReadOptions(roles, rate_hz=333.0))["u_rad_s"]) == {0.0, 1.0}
     del roles["command"]
-    half = read_log(path, roles)
+    half = read_log(path, ReadOptions(roles))
     assert half.has == {"reference"}
     assert "need both" in half.notes[-1]
 
 
 def test_between(tmp_path: Path) -> None:
-    log = read_log(write_csv(tmp_path / "s.csv", sine()), COLUMNS, between_s=(2.0, 5.0))
+    log = read_log(write_csv(tmp_path / "s.csv", sine()), ReadOptions(COLUMNS, time_range_s=(2.0, 5.0)))
     assert (log["time_s"][0], len(log)) == (pytest.approx(2.0), 601)
 
 
@@ -291,7 +296,7 @@ def test_what_cannot_be(edit: Edit, says: str, tmp_path: Path) -> None:
     edit(columns)
     path = write_csv(tmp_path / "wrong.csv", columns)
     with pytest.raises(InputError) as caught:
-        read_log(path, COLUMNS)
+        read_log(path, ReadOptions(COLUMNS))
     assert str(path) in str(caught.value)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -311,7 +316,7 @@ def test_what_cannot_be(edit: Edit, says: str, tmp_path: Path) -> None:
         ({"columns": {"tilt": "tilt_rad"}}, "no time: name its column, --columns time=..., or give --rate HZ"),
         ({"columns": {"tilt": "tilt_rad"}, "delay_s": 0.1}, "there is no reference to shift"),
         ({"columns": COLUMNS, "radii_m": (0.1, 0.2)}, "there are no accelerometers"),
-        ({"columns": COLUMNS, "between_s": (100.0, 200.0)}, "has no row there; it lasts 19.995 s"),
+        ({"columns": COLUMNS, "time_range_s": (100.0, 200.0)}, "has no row there; it lasts 19.995 s"),
         ({"columns": COLUMNS, "rate_hz": 1e6}, "at most 5,000,000"),
         (
             {
@@ -327,7 +332,7 @@ def test_what_cannot_be(edit: Edit, says: str, tmp_path: Path) -> None:
 def test_arguments_that_cannot_be(arguments: dict, says: str, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "s.csv", sine())
     with pytest.raises(InputError) as caught:
-        read_log(path, **arguments)
+        read_log(path, ReadOptions(**arguments))
     assert says in str(caught.value)
 
 
@@ -353,7 +358,7 @@ def test_files_that_are_none(content: bytes, says: str, tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     path.write_bytes(content)
     with pytest.raises(InputError, match=says):
-        read_log(path, COLUMNS)
+        read_log(path, ReadOptions(COLUMNS))
 
 
 def test_parquet_with_blanks_dots_and_nested_columns(tmp_path: Path) -> None:
@@ -364,35 +369,37 @@ def test_parquet_with_blanks_dots_and_nested_columns(tmp_path: Path) -> None:
     nested = pa.array([{"tilt_rad": one} for one in y])
     path = tmp_path / "log.parquet"
     pq.write_table(pa.table({" t_s": t, "tilt_rad ": y, "imu.tilt_rad": 2.0 * y, "imu": nested}), path)
-    np.testing.assert_array_equal(read_log(path, {"time": "t_s", "tilt": "tilt_rad"})["y1_rad"], y)
-    np.testing.assert_array_equal(read_log(path, {"time": "t_s", "tilt": "imu.tilt_rad"})["y1_rad"], 2.0 * y)
+    np.testing.assert_array_equal(read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}))["y1_rad"], y)
+    np.testing.assert_array_equal(
+        read_log(path, ReadOptions({"time": "t_s", "tilt": "imu.tilt_rad"}))["y1_rad"], 2.0 * y
+    )
     with pytest.raises(InputError, match=r"column 'imu' holds struct<tilt_rad: double>, not numbers"):
-        read_log(path, {"time": "t_s", "tilt": "imu"}, units={"tilt": "rad"})
+        read_log(path, ReadOptions({"time": "t_s", "tilt": "imu"}, units={"tilt": "rad"}))
     pq.write_table(pa.table({"t_s": t, "tilt_rad": y, " tilt_rad": y}), path)
     with pytest.raises(InputError, match="has the column 'tilt_rad' 2 times"):
-        read_log(path, {"time": "t_s", "tilt": "tilt_rad"})
+        read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}))
 
 
 def test_truth_values_are_no_numbers(tmp_path: Path) -> None:
     path = tmp_path / "log.parquet"
     pq.write_table(pa.table({"t_s": sine()["t_s"], "tilt_rad": sine()["tilt_rad"] > 0.0}), path)
     with pytest.raises(InputError, match="column 'tilt_rad' holds bool, not numbers"):
-        read_log(path, {"time": "t_s", "tilt": "tilt_rad"})
+        read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}))
 
 
 @pytest.mark.parametrize(("rate", "samples"), [(0.1, 2), (0.5, 10)])
 def test_a_rate_that_leaves_too_few_samples(rate: float, samples: int, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", sine())
     with pytest.raises(InputError, match=f"s at {rate:g} Hz are {samples} samples; at least 20"):
-        read_log(path, COLUMNS, rate_hz=rate)
-    assert len(read_log(path, COLUMNS, rate_hz=1.05)) == 21
+        read_log(path, ReadOptions(COLUMNS, rate_hz=rate))
+    assert len(read_log(path, ReadOptions(COLUMNS, rate_hz=1.05))) == 21
 
 
 @pytest.mark.parametrize(
     ("torn", "says"),
     [
-        (1, "1 line has another number of cells and was left out; 2 cells instead of 3: "),
-        (2, "2 lines have another number of cells and were left out; the first, 2 cells instead of 3: "),
+        (1, "1 line has another number of cells and was discarded; 2 cells instead of 3: "),
+        (2, "2 lines have another number of cells and were discarded; the first, 2 cells instead of 3: "),
     ],
 )
 def test_torn_lines(torn: int, says: str, tmp_path: Path) -> None:
@@ -401,21 +408,21 @@ def test_torn_lines(torn: int, says: str, tmp_path: Path) -> None:
     for i in range(torn):
         lines[100 + 500 * i] = "1,2"
     path.write_text("\n".join(lines))
-    assert read_log(path, COLUMNS).notes[0].startswith(says)
+    assert read_log(path, ReadOptions(COLUMNS)).notes[0].startswith(says)
 
 
 def test_no_file_and_no_regular_file(tmp_path: Path) -> None:
     for path, says in ((tmp_path / "not.csv", "no such file"), (tmp_path, "no file"), (Path("/dev/zero"), "no file")):
         with pytest.raises(InputError, match=says):
-            read_log(path, COLUMNS)
+            read_log(path, ReadOptions(COLUMNS))
 
 
 def test_too_many_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.replay.logs.table.MOST_ROWS", 100)
     with pytest.raises(InputError, match="more than 100 rows"):
-        read_log(write_csv(tmp_path / "long.csv", sine()), COLUMNS)
+        read_log(write_csv(tmp_path / "long.csv", sine()), ReadOptions(COLUMNS))
     with pytest.raises(InputError, match="4,000 rows, more than 100 rows"):
-        read_log(parquet(tmp_path / "long.parquet", sine()), COLUMNS)
+        read_log(parquet(tmp_path / "long.parquet", sine()), ReadOptions(COLUMNS))
 
 
 def test_milliseconds_are_not_taken_as_seconds(tmp_path: Path) -> None:
@@ -423,9 +430,9 @@ def test_milliseconds_are_not_taken_as_seconds(tmp_path: Path) -> None:
     names = {"time": "clock", "tilt": "tilt_rad"}
     path = write_csv(tmp_path / "ms.csv", columns)
     with pytest.raises(InputError, match=r"would be 5 s apart, 0.2 Hz, and no unit is said: --units time=ms"):
-        read_log(path, names)
-    assert read_log(path, names, units={"time": "ms"}).dt == pytest.approx(DT)
-    assert read_log(path, names, units={"time": "s"}).dt == pytest.approx(1e3 * DT)
+        read_log(path, ReadOptions(names))
+    assert read_log(path, ReadOptions(names, units={"time": "ms"})).dt == pytest.approx(DT)
+    assert read_log(path, ReadOptions(names, units={"time": "s"})).dt == pytest.approx(1e3 * DT)
 
 
 def test_dates_are_not_assumed_to_be_seconds(tmp_path: Path) -> None:
@@ -433,7 +440,7 @@ def test_dates_are_not_assumed_to_be_seconds(tmp_path: Path) -> None:
     dates = [str(start + np.timedelta64(round(t * 1e3), "ms")) for t in sine()["t_s"]]
     for heading in ("when", "when_ms"):
         path = write_csv(tmp_path / "dates.csv", {heading: dates, "tilt_rad": sine()["tilt_rad"]})
-        log = read_log(path, {"time": heading, "tilt": "tilt_rad"})
+        log = read_log(path, ReadOptions({"time": heading, "tilt": "tilt_rad"}))
         assert not log.notes
         assert log.dt == pytest.approx(DT)
 
@@ -442,7 +449,7 @@ def test_a_spike_is_no_turn(tmp_path: Path) -> None:
     """One row that leaps by 300 degrees, or by a turn out of what the angle's range can be: kept, and named."""
     for leap in (math.radians(300.0), 2.0 * math.pi):
         columns = dict(sine(), tilt_rad=sine()["tilt_rad"] + leap * (np.arange(N) == 1000))
-        log = read_log(write_csv(tmp_path / "spike.csv", columns), COLUMNS)
+        log = read_log(write_csv(tmp_path / "spike.csv", columns), ReadOptions(COLUMNS))
         np.testing.assert_allclose(log["y1_rad"], columns["tilt_rad"], atol=1e-12)
         (note,) = log.notes
         assert "and back in row 1001 alone: a spike, kept as it is" in note
@@ -452,7 +459,7 @@ def test_a_tilt_that_flickers_at_the_end_of_its_turn_runs_on(tmp_path: Path) -> 
     t = np.arange(N) * DT
     truth = 0.4 * t + 0.003 * np.random.default_rng(1).standard_normal(N)
     columns = {"t_s": t, "tilt_rad": (truth + math.pi) % (2.0 * math.pi) - math.pi}
-    log = read_log(write_csv(tmp_path / "turns.csv", columns), {"time": "t_s", "tilt": "tilt_rad"})
+    log = read_log(write_csv(tmp_path / "turns.csv", columns), ReadOptions({"time": "t_s", "tilt": "tilt_rad"}))
     assert np.ptp(log["y1_rad"] - truth) < 1e-9
     assert len(log.notes) == 1
     assert "jumps by a turn" in log.notes[0]

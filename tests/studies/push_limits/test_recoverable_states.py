@@ -17,7 +17,7 @@ from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, push_margin
-from cmg_mj.studies.push_limits.mount_report import write_scenario
+from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
 FAST = """

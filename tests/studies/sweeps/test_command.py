@@ -148,7 +148,7 @@ def test_one_world_is_shown_without_an_interval(tmp_path: Path) -> None:
     assert "The order gyro_free < linear: by the velocity RMS error [rad/s] it holds at 2 of 2 points" in said.out
     report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "2 points, 2 observers, 1 world: 4 trials." in report
-    assert cmg_mj(*arguments, "--plan").out.startswith(
+    assert cmg_mj(*arguments, "--dry-run").out.startswith(
         "2 points x 2 observers x 1 world = 4 trials in 2 chunks; about "
     )
 
@@ -168,12 +168,12 @@ def test_a_study_file_with_settings_and_its_own_model(tmp_path: Path) -> None:
     assert said.status == 0
     fields = tomllib.loads((out / "study.toml").read_text(encoding="utf-8"))
     assert (fields["scenario"]["controller"]["feedback"], fields["sweep"]["worlds"]) == ("truth", 3)
-    wrong = cmg_mj("sweep", tmp_path / "s.toml", "--set", "controller.feedbak=truth", "--plan")
+    wrong = cmg_mj("sweep", tmp_path / "s.toml", "--set", "controller.feedbak=truth", "--dry-run")
     assert (wrong.status, "controller.feedbak: no such field" in wrong.complaint) == (2, True)
 
 
 def test_a_plan_runs_nothing(tmp_path: Path) -> None:
-    said = cmg_mj(*SMALL, "--plan", "--out", str(tmp_path / "out"))
+    said = cmg_mj(*SMALL, "--dry-run", "--out", str(tmp_path / "out"))
     assert said.out.startswith("2 points x 2 observers x 3 worlds = 12 trials in 2 chunks; about ")
     assert not (tmp_path / "out").exists()
 

@@ -1,4 +1,4 @@
-"""`--plan`: what it says, and what it does without."""
+"""`--dry-run`: what it says, and what it does without."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cmg_mj.cli.sweeps import _plan_text
+from cmg_mj.cli.sweeps import _cost_text
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps import plan, study
 from cmg_mj.studies.sweeps.axes import parse_axis
@@ -22,7 +22,7 @@ def test_ctrl_c_before_the_first_tick(monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plan, "compute", interrupted)
-    said = cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--plan")
+    said = cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run")
     assert (said.status, said.out, said.err) == (130, "", "cmg-mj: interrupted\n")
 
 
@@ -33,7 +33,7 @@ def test_ctrl_c_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plan, "compute", interrupted)
-    assert cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--plan").status == 130
+    assert cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run").status == 130
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_ctrl_c_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_how_long_in_words(minutes: float, words: str) -> None:
     counts = {"points": 1, "observers": 1, "worlds": 1, "trials": 1, "chunks": 1}
-    assert words in _plan_text({**counts, "minutes": minutes, "memory_mb": 230.0})
+    assert words in _cost_text({**counts, "minutes": minutes, "memory_mb": 230.0})
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
         (["--vary", f"{INNER}=0.05,0.5"], f"--vary {INNER}=0.5: .* the inner accelerometer must lie nearer"),
         (["--vary", "plant.model=nope.xml"], "--vary plant.model: plant.model = 'nope.xml': no such file"),
         (["--vary", "plant.model=cube,nope.xml", "--vary", f"{BIAS}=0,1"], "'nope.xml': no such file"),
-        (["--vary", f"{BIAS}=0,1", "--plan", "--cluster", "nonsense"], "--cluster nonsense: write tcp://HOST:PORT"),
+        (["--vary", f"{BIAS}=0,1", "--dry-run", "--cluster", "nonsense"], "--cluster nonsense: write tcp://HOST:PORT"),
     ],
 )
 @pytest.mark.usefixtures("elsewhere")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pydantic import TypeAdapter
 
-from cmg_mj.cli import studies
+from cmg_mj.cli.tune import tune as tune_command
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.tuning import tune
 from tests.command import cmg_mj
@@ -37,7 +37,7 @@ def test_command_prints_a_table_and_writes_what_reruns(quick: str) -> None:
 
 
 def test_json_has_every_figure(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--noise", "200,400", "--json")
+    said = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--noise-levels", "200,400", "--json")
     figures = json.loads(said.out)
     assert figures["tuned"] == ["tau"]
     assert figures["worlds_fitted"] == 3
@@ -55,7 +55,9 @@ def test_json_has_every_figure(quick: str) -> None:
 
 
 def test_several_noises_make_a_scenario_each(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 2, "--noise", "200,400", "--out", "t", "--json")
+    said = cmg_mj(
+        "tune", quick, "--observer", "linear", "--worlds", 2, "--noise-levels", "200,400", "--out", "t", "--json"
+    )
     assert said.err == ""
     for noise in (200.0, 400.0):
         scenario = load_scenario(f"t/scenario-{noise:g}.toml")
@@ -89,7 +91,7 @@ def test_a_users_own_observer_by_its_path(quick: str) -> None:
 
 
 def test_help_names_the_experiment() -> None:
-    assert "observer_tuning" in (studies.tune.help or "")
+    assert "observer_tuning" in (tune_command.help or "")
 
 
 @pytest.mark.parametrize(
@@ -102,9 +104,9 @@ def test_help_names_the_experiment() -> None:
             ["--observer", "ltv", "--parameters", "H0[2],Q[2]", "--worlds", "2"],
             "the rate that ltv estimates does not depend on",
         ),
-        (["--observer", "linear", "--noise", "100,loud"], "--noise 'loud': must be numbers not below 0"),
-        (["--observer", "linear", "--noise", ","], "--noise ',': give numbers with commas between"),
-        (["--observer", "linear", "--noise=-1"], "--noise '-1': must be numbers not below 0"),
+        (["--observer", "linear", "--noise-levels", "100,loud"], "--noise-levels 'loud': must be numbers not below 0"),
+        (["--observer", "linear", "--noise-levels", ","], "--noise-levels ',': give numbers separated by commas"),
+        (["--observer", "linear", "--noise-levels=-1"], "--noise-levels '-1': must be numbers not below 0"),
         (["--observer", "linear", "--range", "tau"], "--range 'tau': write NAME=LOW:HIGH"),
         (["--observer", "linear", "--range", "tau=3:1"], "--range tau=3:1: must be two positive numbers"),
         (["--observer", "linear", "--range", "L=1:3"], "--range L: not tuned; tuned: tau"),

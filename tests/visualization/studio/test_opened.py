@@ -32,9 +32,9 @@ def test_graphics_that_cannot_be_had_are_one_line(monkeypatch: pytest.MonkeyPatc
     """Without a screen a window would end the process; Python 3.11 has no windows at all."""
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    said = cmg_mj("studio", "push_recovery", "--gfx", "native").complaint
-    assert said.startswith("--gfx native: MuJoCo Studio")
-    assert said.endswith("; take --gfx web")
+    said = cmg_mj("studio", "push_recovery", "--viewer", "native").complaint
+    assert said.startswith("--viewer native: MuJoCo Studio")
+    assert said.endswith("; take --viewer web")
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_graphics_are_tried_in_a_process_of_their_own(
     monkeypatch.setattr(sys, "version_info", (3, 12, 0))
     tried = subprocess.CompletedProcess([], returned[0], "", returned[1])
     monkeypatch.setattr(viewers.subprocess, "run", lambda *_, **__: tried)
-    with pytest.raises(InputError, match="take --gfx web") as error:
+    with pytest.raises(InputError, match="take --viewer web") as error:
         viewers.check_graphics("vulkan")
     assert said in str(error.value)
 

@@ -1,0 +1,45 @@
+"""The command that reproduces the papers."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from cmg_mj.cli.arguments import claim_folder, output_path, with_json, with_out
+from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, final_path, note, progress, say_written, show
+from cmg_mj.errors import InputError, nearest
+
+
+@click.command(short_help="Reproduce the four papers, claim by claim, with verdicts.")
+@click.argument("paper")
+@with_out
+@with_json
+def reproduce(paper: str, out: str | None, as_json: bool) -> None:
+    """Reproduce PAPER (aranovskiy2020, sokolov2019, dao2023, andrieu2009), or all of them.
+
+    PAPER may also be beyond, which is in no paper and takes some minutes: every observer, 100 seeds each, in one table.
+
+    Writes a folder: report.md, its plots, and figures.json. The report compares every claim of the paper with the
+    figures obtained here. The verdicts are reproduced, reproduced within stated conditions, or not reproduced and why.
+    """
+    from cmg_mj.papers import BEYOND, PAPERS, check_installed
+    from cmg_mj.papers import reproduce as reproduce_papers
+    from cmg_mj.papers.report import REPORT_FILES, figures_of, save_report, verdict_table
+
+    names = (*PAPERS, *BEYOND, "all")
+    if paper not in names:
+        raise InputError(f"{paper!r}: no such paper; {nearest(paper, names)}")
+    papers = list(PAPERS) if paper == "all" else [paper]
+    check_installed(papers)  # before a folder is made
+    folder = claim_folder(output_path(out) if out is not None else Path("runs") / f"reproduce-{paper}", REPORT_FILES)
+    with CtrlC() as ctrl_c:
+        with progress(f"reproduce {paper}", 1.0, ctrl_c) as on_progress:
+            entries = reproduce_papers(papers, lambda now, done: on_progress(done, now))
+        place = save_report(folder, entries)
+        show(figures_of(entries), verdict_table(entries), as_json)
+    say_written(folder, place, f"Read {place / 'report.md'}", as_json)
+    if ctrl_c.noted:
+        note(f"interrupted; what was obtained until then is in {final_path(folder, place)}")
+        sys.exit(INTERRUPTED)

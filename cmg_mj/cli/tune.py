@@ -1,0 +1,243 @@
+"""The commands that fit an observer's parameters: to the gyro of a scenario, or to the reference of logs."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import click
+
+from cmg_mj.cli.arguments import (
+    MOST_WORLDS,
+    RunArguments,
+    check_observer,
+    claim_folder,
+    output_path,
+    run_options,
+    with_json,
+    with_out,
+)
+from cmg_mj.cli.logs import takes_log_options, with_noise, with_pendulum
+from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, final_path, note, progress, say_written, show, users_code
+from cmg_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from cmg_mj.replay.logs import ReadOptions
+
+C = TypeVar("C", bound=Callable[..., None])
+
+
+def takes_parameters(command: C) -> C:
+    """Add the options that select the parameters to tune."""
+    for decorate in (
+        click.option(
+            "--range",
+            "ranges",
+            multiple=True,
+            metavar="NAME=LOW:HIGH",
+            help="Range in which to search for a parameter. May be given again.",
+        ),
+        click.option(
+            "--parameters", default="", metavar="NAMES", help="Parameters to tune, separated by commas.  [default: all]"
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+@click.command(short_help="Fit an observer's parameters to the gyro of a scenario.")
+@click.option("--observer", metavar="NAME", help="Observer to tune: a name, or your own as package.module:Class.")
+@run_options
+@click.option(
+    "--worlds",
+    type=click.IntRange(2, MOST_WORLDS // 10),  # whose trajectories are kept
+    default=20,
+    show_default=True,
+    metavar="N",
+    help="Worlds to fit; as many more are held out for scoring.",
+)
+@takes_parameters
+@click.option(
+    "--noise-levels",
+    default="",
+    metavar="LIST",
+    help="Accelerometer noise densities to tune at, separated by commas [ug/rtHz].  [default: the scenario's]",
+)
+@users_code()
+def tune(
+    arguments: RunArguments,
+    observer: str | None,
+    worlds: int,
+    parameters: str,
+    ranges: tuple[str, ...],
+    noise_levels: str,
+) -> None:
+    """Fit an observer's parameters to the gyro, as section V of aranovskiy2020 does; observer_tuning is its experiment.
+
+    The loop is closed on the gyro, whatever the scenario says, and its recording is replayed through the observer. The
+    score is the RMS of the estimated rate less the gyro's, from each push to one second after it, on held-out worlds.
+    It is compared with the score of the observer's parameters as given (by default, the paper's). With several noise
+    levels the command reports at which one the given parameters are best.
+
+    Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
+    """
+    from cmg_mj.studies.save import file_name
+    from cmg_mj.studies.tuning import figures_of, files_of_study, save_study, tuning_table
+    from cmg_mj.studies.tuning import tune as fit
+
+    if observer is not None:
+        check_observer("--observer", observer)
+    scenario = arguments.scenario(observer)
+    default = Path("runs") / f"tune-{file_name(scenario.observer.kind)}-{scenario.seed}"
+    densities = _densities(noise_levels)
+    folder = claim_folder(default if arguments.out is None else output_path(arguments.out), files_of_study(densities))
+    with CtrlC() as ctrl_c:
+        with progress(f"{scenario.title or arguments.name}: {scenario.observer.kind}", 1.0, ctrl_c) as on_progress:
+            study = fit(
+                scenario,
+                worlds=worlds,
+                parameters=_names(parameters),
+                ranges=_ranges(ranges),
+                noise_ug_rthz=densities,
+                on_share=on_progress,
+            )
+        show(figures_of(study), tuning_table(study), arguments.as_json)
+        total = len(densities) or 1
+        files = save_study(folder, study, complete=len(study.levels) == total)
+    place = files[0].parent
+    say_written(folder, place, f"Run with the tuned observer: cmg-mj run {files[1]}", arguments.as_json)
+    if ctrl_c.noted:
+        note(f"interrupted; {len(study.levels)} of {total} noise levels are in {final_path(folder, place)}")
+        sys.exit(INTERRUPTED)
+
+
+@click.command("tune-log", short_help="Fit an observer's parameters to the reference of your own logs.")
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True)
+@click.option("--observer", required=True, metavar="NAME", help="Observer to tune: a name, or package.module:Class.")
+@takes_log_options
+@takes_parameters
+@click.option(
+    "--split",
+    type=float,
+    default=0.5,
+    show_default=True,
+    metavar="SHARE",
+    help="Share of each log, from its start, to fit; the rest is scored.",
+)
+@click.option(
+    "--settle-s",
+    type=float,
+    default=1.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Seconds to ignore at the start of each part of a log.",
+)
+@with_pendulum
+@with_noise
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="observer.NAME=VALUE",
+    help="Set a parameter to start from and to compare with. May be given again.",
+)
+@with_out
+@with_json
+@users_code()
+def tune_log(
+    options: ReadOptions,
+    logs: tuple[str, ...],
+    observer: str,
+    parameters: str,
+    ranges: tuple[str, ...],
+    split: float,
+    settle_s: float,
+    model: str | None,
+    noise: str,
+    settings: tuple[str, ...],
+    out: str | None,
+    as_json: bool,
+) -> None:
+    """Fit an observer's parameters to the reference of one part of each LOG, and score them on the rest.
+
+    \b
+      cmg-mj tune-log LOG.csv --columns tilt=pitch_deg,rate=gyro_dps --observer linear
+
+    The score is the RMS of the estimated rate less the reference, compared with that of the parameters as given. Logs
+    are read as in replay. Writes a folder with tuned.json.
+    """  # noqa: D301  (click wants the character itself)
+    from cmg_mj.replay.logs import read_log
+    from cmg_mj.replay.logs.checks import check_distinct_logs
+    from cmg_mj.replay.parameter_options import parameters_of
+    from cmg_mj.replay.user_noise import noise_numbers
+    from cmg_mj.replay.user_pendulum import model_of
+    from cmg_mj.scenario.differences import safe_name
+    from cmg_mj.studies.save import file_name
+    from cmg_mj.studies.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
+    from cmg_mj.studies.tuning.save_on_logs import FILES
+
+    check_observer("--observer", observer)
+    for setting in settings:
+        if not setting.startswith("observer."):
+            raise InputError(f"--set {setting}: write observer.PARAMETER=VALUE")
+    given = parameters_of([observer + setting.removeprefix("observer") for setting in settings])
+    noises = noise_numbers(noise)
+    check_distinct_logs(logs)
+    recordings = [read_log(path, options) for path in logs]
+    pendulum = None if model is None else model_of(model)
+    default = Path("runs") / f"tune-{file_name(observer)}-{safe_name(recordings[0].name)}"
+    folder = claim_folder(default if out is None else output_path(out), FILES)
+    with CtrlC() as ctrl_c:
+        with progress(f"{recordings[0].name}: {observer}", 1.0, ctrl_c) as on_progress:
+            study = tune_on_logs(
+                recordings,
+                observer,
+                model=pendulum,
+                noises=noises,
+                given=given.get(observer),
+                split=split,
+                settle_s=settle_s,
+                parameters=_names(parameters),
+                ranges=_ranges(ranges),
+                on_share=on_progress,
+            )
+        show(figures_of_logs(study), logs_table(study), as_json)
+        place = save_log_study(folder, study)
+    tuned = " ".join(f"--set '{setting}'" for setting in study.settings())
+    say_written(folder, place, f"Replay it tuned: {tuned}", as_json)
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _ranges(texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+    """Parse texts such as `L=10.4:1000`."""
+    ranges = {}
+    for text in texts:
+        name, _, ends = text.partition("=")
+        low, _, high = ends.partition(":")
+        try:
+            ranges[name.strip()] = float(low), float(high)
+        except ValueError as error:
+            raise InputError(f"--range {text!r}: write NAME=LOW:HIGH, for example tau=0.005:0.1") from error
+    return ranges
+
+
+def _densities(text: str) -> list[float]:
+    """Parse noise densities separated by commas; a repeated one counts once."""
+    densities: list[float] = []
+    for part in _names(text):
+        try:
+            density = float(part)
+        except ValueError:
+            density = -1.0
+        if not 0.0 <= density < math.inf:
+            raise InputError(f"--noise-levels {part!r}: must be numbers not below 0, separated by commas")
+        densities.append(density)
+    if text and not densities:
+        raise InputError(f"--noise-levels {text!r}: give numbers separated by commas")
+    return list(dict.fromkeys(densities))

@@ -1,0 +1,127 @@
+"""Replay of several logs on request, as `cmg-mj replay` runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tomli_w
+
+from cmg_mj.errors import InputError
+from cmg_mj.replay.log_replay import ReplayResult
+from cmg_mj.replay.logs import Log, ReadOptions, read_log
+from cmg_mj.replay.logs.checks import check_distinct_logs
+from cmg_mj.replay.observer_inputs import replay_prepared
+from cmg_mj.replay.parameter_options import Parameters
+from cmg_mj.replay.save import distinct_names, files_of_replay, save_replay
+from cmg_mj.replay.user_pendulum import model_of
+from cmg_mj.results.run_folder import RunFolder
+
+
+@dataclass(frozen=True)
+class ReplayRequest:
+    """Request to replay some logs.
+
+    Attributes:
+        paths: The logs.
+        observers: Names of the observers.
+        options: Options with which all logs are read.
+        model: The pendulum as `model_of` takes it.
+        noises: Noises from `noise_numbers`.
+        parameters: Observer -> parameter -> value, where not the default.
+        settle_s: Time at the start of each part that is not scored [s]; None for `replay_prepared`'s.
+    """
+
+    paths: Sequence[str]
+    observers: Sequence[str]
+    options: ReadOptions
+    model: str | None = None
+    noises: Mapping[str, float] = field(default_factory=dict)
+    parameters: Parameters = field(default_factory=dict)
+    settle_s: float | None = None
+
+    def __post_init__(self) -> None:
+        for kind in self.parameters:
+            if kind not in self.observers:
+                raise InputError(f"--set {kind}: is not among --observers {','.join(self.observers)}")
+
+    def as_toml(self) -> str:
+        """Return the request as TOML."""
+        replay = {
+            "observers": list(self.observers),
+            "model": self.model,
+            "parameters": self.parameters,
+            "noise": self.noises,
+            "settle_s": self.settle_s,
+        }
+        options = self.options.as_toml()
+        return tomli_w.dumps(
+            {
+                "logs": list(self.paths),
+                **({"log": options} if options else {}),
+                "replay": {name: value for name, value in replay.items() if value not in (None, {})},
+            }
+        )
+
+
+class LogReplays:
+    """The logs of a request, and the replays that are done.
+
+    Args:
+        request: The request; its logs are read at once.
+
+    Attributes:
+        logs: The logs.
+        names: Their names in file names.
+        results: The replays that are done.
+    """
+
+    def __init__(self, request: ReplayRequest) -> None:
+        self.request = request
+        self._model = None if request.model is None else model_of(request.model)
+        check_distinct_logs(request.paths)
+        self.logs: list[Log] = [read_log(path, request.options) for path in request.paths]
+        self.names = distinct_names([log.name for log in self.logs])
+        self.results: list[ReplayResult] = []
+
+    @property
+    def complete(self) -> bool:
+        """Whether all logs have been replayed."""
+        return len(self.results) == len(self.logs)
+
+    @property
+    def folder_name(self) -> str:
+        """Name of the folder of the files by default."""
+        return f"replay-{self.names[0]}" + (f"-and-{len(self.logs) - 1}-more" if len(self.logs) > 1 else "")
+
+    @property
+    def files(self) -> list[str]:
+        """Names of the files."""
+        return files_of_replay(self.names)
+
+    def run(self, on_progress: Callable[[float, str], None]) -> None:
+        """Replay the logs.
+
+        Args:
+            on_progress: Called with the logs done so far, parts of one included, and the current one's name. It may
+                raise `KeyboardInterrupt`; the results until then are kept.
+        """
+        request = self.request
+        for i, log in enumerate(self.logs):
+            self.results.append(
+                replay_prepared(
+                    log,
+                    request.observers,
+                    model=self._model,
+                    noises=request.noises,
+                    parameters=request.parameters,
+                    settle_s=request.settle_s,
+                    on_share=lambda share, i=i, log=log: on_progress(i + share, f"Replay {log.name}"),
+                )
+            )
+
+    def save(self, folder: RunFolder | Path) -> Path:
+        """Write the files of the replays that are done, and return where they are."""
+        names = self.names[: len(self.results)]
+        return save_replay(folder, self.results, names, self.request.as_toml(), complete=self.complete)
