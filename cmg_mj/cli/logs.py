@@ -16,6 +16,7 @@ import click
 from cmg_mj.cli.arguments import claim_folder, names_of, of_observers, output_path, released_at_the_end
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, final_path, note, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
+from cmg_mj.results.summary_keys import finite
 
 if TYPE_CHECKING:
     from cmg_mj.replay.logs import Log
@@ -262,7 +263,7 @@ def replay(
         try:
             place = files.save_replay(folder, replays, distinct[: len(replays)], toml, complete=complete)
         finally:
-            figures = files.finite_throughout(report.figures_of(replays))
+            figures = finite(report.figures_of(replays))
             table = report.replay_markdown(replays) if markdown else report.replay_tables(replays)
             show(figures, table, as_json)
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", as_json)

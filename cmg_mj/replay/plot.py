@@ -11,7 +11,7 @@ import numpy as np
 from cmg_mj.replay.log_replay import ReplayResult, described
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import shown_first, written
-from cmg_mj.results.trajectory import whole_file
+from cmg_mj.results.files import whole_file
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import (

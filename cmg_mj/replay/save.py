@@ -67,7 +67,7 @@ def save_replay(
         InputError: The folder, or a file, cannot be written.
     """
     writers: list[Any] = [
-        lambda path: write_text(path, json.dumps(finite_throughout(figures_of(replays)), indent=2)),
+        lambda path: write_text(path, json.dumps(finite(figures_of(replays)), indent=2)),
         lambda path: write_text(path, settings_toml),
         lambda path: _record(path, replays, names, settings_toml),
     ]
@@ -86,22 +86,13 @@ def signals(replayed: ReplayResult) -> Trajectory:
     columns = {name: np.ascontiguousarray(log[name]) for name in kept}
     for kind in names:
         columns |= {f"estimate/{kind}/{name}": values for name, values in replayed.estimates[kind].items()}
-    metadata = {"replay": finite_throughout(figures_of([replayed])["logs"][0])}
+    metadata = {"replay": finite(figures_of([replayed])["logs"][0])}
     return Trajectory(columns, metadata, Layout(names, extra))
 
 
 def settings_of(paths: Sequence[str], replay: Mapping[str, Any], read: Mapping[str, Any]) -> str:
     """What was asked for, as TOML: the logs, how they were read, and with what they were replayed."""
     return tomli_w.dumps({"logs": list(paths), **({"log": dict(read)} if read else {}), "replay": dict(replay)})
-
-
-def finite_throughout(value: Any) -> Any:
-    """None for numbers that JSON does not know, in lists too."""
-    if isinstance(value, list):
-        return [finite_throughout(item) for item in value]
-    if isinstance(value, dict):
-        return {key: finite_throughout(item) for key, item in value.items()}
-    return finite(value)
 
 
 def _record(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.results.files import write_parquet
 
 SIGNALS = (
     "x1_rad",
@@ -210,14 +209,10 @@ class Trajectory:
     def save(self, path: Path) -> None:
         """Write one world's trajectory as Parquet, whole or not at all."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         stored = {"layout": asdict(self.layout), **self.metadata}
         metadata = {b"cmg_mj": json.dumps(stored).encode()}
-        table = pa.table(self.columns).replace_schema_metadata(metadata)
-        # Opened here: Arrow takes no path with bytes that are no UTF-8.
-        with whole_file(path) as temporary, temporary.open("wb") as file:
-            pq.write_table(table, file)
+        write_parquet(path, pa.table(self.columns).replace_schema_metadata(metadata))
 
     @staticmethod
     def load(path: Path) -> Trajectory:
@@ -251,23 +246,3 @@ class Trajectory:
                 f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"
             ) from error
         return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)
-
-
-@contextmanager
-def whole_file(path: Path, ending: str = "") -> Iterator[Path]:
-    """Give a temporary name to write to; rename it to `path` at the end, or remove it if the writing failed.
-
-    Args:
-        path: The file.
-        ending: Of the temporary name, for readers that go by it.
-
-    Yields:
-        The temporary file.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial{ending}")
-    try:
-        yield temporary
-        temporary.replace(path)
-    finally:
-        with suppress(FileNotFoundError):
-            temporary.unlink()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.results.per_world_table import open_loop_figures
+from cmg_mj.results.summary_keys import open_loop_figures
 from tests.acceptance.cases import (
     FALLING,
     GROUP,

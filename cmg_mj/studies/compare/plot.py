@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.results.files import whole_file
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import KEYS
-from cmg_mj.results.trajectory import whole_file
 from cmg_mj.studies.compare.comparison import ComparedObserver
 from cmg_mj.studies.compare.statistics import ComparisonRow, comparison_rows
 from cmg_mj.visualization.plots.colours import colours, hexadecimal

@@ -12,7 +12,7 @@ import tomli_w
 from cmg_mj.plant.mounting.mounted import MountedRobot
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.tilt_line import HingeLine
-from cmg_mj.results.trajectory import whole_file
+from cmg_mj.results.files import whole_file
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.results import markdown
-from cmg_mj.results.summary_keys import heading, written
+from cmg_mj.results.summary_keys import format_figure, heading
 from cmg_mj.studies.sweeps.axes import VariedField
 from cmg_mj.studies.sweeps.cells import Trials, cells_of
 from cmg_mj.studies.sweeps.plot_scales import ERRORS, fall_counts
@@ -35,7 +35,7 @@ def varied(study: SweepStudy) -> list[str]:
     """What a table of the cells does not say: of a design every field's values, of a grid those that go alike."""
     if study.design == "grid":
         return [f"With {axis.field} go, alike: {', '.join(axis.also)}." for axis in study.axes if axis.also]
-    return ["Varied:", "\n".join(f"- {axis.written}: {_values(axis)}" for axis in study.axes)]
+    return ["Varied:", "\n".join(f"- {axis.format_figure}: {_values(axis)}" for axis in study.axes)]
 
 
 def in_short(trials: Trials) -> str:
@@ -87,7 +87,7 @@ def _table_of_cells(trials: Trials) -> str:
 def _cell(row: dict[str, Any]) -> str:
     fell = f" [{row['fell']} fell]" if row["fell"] else ""
     stopped = f" [{row['stopped']} stopped]" if row["stopped"] else ""
-    return written(ERROR, row[ERROR]) + fell + stopped
+    return format_figure(ERROR, row[ERROR]) + fell + stopped
 
 
 def _values(axis: VariedField) -> str:
@@ -108,7 +108,7 @@ def _over_points(trials: Trials) -> str:
         means = _means(error[:, place])
         quantiles = np.quantile(means, QUANTILES) if len(means) else [math.nan] * len(QUANTILES)
         average = float(means.mean()) if len(means) else math.nan
-        figures = [written(ERROR, None if math.isnan(value) else value) for value in (average, *quantiles)]
+        figures = [format_figure(ERROR, None if math.isnan(value) else value) for value in (average, *quantiles)]
         falls, of = int(fell[:, place].sum()), int(known[:, place].sum())
         share = f" ({100.0 * falls / of:.1f} %)" if of else ""
         table.append([name, f"{len(means)} of {len(study.points)}", *figures, f"{falls} of {of}{share}"])

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from cmg_mj.results.files import whole_file
 from cmg_mj.results.per_world_table import ID_COLUMNS
 from cmg_mj.results.summary_keys import KEYS
-from cmg_mj.results.trajectory import whole_file
 from cmg_mj.studies.sweeps.chunk import COLUMNS
 from cmg_mj.studies.sweeps.study import SweepStudy
 

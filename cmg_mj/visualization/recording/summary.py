@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmg_mj.results import markdown
-from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, heading, written
+from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, format_figure, heading
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.visualization.plots.readability import FEW, short_names
@@ -57,7 +57,7 @@ def _estimates(run: Run) -> list[str]:
     said = f"In the run of {run.name}.{' The others ride along.' if len(names) > 1 else ''}"
     parts = [f"{said} {BOLD}" if len(run.observers) > FEW else said]
     for keys in RIDING_TABLES:
-        rows = [[written(key, of.get(key)) for key in keys] for of in figures]
+        rows = [[format_figure(key, of.get(key)) for key in keys] for of in figures]
         rows = [(name, *row) for name, row in zip(names, rows, strict=True)]
         parts.append(markdown.table(("", *map(heading, keys)), rows))
     return parts
@@ -72,7 +72,7 @@ def _by_column(runs: Sequence[Run]) -> str:
     """A table with a column a run."""
     rows = [("Outcome", *map(_outcome, runs))]
     rows += [
-        (heading(key), *(written(key, run.summary.get(key)) for run in runs))
+        (heading(key), *(format_figure(key, run.summary.get(key)) for run in runs))
         for key in KEYS
         if any(key in run.summary for run in runs)
     ]
@@ -84,7 +84,7 @@ def _by_row(runs: Sequence[Run]) -> list[str]:
     first = [_marked([run.name for run in runs], best_runs(runs)), [_outcome(run) for run in runs]]
     tables = []
     for i, keys in enumerate(ROW_TABLES):
-        columns = [[written(key, run.summary.get(key)) for run in runs] for key in keys]
+        columns = [[format_figure(key, run.summary.get(key)) for run in runs] for key in keys]
         text = first if i == 0 else first[:1]
         headings = (*("", "Outcome")[: len(text)], *map(heading, keys))
         tables.append(markdown.table(headings, list(zip(*text, *columns, strict=True)), text_columns=len(text)))
