@@ -183,7 +183,7 @@ def test_references_are_judged_as_open_loop_observers_are() -> None:
     run = metrics(references=("zero",), pushes=(Push(2.0, 0.1),))
     x2 = rows(np.sin(T), len(T))
     run.update(block(estimates([x2]), **still(len(T)) | {"x2": x2}), {"zero": 0.0 * x2})
-    figures = run.summary(0, stood=True)
+    figures: dict[str, Any] = run.summary(0, stood=True)
     assert list(figures["references"]) == ["zero"]
     assert figures["references"]["zero"]["velocity_rms_error_rad_s"] == figures["velocity_rms_rad_s"]
     assert figures["references"]["zero"]["velocity_fit"] == 0.0
@@ -325,7 +325,7 @@ def test_bias_is_judged_from_its_time_on() -> None:
         n = len(part)
         rate, figures = {"x2_rad_s": rows(0.0, n)}, {"bias_rad": rows(bias[part], n)}
         run.update(block([rate | figures, rate], **still(n)))
-    figures = run.summary(0, stood=True)
+    figures: dict[str, Any] = run.summary(0, stood=True)
     assert figures["bias_deg"] == pytest.approx(1.0)
     assert figures["bias_estimate_deg"] == pytest.approx(1.1, rel=1e-12)
     assert figures["bias_rms_error_deg"] == pytest.approx(math.sqrt((0.4**2 + 0.2**2) / 2.0), rel=1e-12)
@@ -336,7 +336,7 @@ def test_a_run_that_ends_before_has_no_bias_figures() -> None:
     run = metrics(bias_from_s=5.0)
     estimate = {"x2_rad_s": rows(0.0, 100), "bias_rad": rows(0.1, 100)}
     run.update(block([estimate], **still(100)))
-    figures = run.summary(0, stood=True)
+    figures: dict[str, Any] = run.summary(0, stood=True)
     assert figures["bias_estimate_deg"] is None
     assert figures["bias_rms_error_deg"] is None
     assert figures["bias_deg"] == 0.0

@@ -11,7 +11,7 @@ import numpy as np
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.per_world_table import as_table
-from cmg_mj.results.summary_keys import KEYS, finite
+from cmg_mj.results.summary_keys import KEYS, finite, open_loop_figures
 from cmg_mj.studies.compare.comparison import ComparedObserver, spread_of
 
 if TYPE_CHECKING:
@@ -40,7 +40,8 @@ class ComparisonRow:
     def values(self, key: str) -> np.ndarray:
         """A figure of every world, (n_worlds,); NaN where a world did not stand to the end or has no such figure."""
         result = self.entry.result
-        figures = result.summaries[0]["references"][self.reference] if self.reference else result.summaries[0]
+        summary = result.summaries[0]
+        figures = open_loop_figures(summary)[self.reference] if self.reference else summary
         return result.values(key, self.reference) if key in figures else np.full(len(result.outcomes), np.nan)
 
     @property

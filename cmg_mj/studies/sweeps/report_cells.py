@@ -35,7 +35,7 @@ def varied(study: SweepStudy) -> list[str]:
     """What a table of the cells does not say: of a design every field's values, of a grid those that go alike."""
     if study.design == "grid":
         return [f"With {axis.field} go, alike: {', '.join(axis.also)}." for axis in study.axes if axis.also]
-    return ["Varied:", "\n".join(f"- {axis.format_figure}: {_values(axis)}" for axis in study.axes)]
+    return ["Varied:", "\n".join(f"- {axis.written}: {_values(axis)}" for axis in study.axes)]
 
 
 def in_short(trials: Trials) -> str:

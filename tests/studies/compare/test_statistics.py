@@ -96,7 +96,8 @@ def test_a_plot_of_fits_shows_the_best() -> None:
     compared = [entry(kind, [0.1, 0.2], more={FIT: fit}) for kind, fit in fits.items()]
     for of in compared:
         for summary in of.result.summaries:
-            summary["references"]["mems_gyro"][FIT] = 0.96
+            references: Any = summary["references"]
+            references["mems_gyro"][FIT] = 0.96
     low, high = _Panel(FIT, comparison_rows(compared)).limits
     assert -5.0 < low < -0.1
     assert 0.96 < high < 1.1
