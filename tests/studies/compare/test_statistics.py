@@ -41,7 +41,7 @@ def entry(
 
 
 def by_name(compared: list[ComparedObserver]) -> dict[str, dict[str, Any]]:
-    return {row["observer"]: row for row in standings(compared)}
+    return {str(row["observer"]): row for row in standings(compared)}
 
 
 def student(values: list[float]) -> list[float]:
@@ -167,9 +167,8 @@ def test_the_table_has_every_world_of_every_row() -> None:
 def test_what_stood_averages_to_what_is_printed() -> None:
     """And the figures of those that fell are there, marked."""
     table = worlds_table(compared())
-    for row in standings(compared()):
-        of = table.filter(pc.field("observer") == row["observer"])
-        stood = of.filter(pc.field("stood"))
+    for observer, row in by_name(compared()).items():
+        stood = table.filter((pc.field("observer") == observer) & pc.field("stood"))
         for key in row["intervals"]:
             known = [value for value in stood[key].to_pylist() if value is not None]
             assert (row[key] is None) == (not known), key
