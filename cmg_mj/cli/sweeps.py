@@ -16,6 +16,7 @@ from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, note, progress, say_written,
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
+    from cmg_mj.studies.sweeps.plan import Cost
     from cmg_mj.studies.sweeps.report import SweepTables
     from cmg_mj.studies.sweeps.study import SweepStudy
 
@@ -67,7 +68,7 @@ def sweep(
     from cmg_mj.studies.sweeps.cells import COLUMNS, Trials
     from cmg_mj.studies.sweeps.chunk_store import Store
     from cmg_mj.studies.sweeps.plan import estimate_cost
-    from cmg_mj.studies.sweeps.report import FILES, found_of, save, summary
+    from cmg_mj.studies.sweeps.report import FILES, save, summary, tables_of
     from cmg_mj.studies.sweeps.study import MOST_TRIALS, check_values, counted
 
     if cluster is not None:
@@ -100,7 +101,7 @@ def sweep(
             except KeyboardInterrupt:
                 note(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
                 sys.exit(INTERRUPTED)
-            found = found_of(Trials(study, store.tables(COLUMNS)))
+            found = tables_of(Trials(study, store.tables(COLUMNS)))
             at = save(folder, store, found)
     show(_as_json(found) if arguments.as_json else None, summary(found), arguments.as_json)
     say_written(folder, at, f"Read {at / 'report.md'}", arguments.as_json)
@@ -131,14 +132,14 @@ def _study(
 ) -> SweepStudy:
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
-    from cmg_mj.studies.sweeps.file import axes_of, design_of, scenario_of, study_file
+    from cmg_mj.studies.sweeps.file import SweepFields, axes_of, design_of, scenario_of, study_file
     from cmg_mj.studies.sweeps.study import SweepStudy
 
     if sample is not None and sobol is not None:
         raise InputError("--sample and --sobol: one of them")
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
     fields = study_file(arguments.name)
-    asked: dict[str, Any] = {}
+    asked: SweepFields = {}
     if fields is None:
         scenario = arguments.scenario()
     else:
@@ -165,18 +166,27 @@ def _split(setting: str) -> tuple[str, str]:
 
 def _as_json(found: SweepTables) -> dict[str, Any]:
     from cmg_mj.studies.sweeps.cells import cells_of
+    from cmg_mj.studies.sweeps.order import order_rows
 
     study = found.trials.study
     tables: dict[str, Any] = {"trials": study.trials, "cells": list(cells_of(found.trials))}
     if study.order:
-        tables["order"] = found.order
-    return tables | ({"indices": found.indices} if study.design == "sobol" else {})
+        tables["order"] = order_rows(study, found.order)
+    if study.design == "sobol":
+        tables["indices"] = [row._asdict() for row in found.indices]
+    return tables
 
 
-def _plan_text(takes: dict[str, Any]) -> str:
+def _plan_text(takes: Cost) -> str:
     from cmg_mj.studies.sweeps.study import counted
 
-    how_many = " x ".join(counted(takes[what], what[:-1]) for what in ("points", "observers", "worlds"))
+    how_many = " x ".join(
+        [
+            counted(takes["points"], "point"),
+            counted(takes["observers"], "observer"),
+            counted(takes["worlds"], "world"),
+        ]
+    )
     seconds, chunks = takes["minutes"] * 60.0, counted(takes["chunks"], "chunk")
     how_long = f"{seconds:.2g} s" if seconds < 10.0 else in_time(seconds)
     return (

@@ -126,7 +126,7 @@ def comparison_note(summaries: Comparison) -> str:
     loop = next((summary["in_loop_of"] for summary in summaries if "in_loop_of" in summary), None)
     if loop:
         lines.append(
-            f"What closes no loop runs open loop in that of {loop}, the best:\n"
+            f"Open loop, on the motion of {loop}, the best:\n"
             "zero, an estimate of zero; mems_gyro, a two-dollar gyro; floor_y1, the best linear filter of\n"
             "y1 alone (its last 0.5 s) for this very world, found afterwards; floor_accel, the least error that\n"
             "y1 with its acceleration allow for whatever motion, by the noise of their datasheet."
