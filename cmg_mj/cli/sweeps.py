@@ -180,13 +180,7 @@ def _as_json(found: SweepTables) -> dict[str, Any]:
 def _plan_text(takes: Cost) -> str:
     from cmg_mj.studies.sweeps.study import counted
 
-    how_many = " x ".join(
-        [
-            counted(takes["points"], "point"),
-            counted(takes["observers"], "observer"),
-            counted(takes["worlds"], "world"),
-        ]
-    )
+    how_many = " x ".join(counted(takes[what], what[:-1]) for what in ("points", "observers", "worlds"))
     seconds, chunks = takes["minutes"] * 60.0, counted(takes["chunks"], "chunk")
     how_long = f"{seconds:.2g} s" if seconds < 10.0 else in_time(seconds)
     return (

@@ -21,6 +21,7 @@ from cmg_mj.visualization.plots.run_plot import pyplot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import PathCollection
 
 COLUMNS = 3
 """Panels in a row."""
@@ -115,30 +116,18 @@ class _Panel:
         axes.set_title(KEYS[self.key].heading, loc="left", fontsize="medium")
         axes.grid(alpha=0.3, axis="x")
         for place, (stood, lost, color) in enumerate(zip(self.stood, self.lost, self.colours, strict=True)):
-            self._scatter(axes, place, stood, color=color, marker="o", size=9, alpha=0.6, linewidth=0.0)
-            self._scatter(axes, place, lost, color="red", marker="x", size=14, linewidth=0.8)
+            self._scatter(partial(axes.scatter, color=color, alpha=0.6, linewidth=0), place, stood, "o", 9)
+            self._scatter(partial(axes.scatter, color="red", linewidth=0.8), place, lost, "x", 14)
             interval = known_interval(stood)
             if interval is not None:
                 axes.plot([interval.low, interval.high], [place, place], color="black", linewidth=2.0)
                 axes.plot([interval.mean], [place], "|", color="black", markersize=9)
 
-    def _scatter(
-        self,
-        axes: Axes,
-        place: int,
-        values: np.ndarray,
-        *,
-        color: str,
-        marker: str,
-        size: float,
-        linewidth: float,
-        alpha: float | None = None,
-    ) -> None:
+    def _scatter(self, draw: partial[PathCollection], place: int, values: np.ndarray, marker: str, size: float) -> None:
         """Draw the worlds in their order across a row; those outside the axis as arrow heads at its edge."""
         rows = place + np.linspace(-0.3, 0.3, len(values)) if len(values) > 1 else np.full(len(values), float(place))
         low, high = self.limits
         inside = (values >= low) & (values <= high)
-        draw = partial(axes.scatter, color=color, linewidth=linewidth, alpha=alpha)
         draw(values[inside], rows[inside], marker=marker, s=size)
         for out, edge, head in ((values < low, low, "<"), (values > high, high, ">")):
             if out.any():

@@ -103,7 +103,7 @@ def table(cost: SweepCost) -> Table:
     for heading in ("rigs", "trials", "stood", "all [s]", "batch [s]", "ratio", "trials\na second"):
         rows.add_column(heading, justify="right", vertical="bottom")
     for row in cost["figures"]:
-        counts = map(str, (row["rigs"], row["trials"], row["stood"]))
+        counts = (str(row[key]) for key in ("rigs", "trials", "stood"))
         rate = row["trials"] / row["cpu_s"]
         seconds = (f"{row['cpu_s']:.1f}", f"{row['batch_cpu_s']:.1f}", f"{row['cpu_over_batch']:.3f}", f"{rate:.1f}")
         rows.add_row(row["observer"], *counts, *seconds)

@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import math
 import statistics
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -40,7 +41,7 @@ def entry(
     )
 
 
-def by_name(compared: list[ComparedObserver]) -> dict[str, dict[str, Any]]:
+def by_name(compared: Sequence[ComparedObserver]) -> dict[str, dict[str, Any]]:
     return {str(row["observer"]): row for row in standings(compared)}
 
 
