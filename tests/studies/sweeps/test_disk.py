@@ -66,7 +66,7 @@ def test_a_disk_that_is_full_at_the_end(tmp_path: Path, whole: bytes, monkeypatc
 
 
 def test_a_disk_that_is_full_at_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store, "_write", full)
+    monkeypatch.setattr(store, "write_bytes", full)
     assert cmg_mj(*SWEEP, tmp_path).complaint == f"{tmp_path}: cannot be written: No space left on device"
     monkeypatch.undo()
     monkeypatch.setattr(files.os, "fsync", full)  # the study too is to outlast a power cut
