@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +18,6 @@ from cmg_mj.studies.compare.statistics import ComparisonRow, comparison_rows
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import pyplot
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.collections import PathCollection
 
 COLUMNS = 3
 """Panels in a row."""
@@ -105,7 +101,7 @@ class _Panel:
         margin = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
         self.limits = low - margin, high + margin
 
-    def draw(self, axes: Axes) -> None:
+    def draw(self, axes: Any) -> None:
         """Draw the panel."""
         axes.set_xscale(self.scale)
         axes.set_xlim(*self.limits)
@@ -123,7 +119,7 @@ class _Panel:
                 axes.plot([interval.low, interval.high], [place, place], color="black", linewidth=2.0)
                 axes.plot([interval.mean], [place], "|", color="black", markersize=9)
 
-    def _scatter(self, draw: partial[PathCollection], place: int, values: np.ndarray, marker: str, size: float) -> None:
+    def _scatter(self, draw: partial[None], place: int, values: np.ndarray, marker: str, size: float) -> None:
         """Draw the worlds in their order across a row; those outside the axis as arrow heads at its edge."""
         rows = place + np.linspace(-0.3, 0.3, len(values)) if len(values) > 1 else np.full(len(values), float(place))
         low, high = self.limits
