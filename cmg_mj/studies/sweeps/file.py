@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Sequence
 from typing import TypedDict, get_args
 
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, TomlValue, nearest
 from cmg_mj.inputs.bundled import bundled, find
 from cmg_mj.inputs.overrides import override
 from cmg_mj.scenario.loading import find_model, load_scenario, parse_scenario
@@ -35,7 +35,7 @@ class StudyFile(TypedDict, total=False):
 
     sweep: SweepFields
     vary: dict[str, FieldValue]
-    scenario: str | dict[str, FieldValue]
+    scenario: str | dict[str, TomlValue]
 
 
 def study_file(name: str) -> StudyFile | None:
