@@ -15,6 +15,7 @@ import click
 from cmg_mj.cli.arguments import claim_folder, names_of, output_path, released_at_the_end, with_observers
 from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, final_path, note, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
+from cmg_mj.results.summary_keys import finite
 
 if TYPE_CHECKING:
     from cmg_mj.replay.log_replays import LogReplays
@@ -181,7 +182,6 @@ def replay(
     from cmg_mj.replay import report
     from cmg_mj.replay.log_replays import LogReplays, ReplayRequest
     from cmg_mj.replay.parameter_options import parameters_of
-    from cmg_mj.replay.save import finite_throughout
     from cmg_mj.replay.user_noise import noise_numbers
 
     names = names_of(observers)
@@ -203,7 +203,7 @@ def replay(
         finally:
             results = replays.results
             table = report.replay_markdown(results) if markdown else report.replay_tables(results)
-            show(finite_throughout(report.replay_figures(results)), table, as_json)
+            show(finite(report.replay_figures(results)), table, as_json)
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", as_json)
     if ctrl_c.noted or not replays.complete:
         note(f"interrupted; {len(replays.results)} of {total} logs are in {final_path(folder, place)}")

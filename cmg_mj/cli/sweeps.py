@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.replay.report import JsonValue
+    from cmg_mj.studies.sweeps.plan import Cost
     from cmg_mj.studies.sweeps.report import SweepTables
     from cmg_mj.studies.sweeps.study import SweepStudy
 
@@ -75,7 +76,7 @@ def sweep(
     from cmg_mj.studies.sweeps.cells import COLUMNS, Trials
     from cmg_mj.studies.sweeps.chunk_store import Store
     from cmg_mj.studies.sweeps.plan import estimate_cost
-    from cmg_mj.studies.sweeps.report import FILES, found_of, save, summary
+    from cmg_mj.studies.sweeps.report import FILES, save, summary, tables_of
     from cmg_mj.studies.sweeps.study import MOST_TRIALS, check_values, counted
 
     if cluster is not None:
@@ -108,7 +109,7 @@ def sweep(
             except KeyboardInterrupt:
                 note(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
                 sys.exit(INTERRUPTED)
-            tables = found_of(Trials(study, store.tables(COLUMNS)))
+            tables = tables_of(Trials(study, store.tables(COLUMNS)))
             written = save(folder, store, tables)
     show(_as_json(tables) if arguments.as_json else None, summary(tables), arguments.as_json)
     say_written(folder, written, f"Read {written / 'report.md'}", arguments.as_json)
@@ -172,17 +173,18 @@ def _split(setting: str) -> tuple[str, str]:
 
 def _as_json(tables: SweepTables) -> JsonValue:
     from cmg_mj.studies.sweeps.cells import cells_of
+    from cmg_mj.studies.sweeps.order import order_rows
 
     study = tables.trials.study
     return {
         "trials": study.trials,
         "cells": list(cells_of(tables.trials)),
-        **({"order": tables.order} if study.order else {}),
-        **({"indices": tables.indices} if study.design == "sobol" else {}),
+        **({"order": order_rows(study, tables.order)} if study.order else {}),
+        **({"indices": [row._asdict() for row in tables.indices]} if study.design == "sobol" else {}),
     }
 
 
-def _cost_text(cost: Mapping[str, float]) -> str:
+def _cost_text(cost: Cost) -> str:
     from cmg_mj.studies.sweeps.study import counted
 
     def count(key: str) -> str:

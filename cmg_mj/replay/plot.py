@@ -11,7 +11,7 @@ from cmg_mj.replay.log_replay import ReplayResult, describe_log
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
-from cmg_mj.results.trajectory import whole_file
+from cmg_mj.results.files import whole_file
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import (

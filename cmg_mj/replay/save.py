@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.plot import plot_replay
-from cmg_mj.replay.report import JsonValue, log_figures, replay_figures
+from cmg_mj.replay.report import log_figures, replay_figures
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
@@ -63,7 +63,7 @@ def save_replay(
         InputError: The folder, or a file, cannot be written.
     """
     writers: list[Callable[[Path], None]] = [
-        lambda path: write_text(path, json.dumps(finite_throughout(replay_figures(replays)), indent=2)),
+        lambda path: write_text(path, json.dumps(finite(replay_figures(replays)), indent=2)),
         lambda path: write_text(path, settings_toml),
         lambda path: _record(path, replays, names, settings_toml),
     ]
@@ -82,17 +82,8 @@ def signals(replayed: ReplayResult) -> Trajectory:
     columns = {name: np.ascontiguousarray(log[name]) for name in known}
     for kind in names:
         columns |= {f"estimate/{kind}/{name}": values for name, values in replayed.estimates[kind].items()}
-    metadata = {"replay": finite_throughout(log_figures(replayed))}
+    metadata = {"replay": finite(log_figures(replayed))}
     return Trajectory(columns, metadata, Layout(names, extra))
-
-
-def finite_throughout(value: JsonValue) -> JsonValue:
-    """Replace numbers that JSON does not know by None, in lists and tables too."""
-    if isinstance(value, list):
-        return [finite_throughout(item) for item in value]
-    if isinstance(value, dict):
-        return {key: finite_throughout(item) for key, item in value.items()}
-    return finite(value)
 
 
 def _record(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:

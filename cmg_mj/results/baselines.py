@@ -1,4 +1,4 @@
-"""What every estimate of the rate is judged beside: zero, a cheap gyro on the same motion, and two floors."""
+"""Baselines of every estimate of the rate: zero, a cheap gyro on the same motion, and two floors."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from cmg_mj.sensors.noise_streams import NoiseStream, normals
 
 ZERO, MEMS_GYRO = "zero", "mems_gyro"
 RATES = (ZERO, MEMS_GYRO)
-"""Those that say what the rate is."""
+"""Baselines that give a rate at every tick."""
 REFERENCES = (*RATES, *FLOORS)
-"""The names of all, in the order of every table."""
+"""Names of all baselines, in the order of every table."""
 
 
 class References:
-    """Those that say a rate, at work. They see the true rate and close no loop.
+    """Baselines that give a rate from the true one. They close no loop.
 
     Args:
         gyro: The gyro.
@@ -34,7 +34,7 @@ class References:
         )
 
     def rates(self, x2: np.ndarray) -> dict[str, np.ndarray]:
-        """What each says at the next ticks.
+        """Compute each baseline's rate at the next ticks.
 
         Args:
             x2: True tilt rate, (n_rows, n_worlds) [rad/s].

@@ -1,9 +1,9 @@
-"""Two floors under every estimate of the rate: what y1 alone allows, and what y1 with its acceleration does."""
+"""Lower bounds (floors) on the error of a rate estimate: from y1 alone, and from y1 with its acceleration."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 
@@ -13,10 +13,10 @@ from cmg_mj.sensors.tilt import TiltNoise
 
 FLOOR_Y1, FLOOR_ACCELERATION = "floor_y1", "floor_accel"
 FLOORS = (FLOOR_Y1, FLOOR_ACCELERATION)
-"""Their names, in the order of every table."""
+"""Names of the floors, in the order of every table."""
 
 MEMORY_S = 0.5
-"""How far back the filters of y1 look that are tried for its floor [s]."""
+"""Memory of the filters of y1 that are tried for its floor [s]."""
 SINGLE, WIDER = 4, 1.3
 """Their newest samples have a tap each; older ones share one, and every share is so much wider than the one before.
 A tap a sample takes 0.3 % off the floor, half a second more of memory 1 % (docs/studies/gyro_free.py --taps)."""
@@ -28,7 +28,7 @@ ROWS_A_TAP = 10
 
 @lru_cache(maxsize=256)
 def acceleration_floor(noise: TiltNoise, dt: float) -> float:
-    """The least RMS error of any filter of y1 and its acceleration that must do for whatever motion there is.
+    """Compute the least RMS error of a filter of y1 and its acceleration that must serve for any motion.
 
     The acceleration runs straight between samples, and nothing else is known of the motion. Then only the noise is
     left of the error: with (v, n) the noise of y1 and of the acceleration, v = c n + v', it obeys, driven by each
@@ -39,11 +39,11 @@ def acceleration_floor(noise: TiltNoise, dt: float) -> float:
     and the stationary Kalman filter of it is the best there is. Not only of the linear ones, if the noise is Gaussian.
 
     Args:
-        noise: Of one sample.
+        noise: Noise of one sample.
         dt: Sample period [s].
 
     Returns:
-        After each measurement, once the filter has settled [rad/s].
+        The error after each measurement, once the filter has settled [rad/s].
     """
     from scipy.linalg import solve_discrete_are
 
@@ -52,9 +52,9 @@ def acceleration_floor(noise: TiltNoise, dt: float) -> float:
     # In units of the tilt's noise and of the sample period: nothing is very large or small.
     a, c = noise.acceleration * dt * dt / noise.tilt, noise.correlation
     F = np.array([[1.0, 1.0, -a / 3.0], [0.0, 1.0, -a / 2.0], [0.0, 0.0, 0.0]])  # of x1, x2, n
-    driven = np.array([[-a / 6.0], [-a / 2.0], [1.0]])
+    gain = np.array([[-a / 6.0], [-a / 2.0], [1.0]])
     C, R = np.array([[1.0, 0.0, c]]), np.array([[1.0 - c * c]])
-    P = solve_discrete_are(F.T, C.T, driven @ driven.T, R)
+    P = solve_discrete_are(F.T, C.T, gain @ gain.T, R)
     after = P - P @ C.T @ np.linalg.solve(C @ P @ C.T + R, C @ P)
     return math.sqrt(max(after[1, 1], 0.0)) * noise.tilt / dt
 
@@ -76,7 +76,7 @@ class TiltFloor:
     def __init__(self, dt: float, n_worlds: int) -> None:
         self.edges = _edges(max(1, round(MEMORY_S / dt)))
         self._taps = len(self.edges) - 1
-        # Of the taps' inputs and the true rate: sums of all products, in the whole run and in the push windows.
+        # Sums of all products of the taps' inputs and the true rate, in the whole run and in the push windows.
         self._products = np.zeros((2, n_worlds, self._taps + 1, self._taps + 1))
         self._counts = np.zeros((2, n_worlds))
         self._past: np.ndarray | None = None
@@ -101,14 +101,14 @@ class TiltFloor:
             for part, (mask, rows, everywhere) in enumerate(masks):
                 if not rows.any():
                     continue
-                kept = inputs if everywhere else np.where(mask[rows, worlds].T[:, None], inputs[:, :, rows], 0.0)
+                selected = inputs if everywhere else np.where(mask[rows, worlds].T[:, None], inputs[:, :, rows], 0.0)
                 # Not by @: BLAS would take every core for it, and keep them busy for a while.
-                self._products[part, worlds] += np.einsum("wir,wjr->wij", kept, kept)
+                self._products[part, worlds] += np.einsum("wir,wjr->wij", selected, selected)
         for part, (mask, *_) in enumerate(masks):
             self._counts[part] += mask.sum(axis=0)
 
     def _inputs(self, y1: np.ndarray, x2: np.ndarray) -> np.ndarray:
-        """What goes into the taps, and the rate below: (n_worlds, taps + 1, n_rows)."""
+        """Stack the taps' inputs, and the rate below: (n_worlds, taps + 1, n_rows)."""
         n_rows = len(x2)
         sums = np.cumsum(y1, axis=1)
         sums = np.concatenate([np.zeros_like(sums[:, :1]), sums], axis=1)
@@ -120,7 +120,7 @@ class TiltFloor:
         return inputs
 
     def errors(self, world: int) -> tuple[float | None, float | None]:
-        """What is left of the rate in one world.
+        """Compute the filter's error in one world.
 
         Args:
             world: Its index.
@@ -128,26 +128,22 @@ class TiltFloor:
         Returns:
             RMS error in the whole run and in the push windows [rad/s]; None where there are too few samples for a fit.
         """
-        whole, pushed = (self._error(products[world], counts[world]) for products, counts in self._sums)
+        whole, pushed = (self._error(self._products[part, world], self._counts[part, world]) for part in (0, 1))
         return whole, pushed
-
-    @property
-    def _sums(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        return zip(self._products, self._counts, strict=True)
 
     def _error(self, products: np.ndarray, count: float) -> float | None:
         if count < ROWS_A_TAP * self._taps or not np.isfinite(products).all():
             return None
         taps = np.linalg.lstsq(products[:-1, :-1], products[:-1, -1], rcond=1e-13)[0]
-        left = np.append(taps, -1.0)
-        return math.sqrt(max(left @ products @ left, 0.0) / count)
+        residual = np.append(taps, -1.0)
+        return math.sqrt(max(residual @ products @ residual, 0.0) / count)
 
 
 class Floors:
     """Both floors of a run.
 
     Args:
-        noises: Of one sample of y1 and its acceleration, a world each.
+        noises: Noise of one sample of y1 and its acceleration, a world each.
         dt: Sample period [s].
     """
 
@@ -157,13 +153,13 @@ class Floors:
         self.add = self._y1.add
 
     def errors(self, world: int) -> dict[str, tuple[float | None, float | None]]:
-        """Of each floor the RMS error in the whole run and in the push windows of one world [rad/s]."""
-        of_both = self._acceleration[world]
-        return {FLOOR_Y1: self._y1.errors(world), FLOOR_ACCELERATION: (of_both, of_both)}
+        """Compute each floor's RMS error in the whole run and in the push windows of one world [rad/s]."""
+        error = self._acceleration[world]
+        return {FLOOR_Y1: self._y1.errors(world), FLOOR_ACCELERATION: (error, error)}
 
 
 def _edges(memory: int) -> list[int]:
-    """Between which samples back each tap lies: the newest have one each."""
+    """Choose the samples back between which each tap lies: the newest samples have a tap each."""
     edges, width = list(range(min(SINGLE, memory) + 1)), 1.0
     while edges[-1] < memory:
         width *= WIDER

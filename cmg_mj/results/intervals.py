@@ -29,7 +29,7 @@ class Interval(NamedTuple):
 
 
 def mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
-    """Student's interval of the mean of independent values.
+    """Compute Student's interval of the mean of independent values.
 
     Args:
         values: One a world, at least two.
@@ -51,14 +51,25 @@ def mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
 
 
 def known_interval(values: Sequence[float] | np.ndarray) -> Interval | None:
-    """The interval of the mean over the finite values, as of the worlds that stood; None of fewer than two."""
-    sample = np.asarray(values, dtype=float)
-    known = sample[np.isfinite(sample)]
+    """Compute the interval of the mean over the finite values, as of the worlds that stood; None of fewer than two."""
+    known = finite_values(values)
     return mean_interval(known) if len(known) >= 2 else None
 
 
+def finite_values(values: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Discard what is not finite, as of worlds that fell, (n,) -> (n_finite,)."""
+    sample = np.asarray(values, dtype=float)
+    return sample[np.isfinite(sample)]
+
+
+def finite_mean(values: Sequence[float] | np.ndarray) -> float | None:
+    """Compute the mean over the finite values; None of none."""
+    known = finite_values(values)
+    return float(known.mean()) if len(known) else None
+
+
 def ratio_interval(numerator: np.ndarray, denominator: np.ndarray) -> Interval:
-    """Ratio of two positive quantities of the same worlds: the geometric mean of the worlds' ratios.
+    """Compute the geometric mean of the worlds' ratios of two positive quantities.
 
     Args:
         numerator: One a world, (n_worlds,).
@@ -73,7 +84,7 @@ def ratio_interval(numerator: np.ndarray, denominator: np.ndarray) -> Interval:
 
 
 def paired_verdict(difference: Interval) -> PairedVerdict:
-    """Whether a difference, counted positive for the better, is one beyond chance."""
+    """Judge whether a difference, counted positive for the better, is one beyond chance."""
     if difference.low > 0.0:
         return "better"
     return "worse" if difference.high < 0.0 else "tie"

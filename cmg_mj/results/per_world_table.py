@@ -1,25 +1,17 @@
-"""Every world kept: a table with a row per observer and world."""
+"""The table of a run's worlds: a row per observer and world."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from cmg_mj.results.summary_keys import NESTED, OPEN_LOOP_SECTIONS
-from cmg_mj.results.trajectory import whole_file
+from cmg_mj.results.files import write_parquet
+from cmg_mj.results.summary_keys import Summary
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-
-class WorldEnd(Protocol):
-    """How a world ended."""
-
-    kind: Any
-    time_s: float
-    reason: str
 
 
 ID_COLUMNS = {
@@ -38,66 +30,16 @@ Figures of a world that did not stand to the end are those until then: `stood` i
 """
 
 
-def world_rows(
-    loop: str,
-    who: str,
-    seed: int,
-    worlds: Sequence[int],
-    outcomes: Sequence[WorldEnd],
-    summaries: Sequence[Mapping[str, Any]],
-) -> list[dict[str, Any]]:
-    """One observer's rows.
-
-    Args:
-        loop: The observer in the loop.
-        who: The same, or one of its open-loop observers or references.
-        seed: The run's seed.
-        worlds: Their numbers, (n_worlds,).
-        outcomes: How each ended, (n_worlds,).
-        summaries: Each world's numbers, (n_worlds,).
-
-    Returns:
-        A row a world, by column.
-    """
-    rows = []
-    for number, outcome, summary in zip(worlds, outcomes, summaries, strict=True):
-        figures = summary if who == loop else open_loop_figures(summary)[who]
-        rows.append(
-            {
-                "observer": who,
-                "in_loop_of": None if who == loop else loop,
-                "world": number,
-                "seed": seed,
-                "outcome": outcome.kind,
-                "stood": outcome.kind == "done",
-                "end_time_s": outcome.time_s,
-                "reason": outcome.reason or None,
-                **{key: value for key, value in figures.items() if key not in NESTED},
-            }
-        )
-    return rows
-
-
-def open_loop_figures(summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Of a summary the figures of everything that rode along, by name: open-loop observers, then references."""
-    return {name: figures for nested in OPEN_LOOP_SECTIONS for name, figures in summary.get(nested, {}).items()}
-
-
-def as_table(rows: Iterable[Mapping[str, Any]]) -> pa.Table:
-    """Rows as a table. A figure that an observer or a world does not have is null."""
+def as_table(rows: Iterable[Summary]) -> pa.Table:
+    """Make rows, a world each, into a table. A figure that an observer or a world does not have is null."""
     import pyarrow as pa
 
-    kept = list(rows)
-    figures = dict.fromkeys(key for row in kept for key in row if key not in ID_COLUMNS)
+    worlds = list(rows)
+    figures = dict.fromkeys(key for row in worlds for key in row if key not in ID_COLUMNS)
     schema = pa.schema([*ID_COLUMNS.items(), *((key, "float64") for key in figures)])
-    return pa.table({name: [row.get(name) for row in kept] for name in schema.names}, schema=schema)
+    return pa.table({name: [row.get(name) for row in worlds] for name in schema.names}, schema=schema)
 
 
 def save_table(path: Path, table: pa.Table, metadata: Mapping[str, Any]) -> None:
     """Write the table as Parquet, whole or not at all."""
-    import pyarrow.parquet as pq
-
-    table = table.replace_schema_metadata({b"cmg_mj": json.dumps(metadata).encode()})
-    # Opened here: Arrow takes no path with bytes that are no UTF-8.
-    with whole_file(path) as temporary, temporary.open("wb") as file:
-        pq.write_table(table, file)
+    write_parquet(path, table.replace_schema_metadata({b"cmg_mj": json.dumps(metadata).encode()}))

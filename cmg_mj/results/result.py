@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.results.per_world_table import as_table, open_loop_figures, world_rows
+from cmg_mj.results.per_world_table import as_table
+from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, open_loop_figures
 from cmg_mj.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class Outcome:
 
 @dataclass
 class Result:
-    """What `simulate` returns.
+    """The outcome, the numbers and perhaps the trajectory of a run's worlds.
 
     Attributes:
         outcomes: How each world ended, (n_worlds,).
@@ -59,7 +60,7 @@ class Result:
     """
 
     outcomes: list[Outcome]
-    summaries: list[dict[str, Any]]
+    summaries: list[Summary]
     trajectory: Trajectory | None = None
     seconds: float = 0.0
     observers: Sequence[str] = ("",)
@@ -78,7 +79,7 @@ class Result:
         return np.array([outcome.fell for outcome in self.outcomes])
 
     def values(self, key: str, estimator: str | None = None) -> np.ndarray:
-        """One number of every world's summary.
+        """Return one number of every world's summary.
 
         Args:
             key: The summary's key, such as `velocity_rms_error_rad_s`.
@@ -90,41 +91,63 @@ class Result:
         Raises:
             InputError: There is no such key or estimator.
         """
-        of = self.summaries
+        summaries: Sequence[Mapping[str, SummaryValue]] = self.summaries
         if estimator is not None:
-            riding = open_loop_figures(self.summaries[0])
-            if estimator not in riding:
-                raise InputError(f"{estimator!r}: no open-loop observer of this run; {nearest(estimator, riding)}")
-            of = [open_loop_figures(summary)[estimator] for summary in of]
-        if key not in of[0]:
-            raise InputError(f"{key!r}: not in the summary; {nearest(key, of[0])}")
-        numbers = np.array([math.nan if s[key] is None else s[key] for s in of], dtype=float)
+            others = open_loop_figures(self.summaries[0])
+            if estimator not in others:
+                raise InputError(f"{estimator!r}: no open-loop observer of this run; {nearest(estimator, others)}")
+            summaries = [open_loop_figures(summary)[estimator] for summary in summaries]
+        if key not in summaries[0]:
+            raise InputError(f"{key!r}: not in the summary; {nearest(key, summaries[0])}")
+        figures = [summary[key] for summary in summaries]
+        numbers = np.array([math.nan if figure is None else figure for figure in figures], dtype=float)
         return np.where(self.stood, numbers, math.nan)
 
     def mean(self, key: str, estimator: str | None = None) -> float | None:
-        """Mean of `values` over the worlds that have one; None if no world has."""
+        """Return the mean of `values` over the worlds that have one; None if no world has."""
         values = self.values(key, estimator)
         known = values[np.isfinite(values)]
         return statistics.fmean(known) if len(known) else None
 
-    def rows(self, who: str | None = None) -> list[dict[str, Any]]:
-        """One observer's rows of `table`: that in the loop, or something that rode along."""
+    def rows(self, estimator: str | None = None) -> list[Summary]:
+        """Make the rows of `table` of one estimator.
+
+        Args:
+            estimator: An open-loop observer or a baseline; None for the observer in the loop.
+
+        Returns:
+            A row a world, by column.
+        """
         loop = self.observers[0]
         worlds = self.worlds or range(len(self.outcomes))
-        return world_rows(loop, who or loop, self.seed, worlds, self.outcomes, self.summaries)
+        return [
+            {
+                "observer": estimator or loop,
+                "in_loop_of": loop if estimator else None,
+                "world": world,
+                "seed": self.seed,
+                "outcome": outcome.kind,
+                "stood": outcome.kind == "done",
+                "end_time_s": outcome.time_s,
+                "reason": outcome.reason or None,
+                **{key: value for key, value in figures.items() if key not in NESTED},
+            }
+            for world, outcome, summary in zip(worlds, self.outcomes, self.summaries, strict=True)
+            for figures in [open_loop_figures(summary)[estimator] if estimator else summary]
+        ]
 
     def table(self) -> pa.Table:
-        """Every world kept: a row per observer and world, those that rode along after the one in the loop.
+        """Make a table with a row per observer and world, open-loop observers after the one in the loop.
 
         Returns:
             Columns `observer`, `in_loop_of`, `world`, `seed`, `outcome`, `stood`, `end_time_s`, `reason`, then
             every figure of the summary, null where there is none. Where `stood` is false they are those until the end.
         """
-        names = [self.observers[0], *open_loop_figures(self.summaries[0])]
-        return as_table(row for name in names for row in self.rows(name))
+        estimators = [None, *open_loop_figures(self.summaries[0])]
+        return as_table(row for estimator in estimators for row in self.rows(estimator))
 
     def split(self, count: int) -> list[Result]:
-        """The worlds in so many groups of equal size, in their order, as `run_many` was given them."""
+        """Split the worlds into groups of equal size, in the order in which `run_many` was given them."""
         worlds = len(self.outcomes)
         if count < 1 or worlds % count:
             raise InputError(f"groups({count}): {worlds} worlds cannot be parted so")
@@ -134,7 +157,7 @@ class Result:
         return [self.select(slice(i * size, (i + 1) * size)) for i in range(count)]
 
     def select(self, worlds: slice) -> Result:
-        """Some of the worlds, that stand beside each other."""
+        """Return neighbouring worlds."""
         return replace(
             self,
             outcomes=self.outcomes[worlds],

@@ -1,9 +1,17 @@
-"""What the numbers of a summary are called, their units and how many digits of them are worth showing."""
+"""Summaries of a run: their type, the names, units and digits of their numbers, and how axes are combined."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple, TypeAlias
+
+Figures = dict[str, float | None]
+"""Numbers of one estimator by their names; None where there is no such number."""
+SummaryValue: TypeAlias = "float | str | Sequence[SummaryValue] | Mapping[str, SummaryValue] | None"
+"""A number, a text, or a part of a summary."""
+Summary = dict[str, SummaryValue]
+"""What `--json` prints of a run or of an observer of a comparison."""
 
 
 class Key(NamedTuple):
@@ -52,37 +60,92 @@ KEYS = {
 AXES = "axes"
 """The part of a summary that holds the figures of each axis of several, by name."""
 OPEN_LOOP_SECTIONS = ("open_loop_observers", "references")
-"""Parts that hold the figures of what rode along, by name."""
+"""Parts that hold the figures of open-loop observers and of baselines, by name."""
 NESTED = (*OPEN_LOOP_SECTIONS, AXES)
 """Parts that hold figures of others by name."""
 
 
 OPEN_LOOP_COLUMNS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "velocity_fit", "velocity_fit_push")
-"""What tables show of everything that rode along."""
+"""Figures that tables show of open-loop observers and baselines."""
 
 
 def heading(key: str) -> str:
-    """A summary key in words, with its unit."""
+    """Name a summary key in words, with its unit."""
     return KEYS[key].heading
 
 
-def written(key: str, value: Any) -> str:
-    """A summary's number as tables show it; a dash where there is none."""
+def format_figure(key: str, value: SummaryValue) -> str:
+    """Format a summary's number for a table; a dash where there is none."""
     return "-" if value is None else KEYS[key].pattern.format(value)
 
 
-def spread(key: str, half: float | None) -> str:
-    """Half the width of a number's interval as tables show it; nothing where there is none."""
+def format_half_interval(key: str, half: float | None) -> str:
+    """Format half the width of a number's interval for a table; nothing where there is none."""
     return "" if half is None else "±" + KEYS[key].pattern.format(half)
 
 
-def difference(key: str, value: float | None) -> str:
-    """A difference of two numbers as tables show it, with its sign."""
+def format_difference(key: str, value: SummaryValue) -> str:
+    """Format a difference of two numbers for a table, with its sign."""
     return "-" if value is None else KEYS[key].pattern.replace("{:", "{:+").format(value)
 
 
-def finite(value: Any) -> Any:
-    """None for a number that JSON does not know."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
+def capitalised(text: str) -> str:
+    """Begin a text with a capital; the rest, such as RMS, stays."""
+    return text[:1].upper() + text[1:]
+
+
+def finite(summary: Mapping[str, SummaryValue]) -> Summary:
+    """Replace each number that JSON does not know by None."""
+    return {key: _finite_value(value) for key, value in summary.items()}
+
+
+def _finite_value(value: SummaryValue) -> SummaryValue:
+    if isinstance(value, Mapping):
+        return finite(value)
+    if isinstance(value, list):
+        return [_finite_value(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def section(summary: Mapping[str, SummaryValue], name: str) -> dict[str, Mapping[str, SummaryValue]]:
+    """Return the summaries that a part of a summary holds, by name; none where there is no such part."""
+    part = summary.get(name)
+    pairs: Iterable[tuple[str, SummaryValue]] = part.items() if isinstance(part, Mapping) else ()
+    return {key: value for key, value in pairs if isinstance(value, Mapping)}
+
+
+def open_loop_figures(summary: Mapping[str, SummaryValue]) -> dict[str, Mapping[str, SummaryValue]]:
+    """Return the figures of each open-loop observer, then of each baseline, by name."""
+    return {name: figures for part in OPEN_LOOP_SECTIONS for name, figures in section(summary, part).items()}
+
+
+def combine_axes(axes: Mapping[str, Summary]) -> Summary:
+    """Combine the summaries of one world's axes.
+
+    Args:
+        axes: The summary of each axis, by its name.
+
+    Returns:
+        The summary of an only axis. Of several: each number from the axis where it is worst, None where an axis has
+        none; `axes` has each axis' own.
+    """
+    if len(axes) == 1:
+        return next(iter(axes.values()))
+    return {**_worst(list(axes.values())), AXES: dict(axes)}
+
+
+def _worst(summaries: Sequence[Mapping[str, SummaryValue]]) -> Summary:
+    worst: Summary = {}
+    for key in summaries[0]:
+        values = [summary[key] for summary in summaries if key in summary]
+        if len(values) < len(summaries):  # the axes' observers differ
+            continue
+        parts = [value for value in values if isinstance(value, Mapping)]
+        numbers = [value for value in values if isinstance(value, (int, float))]
+        if parts:
+            worst[key] = _worst(parts)
+        elif len(numbers) < len(values):
+            worst[key] = None
+        else:
+            worst[key] = min(numbers) if key in KEYS and KEYS[key].better == "more" else max(numbers, key=abs)
+    return worst

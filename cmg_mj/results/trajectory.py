@@ -1,18 +1,17 @@
-"""What a run leaves behind, tick by tick; saved and loaded as Parquet."""
+"""A run tick by tick, saved and loaded as Parquet."""
 
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.results.files import write_parquet
 
 SIGNALS = (
     "x1_rad",
@@ -29,8 +28,7 @@ SIGNALS = (
 """Columns of every trajectory after `time_s`: true state, measurements, gyro, command, integrator [rad s], push."""
 
 ESTIMATES = ("x1_rad", "x2_rad_s", "x3_rad")
-"""What every observer estimates; what it estimates beyond x comes after them."""
-
+"""Signals that every observer estimates; those that it estimates beyond x come after them."""
 
 POSITIONS = {
     "hinge": ("angle/{}_rad",),
@@ -38,27 +36,38 @@ POSITIONS = {
     "ball": tuple(f"orientation/{{}}/{part}" for part in "wxyz"),
 }
 POSITIONS["free"] = (*(f"position/{{}}/{part}_m" for part in "xyz"), *POSITIONS["ball"])
-"""Columns of a joint by its kind, in the order of MuJoCo's qpos: those of a free joint in the world's axes."""
+"""Columns of a joint by its kind, in the order of MuJoCo's qpos; a free joint's are in the world's axes."""
 RATES = {
     "hinge": ("rate/{}_rad_s",),
     "slide": ("velocity/{}_m_s",),
     "ball": tuple(f"rate/{{}}/{part}_rad_s" for part in "xyz"),
 }
 RATES["free"] = (*(f"velocity/{{}}/{part}_m_s" for part in "xyz"), *RATES["ball"])
-"""The same of qvel: angular velocities in the body's own axes."""
+"""Columns of a joint by its kind, in the order of qvel; angular velocities are in the body's own axes."""
+
+
+class StoredLayout(TypedDict):
+    """A `Layout` as JSON has it."""
+
+    observers: list[str]
+    extra_signals: list[list[str]]
+    joints: list[str]
+    kinds: NotRequired[list[str]]
+    axes: NotRequired[list[StoredLayout]]
+    name: NotRequired[str]
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Whose columns a trajectory has, in their order.
+    """The observers, joints and axes that a trajectory has columns of.
 
     Attributes:
         observers: The observer in the loop, then the open-loop observers: columns `estimate/<observer>/<signal>`.
-        extra_signals: For each of them the names of what it estimates beyond x.
+        extra_signals: For each observer the names of the signals that it estimates beyond x.
         joints: In the order of qpos; a hinge has the columns `angle/<joint>_rad` and `rate/<joint>_rad_s`.
-        kinds: Of each joint `hinge`, `slide`, `ball` or `free`: see `POSITIONS` and `RATES`; none if all are hinges.
-        axes: Of a rig of several axes a layout each, without joints: the columns of an axis begin with `<axis>/`.
-        name: Of the axis.
+        kinds: `hinge`, `slide`, `ball` or `free` for each joint (see `POSITIONS` and `RATES`); none if all are hinges.
+        axes: For a plant of several axes a layout each, without joints: the columns of an axis begin with `<axis>/`.
+        name: The axis' name.
     """
 
     observers: tuple[str, ...] = ()
@@ -69,26 +78,26 @@ class Layout:
     name: str = ""
 
     def positions(self) -> list[str]:
-        """Names of the columns that make up qpos, in order."""
-        return self._of_joints(POSITIONS)
+        """List the columns that make up qpos, in order."""
+        return self._joint_columns(POSITIONS)
 
     def rates(self) -> list[str]:
-        """Names of the columns that make up qvel, in order."""
-        return self._of_joints(RATES)
+        """List the columns that make up qvel, in order."""
+        return self._joint_columns(RATES)
 
-    def _of_joints(self, named: Mapping[str, Sequence[str]]) -> list[str]:
+    def _joint_columns(self, patterns: Mapping[str, Sequence[str]]) -> list[str]:
         kinds = self.kinds or ("hinge",) * len(self.joints)
         pairs = zip(self.joints, kinds, strict=True)
-        return [name.format(joint) for joint, kind in pairs for name in named[kind]]
+        return [pattern.format(joint) for joint, kind in pairs for pattern in patterns[kind]]
 
     def columns(self) -> list[str]:
-        """Names of all columns after `time_s`, in order."""
+        """List all columns after `time_s`, in order."""
         return [*self._signals(), *self.positions(), *self.rates()]
 
     def _signals(self) -> list[str]:
-        """Those that are no joints'."""
+        """List the columns that are no joints'."""
         if self.axes:
-            return [f"{own.name}/{column}" for own in self.axes for column in own._signals()]
+            return [f"{axis.name}/{column}" for axis in self.axes for column in axis._signals()]
         estimates = [
             f"estimate/{observer}/{name}"
             for observer, more in zip(self.observers, self.extra_signals, strict=True)
@@ -97,15 +106,15 @@ class Layout:
         return [*SIGNALS, *estimates]
 
     @staticmethod
-    def loaded(kept: Mapping[str, Any]) -> Layout:
-        """What `asdict` made of one, and JSON of that."""
+    def loaded(stored: StoredLayout) -> Layout:
+        """Make a layout from what `asdict`, then JSON made of one."""
         return Layout(
-            tuple(kept["observers"]),
-            tuple(map(tuple, kept["extra_signals"])),
-            tuple(kept["joints"]),
-            tuple(kept.get("kinds", ())),
-            tuple(map(Layout.loaded, kept.get("axes", ()))),
-            kept.get("name", ""),
+            tuple(stored["observers"]),
+            tuple(map(tuple, stored["extra_signals"])),
+            tuple(stored["joints"]),
+            tuple(stored.get("kinds", ())),
+            tuple(map(Layout.loaded, stored.get("axes", ()))),
+            stored.get("name", ""),
         )
 
 
@@ -117,7 +126,7 @@ class Trajectory:
         columns: Name -> values, (n_ticks,) for one world, (n_ticks, n_worlds) for many; the unit ends the name.
             In many worlds, rows after a world's end are NaN.
         metadata: The outcome and the resolved scenario.
-        layout: Whose columns they are; empty for one put together by hand.
+        layout: The observers, joints and axes that have columns; empty for a trajectory put together by hand.
     """
 
     columns: dict[str, np.ndarray]
@@ -136,88 +145,84 @@ class Trajectory:
         return self.layout.observers
 
     def extra_signals(self, observer: str) -> tuple[str, ...]:
-        """Names of what an observer estimates beyond x."""
+        """List the signals that an observer estimates beyond x."""
         return self.layout.extra_signals[self.layout.observers.index(observer)]
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the rig's joints, in the order of qpos."""
+        """Names of the plant's joints, in the order of qpos."""
         return self.layout.joints
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names of the rig's axes, if it has several."""
-        return tuple(own.name for own in self.layout.axes)
+        """Names of the plant's axes, if it has several."""
+        return tuple(axis.name for axis in self.layout.axes)
 
     def along(self, axis: str) -> Trajectory:
-        """One axis of several, with the columns that a rig of one axis has.
+        """Select one axis of several, with the columns that a plant of one axis has.
 
         Args:
-            axis: Its name.
+            axis: The axis' name.
 
         Returns:
-            Its trajectory, with all joints.
+            The axis' trajectory, with all joints.
 
         Raises:
             InputError: There is no such axis.
         """
         if axis not in self.axes:
             raise InputError(f"axis {axis!r}: {nearest(axis, self.axes)}")
-        own = replace(
+        layout = replace(
             self.layout.axes[self.axes.index(axis)], joints=self.layout.joints, kinds=self.layout.kinds, name=""
         )
         columns = {"time_s": self["time_s"]}
-        for name in own.columns():
+        for name in layout.columns():
             columns[name] = self.columns[name if name in self.columns else f"{axis}/{name}"]
-        return replace(self, columns=columns, layout=own)
+        return replace(self, columns=columns, layout=layout)
 
     @staticmethod
     def joined(axes: Mapping[str, Trajectory]) -> Trajectory:
-        """The trajectories of a rig's axes as one; the first has the joints."""
+        """Join the trajectories of a plant's axes; the first has the joints."""
         first = next(iter(axes.values()))
-        parts = tuple(replace(own.layout, joints=(), kinds=(), name=name) for name, own in axes.items())
+        parts = tuple(replace(axis.layout, joints=(), kinds=(), name=name) for name, axis in axes.items())
         layout = replace(first.layout, axes=parts)
         columns = {"time_s": first["time_s"]}
-        for part, own in zip(parts, axes.values(), strict=True):
-            columns |= {f"{part.name}/{name}": own[name] for name in part.columns()}
+        for part, axis in zip(parts, axes.values(), strict=True):
+            columns |= {f"{part.name}/{name}": axis[name] for name in part.columns()}
         joints = (*layout.positions(), *layout.rates())
         return Trajectory(columns | {name: first[name] for name in joints}, layout=layout)
 
     def qpos(self) -> np.ndarray:
-        """Joint positions as MuJoCo has them, (n_ticks, nq) [rad, m, quaternions w, x, y, z]."""
+        """Stack the joint positions as MuJoCo has them, (n_ticks, nq) [rad, m, quaternions w, x, y, z]."""
         return np.stack([self.columns[name] for name in self.layout.positions()], axis=-1)
 
     def world(self, index: int) -> Trajectory:
-        """One world of many, up to its end."""
+        """Select one world of many, up to its end."""
         columns = {name: values if name == "time_s" else values[:, index] for name, values in self.columns.items()}
-        kept = np.isfinite(columns[self.layout.columns()[0] if self.layout.axes else SIGNALS[0]])
-        return replace(self, columns={name: values[kept] for name, values in columns.items()})
+        running = np.isfinite(columns[self.layout.columns()[0] if self.layout.axes else SIGNALS[0]])
+        return replace(self, columns={name: values[running] for name, values in columns.items()})
 
     def of_worlds(self, worlds: np.ndarray | slice) -> Trajectory:
-        """Some of many worlds: their indices, a mask (n_worlds,) or a slice."""
+        """Select some of many worlds by their indices, a mask (n_worlds,) or a slice."""
         columns = {name: values if name == "time_s" else values[:, worlds] for name, values in self.columns.items()}
         return replace(self, columns=columns)
 
     def from_tick(self, tick: int) -> Trajectory:
-        """The rows from one on."""
+        """Select the rows from a tick on."""
         return replace(self, columns={name: values[tick:] for name, values in self.columns.items()})
 
     def between(self, start_s: float, end_s: float) -> Trajectory:
-        """The rows from one time to another, both included."""
-        kept = (self["time_s"] >= start_s - 1e-9) & (self["time_s"] <= end_s + 1e-9)
-        return replace(self, columns={name: values[kept] for name, values in self.columns.items()})
+        """Select the rows from one time to another, both included."""
+        rows = (self["time_s"] >= start_s - 1e-9) & (self["time_s"] <= end_s + 1e-9)
+        return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
 
     def save(self, path: Path) -> None:
         """Write one world's trajectory as Parquet, whole or not at all."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         stored = {"layout": asdict(self.layout), **self.metadata}
         metadata = {b"cmg_mj": json.dumps(stored).encode()}
-        table = pa.table(self.columns).replace_schema_metadata(metadata)
-        # Opened here: Arrow takes no path with bytes that are no UTF-8.
-        with whole_file(path) as temporary, temporary.open("wb") as file:
-            pq.write_table(table, file)
+        write_parquet(path, pa.table(self.columns).replace_schema_metadata(metadata))
 
     @staticmethod
     def load(path: Path) -> Trajectory:
@@ -251,23 +256,3 @@ class Trajectory:
                 f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"
             ) from error
         return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)
-
-
-@contextmanager
-def whole_file(path: Path, ending: str = "") -> Iterator[Path]:
-    """Give a temporary name to write to; rename it to `path` at the end, or remove it if the writing failed.
-
-    Args:
-        path: The file.
-        ending: Of the temporary name, for readers that go by it.
-
-    Yields:
-        The temporary file.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial{ending}")
-    try:
-        yield temporary
-        temporary.replace(path)
-    finally:
-        with suppress(FileNotFoundError):
-            temporary.unlink()

@@ -21,8 +21,8 @@ from cmg_mj.inputs.bundled import folder
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.results.files import whole_file
 from cmg_mj.results.result import Driver, Result
-from cmg_mj.results.trajectory import whole_file
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.differences import differences
 from cmg_mj.scenario.disturbances import Push

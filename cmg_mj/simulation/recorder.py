@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,28 +12,12 @@ from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References
 from cmg_mj.results.metrics import Metrics
+from cmg_mj.results.tick_block import TickBlock
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.simulation.physics import Joints
 
 TICKS_A_PIECE = 256
 """So many ticks wait until they are made into columns together, which is much cheaper than one by one."""
-
-
-class TickBlock(NamedTuple):
-    """Ticks as columns, (n_ticks, n_worlds) each."""
-
-    x1: np.ndarray
-    x2: np.ndarray
-    x3: np.ndarray
-    y1: np.ndarray
-    fog: np.ndarray
-    u: np.ndarray
-    estimates: list[dict[str, np.ndarray]]
-    """Of the observer in the loop and each open-loop observer, signal by signal."""
-    columns: list[np.ndarray]
-    """The trajectory's after its time, in its order."""
-    ended: np.ndarray | None
-    """Which worlds have ended; None for one world."""
 
 
 class TickRecorder:
@@ -99,12 +82,10 @@ class TickRecorder:
             return
         piece = self._piece(self._waiting)
         self._waiting = []
-        x1, x2, x3, y1, fog, u, estimates, columns, ended = piece
-        self._metrics.update(x1, x2, x3, u, fog, estimates, self._references.rates(x2), y1)
+        self._metrics.update(piece, self._references.rates(piece.x2))
         if self._keep:
-            if ended is not None:
-                columns = [np.where(ended, np.nan, column) for column in columns]
-            self._pieces.append(columns)
+            columns, ended = piece.columns, piece.ended
+            self._pieces.append(columns if ended is None else [np.where(ended, np.nan, column) for column in columns])
 
     def _piece(self, waiting: Sequence[tuple]) -> TickBlock:
         qs, vs, ticks, torques, runnings = zip(*waiting, strict=True)

@@ -18,8 +18,8 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import RATES, References
 from cmg_mj.results.error_bounds import Floors
 from cmg_mj.results.metrics import Metrics
-from cmg_mj.results.multi_axis_summary import combine_axes
 from cmg_mj.results.result import Driver, Outcome, Result
+from cmg_mj.results.summary_keys import combine_axes
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.sensors.timing import whole_steps

@@ -1,4 +1,4 @@
-"""A run shown in a viewer while it goes on, at real time or as fast as is wanted."""
+"""A run shown in a viewer while it runs, in real time or as fast as is wanted."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
     from cmg_mj.visualization.recording.streaming import StreamHeader
 
 PIECES_HZ = 20.0
-"""So often a viewer is given what there is: the eye takes it for motion."""
+"""The viewer gets new ticks so often: the eye takes it for motion."""
 TOO_LATE_S = 0.25
-"""A run that is so far behind its clock, as after Ctrl-Z, does not hurry to make up for it."""
+"""A run this far behind its clock, as after Ctrl-Z, does not hurry to catch up."""
 
 
 class RealTimeClock:
     """Holds a run to a clock.
 
     Args:
-        factor: Simulated seconds in one of the clock; inf: as fast as it goes.
-        clock: Says how late it is [s].
-        sleep: Waits so long [s].
+        factor: Simulated seconds per second of the clock; inf: as fast as the run goes.
+        clock: Returns the time [s].
+        sleep: Waits for so long [s].
     """
 
     def __init__(
@@ -43,11 +43,11 @@ class RealTimeClock:
         self._start = clock()
 
     def start(self) -> None:
-        """Simulated time is zero now."""
+        """Take now for simulated time zero."""
         self._start = self._clock()
 
     def wait(self, simulated_s: float) -> None:
-        """Wait until it is so late."""
+        """Wait until the clock has reached a simulated time."""
         if math.isinf(self.factor):
             return
         ahead = self._start + simulated_s / self.factor - self._clock()
@@ -58,15 +58,15 @@ class RealTimeClock:
 
 
 def shown_before(experiment: Experiment, driver: Driver = "native", world: int = 0) -> StreamHeader:
-    """What a viewer is told of a run before its first tick."""
+    """Collect what a viewer needs before a run's first tick."""
     from cmg_mj.visualization.recording.streaming import BranchSpec, StreamHeader
 
     scenario = experiment.scenario
     several = len(experiment.parts) > 1
     branches = []
-    for own in experiment.parts:
-        bias = math.degrees(own.plant.apparent_bias(own.scenario.sensors.accelerometer))
-        axis = own.plant.axis.name if several else None
+    for part in experiment.parts:
+        bias = math.degrees(part.plant.apparent_bias(part.scenario.sensors.accelerometer))
+        axis = part.plant.axis.name if several else None
         branches.append(BranchSpec(axis or scenario.observer.kind, bias, axis))
     return StreamHeader(
         branches,
@@ -81,16 +81,16 @@ def shown_before(experiment: Experiment, driver: Driver = "native", world: int =
 
 
 class LiveRun:
-    """One run, streamed to a viewer while it goes on; what it computes is the same as without one.
+    """One run, streamed to a viewer while it runs. Streaming changes no number.
 
     Use it as a context manager around the run, which takes its `options`, and the writing of the files.
 
     Args:
-        experiment: What is run.
-        url: Of a viewer that listens.
-        pace: How fast.
+        experiment: The experiment that runs.
+        url: Address of a viewer that listens.
+        pace: The clock that the run is held to.
         driver: Who calls the controller.
-        world: Which world.
+        world: Number of the world.
     """
 
     def __init__(
@@ -102,12 +102,12 @@ class LiveRun:
         self._pace = pace
         self._ticks = 0
         self._shown_at = -math.inf
-        self._rows: TickRecorder | MultiAxisRecorder | None = None
+        self._recorder: TickRecorder | MultiAxisRecorder | None = None
         self._view = ViewerStream(url, shown_before(experiment, driver, world))
 
     @property
     def lost(self) -> str:
-        """Why the viewer has not got all of it, in words; empty if it has."""
+        """The reason why the viewer has not got every tick, in words; empty if it has."""
         return self._view.lost
 
     def __enter__(self) -> LiveRun:
@@ -120,13 +120,13 @@ class LiveRun:
         self._view.__exit__(kind, error, traceback)
 
     def options(self, on_progress: Callable[[float], None] | None = None) -> SimulationOptions:
-        """What `Experiment.run` must be given.
+        """Make the options of `Experiment.run` that stream the run.
 
         Args:
-            on_progress: Called first after every tick; where it hears Ctrl-C, the run ends without waiting.
+            on_progress: Called first after every tick; if it raises KeyboardInterrupt, the run ends without waiting.
 
         Returns:
-            Options of `simulate`.
+            The options.
         """
 
         def tick(simulated_s: float) -> None:
@@ -140,17 +140,17 @@ class LiveRun:
 
         return {"on_start": self._begin, "on_progress": tick}
 
-    def _begin(self, rows: TickRecorder | MultiAxisRecorder) -> None:
-        self._rows = rows
-        self._view.begin(rows.since(0))
+    def _begin(self, recorder: TickRecorder | MultiAxisRecorder) -> None:
+        self._recorder = recorder
+        self._view.begin(recorder.since(0))
         self._pace.start()
 
     def ended(self, result: Result) -> None:
-        """Show the end."""
+        """Show how the run ended."""
         self._view.end(to_record(self._experiment, result))
 
     def _show(self) -> None:
-        assert self._rows is not None
-        piece = self._rows.since(self._ticks)
-        self._ticks += len(piece)
-        self._view.add(piece)
+        assert self._recorder is not None
+        ticks = self._recorder.since(self._ticks)
+        self._ticks += len(ticks)
+        self._view.add(ticks)

@@ -1,4 +1,4 @@
-"""What a run and a comparison write."""
+"""The files that a run and a comparison write."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import json
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.per_world_table import save_table
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
-from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, finite
+from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
 from cmg_mj.results.terminal_tables import run_title
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.experiment import Experiment
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from cmg_mj.visualization.recording import Run
 
 
-def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[str, Any]:
-    """One world's summary as `--json` prints it."""
+def summary_of(experiment: Experiment, result: Result, world: int = 0) -> Summary:
+    """Assemble one world's summary as `--json` prints it."""
     outcome = result.outcomes[world]
     scenario = experiment.scenario
-    summary = {
+    summary: Summary = {
         "scenario": scenario.title,
         "observer": experiment.observer_title,
         "seed": scenario.seed,
-        **_which(result, world),
+        **_world_and_driver(result, world),
         "outcome": outcome.kind,
         "end_time_s": outcome.time_s,
         "fell": outcome.fell,
@@ -44,7 +44,7 @@ def summary_of(experiment: Experiment, result: Result, world: int = 0) -> dict[s
 
 
 def files_of_run(experiment: Experiment, *, plot: bool = False) -> list[str]:
-    """Names of what a run writes; of a rig of several axes a plot each."""
+    """List the files that a run writes; for a plant of several axes a plot each."""
     plots = [f"plot-{name}.png" for name in experiment.plant.axis_names] if len(experiment.axes) > 1 else ["plot.png"]
     return ["trajectory.parquet", "summary.json", "scenario.toml", "recording.rrd", *(plots if plot else [])]
 
@@ -54,13 +54,13 @@ def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *
     """Write scenario.toml, summary.json, trajectory.parquet and recording.rrd, all at once.
 
     Args:
-        folder: Where. What is there and was not written by cmg_mj stays.
-        experiment: What was run.
+        folder: Where to. Files there that cmg_mj has not written stay.
+        experiment: The experiment.
         result: One world's result, with its trajectory.
         plot: Write plot.png as well.
 
     Returns:
-        Where they are: the folder, or one in it (see `RunFolder.write`).
+        The folder, or one in it (see `RunFolder.write`).
 
     Raises:
         InputError: The folder, or a file, cannot be written.
@@ -72,15 +72,15 @@ def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *
         lambda path: _write_json(path, summary),
         lambda path: experiment.save(path, result.driver, _world(result)),
         lambda path: _record(path, [(experiment, result)]),
-        *(partial(_plot, run=own, experiment=experiment) for own in to_record(experiment, result)),
+        *(partial(_plot, run=run, experiment=experiment) for run in to_record(experiment, result)),
     )
-    with claimed(folder) as it:
+    with claimed(folder) as place:
         complete = result.outcomes[0].kind in ("done", "fell")
-        return it.write(dict(zip(files_of_run(experiment, plot=plot), writers, strict=False)), complete=complete)
+        return place.write(dict(zip(files_of_run(experiment, plot=plot), writers, strict=False)), complete=complete)
 
 
 def files_of_comparison(kinds: Sequence[str], *, plot: bool = False) -> list[str]:
-    """Names of what a comparison of these observers writes."""
+    """List the files that a comparison of these observers writes."""
     trajectories = [f"trajectory-{name}.parquet" for name in file_names(kinds)]
     others = ["summary.json", "worlds.parquet", "scenario.toml", "recording.rrd"]
     return [*trajectories, *others, *(["plot.png"] if plot else [])]
@@ -98,14 +98,14 @@ def save_comparison(
     """Write summary.json, worlds.parquet, scenario.toml, and of world 0 a trajectory an observer and one recording.
 
     Args:
-        folder: Where. What is there and was not written by cmg_mj stays.
-        experiment: The one whose scenario runs to the same comparison: `comparison.rerunnable`.
-        compared: What was run.
+        folder: Where to. Files there that cmg_mj has not written stay.
+        experiment: The experiment whose scenario runs to the same comparison: `comparison.rerunnable`.
+        compared: The observers with their runs.
         plot: Write plot.png as well: how every figure is distributed over the worlds.
         complete: Whether these are all observers that were to be compared.
 
     Returns:
-        Where they are: the folder, or one in it (see `RunFolder.write`).
+        The folder, or one in it (see `RunFolder.write`).
 
     Raises:
         InputError: The folder, or a file, cannot be written.
@@ -121,37 +121,37 @@ def save_comparison(
         lambda path: plot_worlds(path, compared, experiment.scenario.title),
     )
     names = files_of_comparison([entry.kind for entry in compared], plot=plot)
-    with claimed(folder) as it:
-        return it.write(dict(zip(names, writers, strict=False)), complete=complete)
+    with claimed(folder) as place:
+        return place.write(dict(zip(names, writers, strict=False)), complete=complete)
 
 
 def file_names(kinds: Sequence[str]) -> list[str]:
-    """Observers' names as parts of file names, no two alike: of a dotted path its class, or all of it."""
+    """Make observers' names into parts of file names, no two alike: a dotted path's class, or all of the path."""
     short = [file_name(kind) for kind in kinds]
     return [name if short.count(name) == 1 else kind.replace(":", ".") for name, kind in zip(short, kinds, strict=True)]
 
 
 def file_name(kind: str) -> str:
-    """An observer's name as a part of a file name: a dotted path's class."""
+    """Make an observer's name into a part of a file name: a dotted path's class."""
     return kind.rpartition(":")[2]
 
 
 def trajectory_with_metadata(experiment: Experiment, result: Result) -> Trajectory:
-    """The trajectory with what is needed to know later where it came from."""
+    """Add to the trajectory how it came about: its outcome, world, driver and scenario."""
     assert result.trajectory is not None
     outcome = {key: getattr(result.outcomes[0], key) for key in ("kind", "time_s", "reason")}
-    metadata = {"outcome": outcome, **_which(result), "scenario": experiment.resolved()}
+    metadata = {"outcome": outcome, **_world_and_driver(result), "scenario": experiment.resolved()}
     return dataclasses.replace(result.trajectory, metadata=metadata)
 
 
 def _world(result: Result, at: int = 0) -> int:
-    """The number of a world: of a single run, or of that at a place."""
+    """Return the number of a world, by its place in the result."""
     return result.worlds[at] if result.worlds else at
 
 
-def _which(result: Result, at: int = 0) -> dict[str, Any]:
-    """What changes the numbers and stands in no scenario: who drove, if it was not the host, and any world but 0."""
-    driver = {"driver": result.driver} if result.driver == "board" else {}
+def _world_and_driver(result: Result, at: int = 0) -> Summary:
+    """Name what changes the numbers and stands in no scenario: the driver, if it is the board, and any world but 0."""
+    driver: Summary = {"driver": result.driver} if result.driver == "board" else {}
     world = _world(result, at)
     return driver | ({"world": world} if world else {})
 
@@ -159,11 +159,11 @@ def _which(result: Result, at: int = 0) -> dict[str, Any]:
 def _plot(path: Path, run: Run, experiment: Experiment) -> None:
     from cmg_mj.visualization.plots.run_plot import plot_run
 
-    about = f", {run.axis}" if run.axis else ""
+    axis = f", {run.axis}" if run.axis else ""
     plot_run(
         path,
         run.trajectory,
-        run_title(run.summary) + about,
+        run_title(run.summary) + axis,
         run.summary,
         settle_band_deg=experiment.scenario.metrics.settle_band_deg,
         rate_limit_rad_s=experiment.law.rate_limit,
@@ -171,12 +171,12 @@ def _plot(path: Path, run: Run, experiment: Experiment) -> None:
 
 
 def to_record(experiment: Experiment, result: Result, *, compared: bool = False) -> list[Run]:
-    """One world's run as recordings take it: of several axes a run each, by the axis' name.
+    """Prepare one world's run for a recording: of several axes a run each, by the axis' name.
 
     Args:
-        experiment: What was run.
-        result: Its result.
-        compared: Whether there are others beside it: it then has its observer in its name.
+        experiment: The experiment.
+        result: The experiment's result.
+        compared: Whether the recording has several observers: the run's name then begins with its observer.
 
     Returns:
         The runs.
@@ -189,8 +189,10 @@ def to_record(experiment: Experiment, result: Result, *, compared: bool = False)
         return [Run(observer, result.trajectory, summary, outcome)]
     common = {key: value for key, value in summary.items() if key not in (AXES, *OPEN_LOOP_SECTIONS)}
     return [
-        Run(f"{observer}, {axis}" if compared else axis, result.trajectory.along(axis), common | own, outcome, axis)
-        for axis, own in summary[AXES].items()
+        Run(
+            f"{observer}, {axis}" if compared else axis, result.trajectory.along(axis), {**common, **own}, outcome, axis
+        )
+        for axis, own in section(summary, AXES).items()
     ]
 
 
@@ -217,5 +219,5 @@ def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
     )
 
 
-def _write_json(path: Path, value: Any) -> None:
+def _write_json(path: Path, value: Summary | list[Summary]) -> None:
     write_text(path, json.dumps(value, indent=2))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 from functools import cache
+from typing import Any
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Result
@@ -49,7 +50,7 @@ def ride_along(seed: int, worlds: int) -> Result:
 
 def closed_loop_figures(result: Result, first: int = 0) -> dict[str, float]:
     """Figures of a group of GROUP worlds."""
-    group = result.summaries[first : first + GROUP]
+    group: list[dict[str, Any]] = result.summaries[first : first + GROUP]
     has_bias = "bias_rms_error_deg" in group[0]
     return {
         **({"bias_rms_error_deg": statistics.fmean(s["bias_rms_error_deg"] for s in group)} if has_bias else {}),
@@ -64,7 +65,7 @@ def closed_loop_figures(result: Result, first: int = 0) -> dict[str, float]:
 
 def ride_along_figures(result: Result, first: int = 0) -> dict[str, float]:
     """Each observer's velocity RMS error over a group of GROUP worlds, in the whole run and in the push window."""
-    group = result.summaries[first : first + GROUP]
+    group: list[dict[str, Any]] = result.summaries[first : first + GROUP]
     figures = {}
     for name in OBSERVERS:
         parts = [s["open_loop_observers"][name] if name in s.get("open_loop_observers", {}) else s for s in group]

@@ -6,11 +6,12 @@ import json
 import math
 import statistics
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.results.per_world_table import open_loop_figures
+from cmg_mj.results.summary_keys import open_loop_figures
 from tests.acceptance.cases import (
     FALLING,
     GROUP,
@@ -88,17 +89,17 @@ def test_a_cheap_gyro_is_far_better() -> None:
                 assert (4.0 < ratio < 10.0) if name == "gyro_free" else ratio > 10.0, (name, key, ratio)
 
 
-Figures = list[dict[str, float]]
+Figures = list[dict[str, Any]]
 
 
 def loop(observer: str, reference: str | None = None) -> Figures:
     """World by world, of an observer in the loop or of a reference on its motion."""
-    summaries = closed_loop(observer, (), SEED, GROUP).summaries
+    summaries: list[dict[str, Any]] = closed_loop(observer, (), SEED, GROUP).summaries
     return [s["references"][reference] for s in summaries] if reference else summaries
 
 
 def riding(name: str) -> Figures:
-    """World by world, of what rides along on the gyro's loop."""
+    """World by world, of an open-loop observer on the gyro's loop."""
     return [{**s, **open_loop_figures(s).get(name, {})} for s in ride_along(SEED, GROUP).summaries]
 
 

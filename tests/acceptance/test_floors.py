@@ -7,7 +7,7 @@ import pytest
 
 from cmg_mj.observers import OBSERVERS, observer_class
 from cmg_mj.observers.protocol import needs
-from cmg_mj.results.per_world_table import open_loop_figures
+from cmg_mj.results.summary_keys import open_loop_figures
 from tests.acceptance.cases import GROUP, closed_loop, ride_along
 
 SEED = 7

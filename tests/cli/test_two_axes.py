@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -128,7 +129,7 @@ def test_replay_of_several_axes_is_refused_for_what_it_is(tmp_path: Path) -> Non
 
 
 def test_the_rigs_figures_are_the_worst_of_its_axes() -> None:
-    summary = two_axes().run().summaries[0]
+    summary: dict[str, Any] = two_axes().run().summaries[0]
     axes = list(summary[AXES].values())
     for key, about in KEYS.items():
         if key in summary and None not in (values := [axis[key] for axis in axes]):
@@ -170,7 +171,7 @@ def test_the_command_prints_each_axis(tmp_path: Path, monkeypatch: pytest.Monkey
     said = cmg_mj("run", "two_axes", *sets, "--out", "it")
     assert said.status == 0, said
     assert "roll" in said.out
-    assert "Riding along, pitch" in said.out
+    assert "Open loop, pitch" in said.out
     summary = json.loads((tmp_path / "it" / "summary.json").read_text())
     assert list(summary["axes"]) == ["roll", "pitch"]
 

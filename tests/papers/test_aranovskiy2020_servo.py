@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -49,7 +50,8 @@ def test_a_servo_that_is_noticed_is_not_reproduced(servos: servo.Servos) -> None
     """In the tilt alone, in the estimate alone, or in what the gimbal does."""
     small = servos.velocity[servo.RESOLUTION]
     for key in ("tilt_rms_deg", "velocity_rms_error_rad_s"):
-        summaries = [summary | {key: 1.2 * summary[key]} for summary in small.summaries]
+        figures: list[dict[str, Any]] = small.summaries
+        summaries = [summary | {key: 1.2 * summary[key]} for summary in figures]
         swapped = dict(servos.velocity) | {servo.RESOLUTION: dataclasses.replace(small, summaries=summaries)}
         assert servo.servo_claim(servos._replace(velocity=swapped)).verdict == "not reproduced"
     loose = dataclasses.replace(small, trajectory=servos.velocity[servo.DEADBANDS[-1]].trajectory)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.results.metrics import Metrics
+from cmg_mj.results.tick_block import TickBlock
 from cmg_mj.scenario.disturbances import Push, push_windows
 from cmg_mj.scenario.schema import MetricsSettings
 
@@ -47,10 +48,15 @@ def estimates(rates: Iterable[np.ndarray]) -> list[dict[str, np.ndarray]]:
     return [{"x2_rad_s": rate} for rate in rates]
 
 
-def summary(of: Metrics, n: int = len(T), fell: bool = False, rates: tuple = (0.0,), **signals: Any) -> dict[str, Any]:
-    given: dict[str, Any] = {name: rows(signals.get(name, 0.0), n) for name in SIGNALS}
-    of.update(**given, estimates=[{"x2_rad_s": rows(rate, n)} for rate in rates])
-    return of.summary(0, stood=not fell)
+def block(estimates: list[dict[str, np.ndarray]], **signals: np.ndarray) -> TickBlock:
+    """Ticks of which nothing but these signals is known."""
+    return TickBlock(**signals, y1=signals["x1"], estimates=estimates, columns=[], ended=None)
+
+
+def summary(run: Metrics, n: int = len(T), fell: bool = False, rates: tuple = (0.0,), **signals: Any) -> dict[str, Any]:
+    known: dict[str, Any] = {name: rows(signals.get(name, 0.0), n) for name in SIGNALS}
+    run.update(block(estimates(rows(rate, n) for rate in rates), **known))
+    return run.summary(0, stood=not fell)
 
 
 def settle_time(x1: np.ndarray, push_end_s: float = 0.0, fell: bool = False, **settings: Any) -> float | None:
@@ -63,7 +69,7 @@ def settle_time(x1: np.ndarray, push_end_s: float = 0.0, fell: bool = False, **s
 def test_rms_values_of_sines() -> None:
     """A sine over whole periods has the amplitude over sqrt(2)."""
     w = 2.0 * math.pi / 2.0  # ten whole periods
-    found = summary(
+    figures = summary(
         metrics(),
         x1=0.3 * DEG * np.sin(w * T),
         x2=0.5 * np.cos(w * T),
@@ -72,17 +78,17 @@ def test_rms_values_of_sines() -> None:
         fog=0.5 * np.cos(w * T) + 0.03,
         rates=(0.5 * np.cos(w * T) + 0.1 * np.sin(w * T),),
     )
-    assert found["tilt_rms_deg"] == pytest.approx(0.3 / math.sqrt(2.0), rel=1e-12)
-    assert found["command_rms_rad_s"] == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-12)
-    assert found["velocity_rms_error_rad_s"] == pytest.approx(0.1 / math.sqrt(2.0), rel=1e-12)
-    assert found["velocity_rms_error_fog_rad_s"] == pytest.approx(math.sqrt(0.1**2 / 2.0 + 0.03**2), rel=1e-12)
-    assert found["gimbal_peak_deg"] == pytest.approx(math.degrees(0.2), rel=1e-4)
-    assert found["command_saturated_fraction"] == 0.0
+    assert figures["tilt_rms_deg"] == pytest.approx(0.3 / math.sqrt(2.0), rel=1e-12)
+    assert figures["command_rms_rad_s"] == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-12)
+    assert figures["velocity_rms_error_rad_s"] == pytest.approx(0.1 / math.sqrt(2.0), rel=1e-12)
+    assert figures["velocity_rms_error_fog_rad_s"] == pytest.approx(math.sqrt(0.1**2 / 2.0 + 0.03**2), rel=1e-12)
+    assert figures["gimbal_peak_deg"] == pytest.approx(math.degrees(0.2), rel=1e-4)
+    assert figures["command_saturated_fraction"] == 0.0
 
 
 def test_offsets_count_as_they_are() -> None:
     """Root mean square, not standard deviation."""
-    found = summary(metrics(), x1=-2.0 * DEG, x2=0.25, u=-1.5, fog=0.2, x3=-0.4, rates=(1.0,))
+    figures = summary(metrics(), x1=-2.0 * DEG, x2=0.25, u=-1.5, fog=0.2, x3=-0.4, rates=(1.0,))
     expected = {
         "tilt_rms_deg": 2.0,
         "velocity_rms_error_rad_s": 0.75,
@@ -90,7 +96,7 @@ def test_offsets_count_as_they_are() -> None:
         "command_rms_rad_s": 1.5,
         "gimbal_peak_deg": math.degrees(0.4),
     }
-    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-12)
+    assert {name: figures[name] for name in expected} == pytest.approx(expected, rel=1e-12)
 
 
 def test_saturated_is_at_the_limit_either_way() -> None:
@@ -99,12 +105,12 @@ def test_saturated_is_at_the_limit_either_way() -> None:
 
 
 def test_each_observer_has_its_own_errors() -> None:
-    of = metrics(observers=("mine", "hers", "theirs"))
-    found = summary(of, x2=1.0, fog=1.1, rates=(1.2, 0.6, 1.0))
-    assert found["velocity_rms_error_rad_s"] == pytest.approx(0.2)
+    run = metrics(observers=("mine", "hers", "theirs"))
+    figures = summary(run, x2=1.0, fog=1.1, rates=(1.2, 0.6, 1.0))
+    assert figures["velocity_rms_error_rad_s"] == pytest.approx(0.2)
     errors = {
         name: (of_one["velocity_rms_error_rad_s"], of_one["velocity_rms_error_fog_rad_s"])
-        for name, of_one in found["open_loop_observers"].items()
+        for name, of_one in figures["open_loop_observers"].items()
     }
     assert list(errors) == ["hers", "theirs"]
     assert errors["hers"] == pytest.approx((0.4, 0.5))
@@ -117,11 +123,11 @@ def test_each_observer_has_its_own_errors() -> None:
 
 def test_fit_is_one_less_error_by_motion() -> None:
     w = math.pi  # ten whole periods
-    found = summary(metrics(observers=("mine", "hers")), x2=0.5 * np.cos(w * T), rates=(0.4 * np.cos(w * T), 0.0))
-    assert found["velocity_rms_rad_s"] == pytest.approx(0.5 / math.sqrt(2.0), rel=1e-12)
-    assert found["velocity_fit"] == pytest.approx(0.8, rel=1e-12)
-    assert found["open_loop_observers"]["hers"]["velocity_fit"] == 0.0  # an estimate of zero
-    assert found["open_loop_observers"]["hers"]["velocity_rms_rad_s"] == found["velocity_rms_rad_s"]
+    figures = summary(metrics(observers=("mine", "hers")), x2=0.5 * np.cos(w * T), rates=(0.4 * np.cos(w * T), 0.0))
+    assert figures["velocity_rms_rad_s"] == pytest.approx(0.5 / math.sqrt(2.0), rel=1e-12)
+    assert figures["velocity_fit"] == pytest.approx(0.8, rel=1e-12)
+    assert figures["open_loop_observers"]["hers"]["velocity_fit"] == 0.0  # an estimate of zero
+    assert figures["open_loop_observers"]["hers"]["velocity_rms_rad_s"] == figures["velocity_rms_rad_s"]
 
 
 def test_fit_is_less_than_zero_where_zero_would_do_better() -> None:
@@ -129,16 +135,16 @@ def test_fit_is_less_than_zero_where_zero_would_do_better() -> None:
 
 
 def test_without_a_motion_there_is_no_fit() -> None:
-    found = summary(metrics(), rates=(0.1,))
-    assert (found["velocity_rms_rad_s"], found["velocity_fit"]) == (0.0, None)
+    figures = summary(metrics(), rates=(0.1,))
+    assert (figures["velocity_rms_rad_s"], figures["velocity_fit"]) == (0.0, None)
 
 
 def push_error(pushes: tuple, error: np.ndarray, n: int = len(T)) -> float | None:
     """Error over the push windows of an estimate that is off by this, with a motion that must not matter."""
     x2 = np.sin(T)[:n]
-    found = summary(metrics(pushes=pushes, observers=("a", "b")), n, x2=x2, rates=(x2 + error[:n], x2))
-    assert found["open_loop_observers"]["b"]["velocity_rms_error_push_rad_s"] in (0.0, None)
-    return found["velocity_rms_error_push_rad_s"]
+    figures = summary(metrics(pushes=pushes, observers=("a", "b")), n, x2=x2, rates=(x2 + error[:n], x2))
+    assert figures["open_loop_observers"]["b"]["velocity_rms_error_push_rad_s"] in (0.0, None)
+    return figures["velocity_rms_error_push_rad_s"]
 
 
 def test_the_push_window_is_from_its_start_to_a_second_after_its_end() -> None:
@@ -174,14 +180,14 @@ def test_a_run_that_ends_within_the_window_is_judged_until_there() -> None:
 
 
 def test_references_are_judged_as_open_loop_observers_are() -> None:
-    of = metrics(references=("zero",), pushes=(Push(2.0, 0.1),))
+    run = metrics(references=("zero",), pushes=(Push(2.0, 0.1),))
     x2 = rows(np.sin(T), len(T))
-    of.update(**still(len(T)) | {"x2": x2}, estimates=estimates([x2]), references={"zero": 0.0 * x2})
-    found = of.summary(0, stood=True)
-    assert list(found["references"]) == ["zero"]
-    assert found["references"]["zero"]["velocity_rms_error_rad_s"] == found["velocity_rms_rad_s"]
-    assert found["references"]["zero"]["velocity_fit"] == 0.0
-    assert found["references"]["zero"]["velocity_rms_error_push_rad_s"] == pytest.approx(
+    run.update(block(estimates([x2]), **still(len(T)) | {"x2": x2}), {"zero": 0.0 * x2})
+    figures: dict[str, Any] = run.summary(0, stood=True)
+    assert list(figures["references"]) == ["zero"]
+    assert figures["references"]["zero"]["velocity_rms_error_rad_s"] == figures["velocity_rms_rad_s"]
+    assert figures["references"]["zero"]["velocity_fit"] == 0.0
+    assert figures["references"]["zero"]["velocity_rms_error_push_rad_s"] == pytest.approx(
         math.sqrt(np.mean(np.sin(T[200:310]) ** 2)), rel=1e-12
     )
 
@@ -263,9 +269,9 @@ def test_pieces_add_up_to_the_whole(cuts: tuple[int, ...]) -> None:
     signals["x1"][250:, 1] = np.nan
     rates = [0.9 * signals["x2"], 1.2 * signals["fog"]]
     whole, pieced = (metrics(n_worlds, 1.0, ("mine", "hers")) for _ in range(2))
-    whole.update(**signals, estimates=estimates(rates))
+    whole.update(block(estimates(rates), **signals))
     for part in np.split(np.arange(n), cuts):
-        pieced.update(**{k: v[part] for k, v in signals.items()}, estimates=estimates(rate[part] for rate in rates))
+        pieced.update(block(estimates(rate[part] for rate in rates), **{k: v[part] for k, v in signals.items()}))
     for world in range(n_worlds):
         assert_same(pieced.summary(world, False), whole.summary(world, False))
 
@@ -276,12 +282,12 @@ def test_rows_after_a_worlds_end_do_not_count() -> None:
     signals = restless(n, 2)
     rate = 0.9 * signals["x2"]
     alone = metrics()
-    alone.update(**{k: v[:end, 1:] for k, v in signals.items()}, estimates=estimates([rate[:end, 1:]]))
+    alone.update(block(estimates([rate[:end, 1:]]), **{k: v[:end, 1:] for k, v in signals.items()}))
     batch = metrics(2)
     for name in SIGNALS:
         signals[name][end:, 1] = np.nan
     rate[end:, 1] = np.nan
-    batch.update(**signals, estimates=estimates([rate]))
+    batch.update(block(estimates([rate]), **signals))
     for fell in (True, False):
         assert_same(batch.summary(1, fell), alone.summary(0, fell))
 
@@ -289,11 +295,11 @@ def test_rows_after_a_worlds_end_do_not_count() -> None:
 def test_worlds_do_not_mix() -> None:
     signals = restless(300, 4)
     batch = metrics(4)
-    batch.update(**signals, estimates=estimates([signals["fog"]]))
+    batch.update(block(estimates([signals["fog"]]), **signals))
     for world in range(4):
         alone = metrics()
         one = {name: values[:, [world]] for name, values in signals.items()}
-        alone.update(**one, estimates=estimates([one["fog"]]))
+        alone.update(block(estimates([one["fog"]]), **one))
         assert_same(batch.summary(world, False), alone.summary(0, False))
 
 
@@ -303,34 +309,34 @@ def test_a_run_without_a_tick_has_no_numbers() -> None:
 
 def test_an_estimate_that_is_not_finite_gives_none_not_nan() -> None:
     """JSON knows no NaN. The other numbers stay."""
-    found = summary(metrics(), x1=DEG, rates=(np.where(T > 1.0, np.inf, 0.0),))
-    assert found["velocity_rms_error_rad_s"] is None
-    assert found["tilt_rms_deg"] == pytest.approx(1.0)
+    figures = summary(metrics(), x1=DEG, rates=(np.where(T > 1.0, np.inf, 0.0),))
+    assert figures["velocity_rms_error_rad_s"] is None
+    assert figures["tilt_rms_deg"] == pytest.approx(1.0)
 
 
 # --- the bias estimate ---------------------------------------------------------------------------------------
 
 
 def test_bias_is_judged_from_its_time_on() -> None:
-    """Far off at first, then 0.3 degrees above and below 1.1 in turn, with 1.0 to be found: RMS of 0.4 and -0.2."""
-    of = Metrics(("adaptive", "other"), 1, DT, (), 4.7, MetricsSettings(bias_from_s=5.0), {"bias_rad": [DEG]})
+    """Far off at first, then 0.3 degrees above and below 1.1 in turn, with 1.0 to be figures: RMS of 0.4 and -0.2."""
+    run = Metrics(("adaptive", "other"), 1, DT, (), 4.7, MetricsSettings(bias_from_s=5.0), {"bias_rad": [DEG]})
     bias = np.where(T < 5.0 - DT / 2.0, 90.0 * DEG, (1.1 + 0.3 * (-1.0) ** np.arange(len(T))) * DEG)
     for part in np.array_split(np.arange(len(T)), 7):
         n = len(part)
-        rate, found = {"x2_rad_s": rows(0.0, n)}, {"bias_rad": rows(bias[part], n)}
-        of.update(**still(n), estimates=[rate | found, rate])
-    found = of.summary(0, stood=True)
-    assert found["bias_deg"] == pytest.approx(1.0)
-    assert found["bias_estimate_deg"] == pytest.approx(1.1, rel=1e-12)
-    assert found["bias_rms_error_deg"] == pytest.approx(math.sqrt((0.4**2 + 0.2**2) / 2.0), rel=1e-12)
-    assert "bias_deg" not in found["open_loop_observers"]["other"]
+        rate, figures = {"x2_rad_s": rows(0.0, n)}, {"bias_rad": rows(bias[part], n)}
+        run.update(block([rate | figures, rate], **still(n)))
+    figures: dict[str, Any] = run.summary(0, stood=True)
+    assert figures["bias_deg"] == pytest.approx(1.0)
+    assert figures["bias_estimate_deg"] == pytest.approx(1.1, rel=1e-12)
+    assert figures["bias_rms_error_deg"] == pytest.approx(math.sqrt((0.4**2 + 0.2**2) / 2.0), rel=1e-12)
+    assert "bias_deg" not in figures["open_loop_observers"]["other"]
 
 
 def test_a_run_that_ends_before_has_no_bias_figures() -> None:
-    of = metrics(bias_from_s=5.0)
+    run = metrics(bias_from_s=5.0)
     estimate = {"x2_rad_s": rows(0.0, 100), "bias_rad": rows(0.1, 100)}
-    of.update(**still(100), estimates=[estimate])
-    found = of.summary(0, stood=True)
-    assert found["bias_estimate_deg"] is None
-    assert found["bias_rms_error_deg"] is None
-    assert found["bias_deg"] == 0.0
+    run.update(block([estimate], **still(100)))
+    figures: dict[str, Any] = run.summary(0, stood=True)
+    assert figures["bias_estimate_deg"] is None
+    assert figures["bias_rms_error_deg"] is None
+    assert figures["bias_deg"] == 0.0

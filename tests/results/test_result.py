@@ -17,6 +17,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Result
+from cmg_mj.results.summary_keys import open_loop_figures
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
@@ -48,7 +49,7 @@ def test_worlds_vary_and_those_that_fell_do_not_count() -> None:
     assert values[0] == found.summaries[0][ERROR]
     assert found.mean(ERROR) == pytest.approx((values[0] + values[1]) / 2.0)
     open_loop_observer = found.values(ERROR, "linear")
-    assert open_loop_observer[1] == found.summaries[1]["open_loop_observers"]["linear"][ERROR]
+    assert open_loop_observer[1] == open_loop_figures(found.summaries[1])["linear"][ERROR]
 
 
 def test_the_table_has_a_row_per_observer_and_world() -> None:
@@ -63,7 +64,7 @@ def test_the_table_has_a_row_per_observer_and_world() -> None:
         summary = result().summaries[world]
         assert {key: row[key] for key in summary if key in row} == {k: v for k, v in summary.items() if k in row}
         assert set(summary) - set(row) == {"open_loop_observers", "references"}
-    assert table[ERROR].to_pylist()[4:8] == [s["open_loop_observers"]["linear"][ERROR] for s in result().summaries]
+    assert table[ERROR].to_pylist()[4:8] == [open_loop_figures(s)["linear"][ERROR] for s in result().summaries]
     assert set(table["tilt_rms_deg"].to_pylist()[4:]) == {None}  # the loop's alone
 
 

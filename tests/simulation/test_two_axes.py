@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.results.result import Result
+from cmg_mj.results.summary_keys import section
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.recoverable_states import ceiling
@@ -22,8 +23,8 @@ def two_axes(*settings: str) -> Experiment:
 
 def errors(result: Result, axis: str) -> np.ndarray:
     """An axis' velocity RMS error, (n_worlds,)."""
-    found = [summary.get("axes", {}).get(axis, summary) for summary in result.summaries]
-    return np.array([figures["velocity_rms_error_rad_s"] for figures in found])
+    figures = [section(summary, "axes").get(axis, summary)["velocity_rms_error_rad_s"] for summary in result.summaries]
+    return np.array(figures, dtype=float)
 
 
 @pytest.mark.parametrize("rate", RATES)

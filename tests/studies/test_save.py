@@ -198,11 +198,12 @@ def test_a_comparison_of_many_worlds() -> None:
     """Means over the worlds that stood, and how they spread."""
     experiment = prepare(load_scenario(write("duration_s = 0.5")))
     (entry,) = comparison.compare([experiment], 3)
-    singles = [experiment.run(world=world).summaries[0] for world in range(3)]
+    singles: list[dict[str, Any]] = [experiment.run(world=world).summaries[0] for world in range(3)]
     for key in ("velocity_rms_error_rad_s", "tilt_rms_deg", "settle_time_s"):
         assert entry.summary[key] == pytest.approx(sum(single[key] for single in singles) / 3, rel=1e-12)
-    assert entry.summary["velocity_rms_error_std_rad_s"] > 0.0
-    assert (entry.summary["worlds"], entry.summary["fell_fraction"], entry.summary["settled_fraction"]) == (3, 0.0, 1.0)
+    summary: dict[str, Any] = entry.summary
+    assert summary["velocity_rms_error_std_rad_s"] > 0.0
+    assert (summary["worlds"], summary["fell_fraction"], summary["settled_fraction"]) == (3, 0.0, 1.0)
 
 
 def test_a_comparison_reports_progress_from_nothing_to_all() -> None:

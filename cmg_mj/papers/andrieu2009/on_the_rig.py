@@ -13,7 +13,7 @@ from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.result import Result
-from cmg_mj.results.summary_keys import written
+from cmg_mj.results.summary_keys import format_figure
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
 from cmg_mj.simulation.experiment import Experiment, prepare
@@ -67,7 +67,7 @@ def compared(found: dict[str, Result]) -> Claim:
         return f"{label} {plus_minus(difference, signed=True)} ({word})"
 
     def means(key: str) -> str:
-        return "; ".join(f"{label} {written(key, result.mean(key))}" for label, result in found.items())
+        return "; ".join(f"{label} {format_figure(key, result.mean(key))}" for label, result in found.items())
 
     setup = (
         "The scenario push_recovery, e = 0.5 deg, default noise; parameters tuned on the gyro's "

@@ -12,7 +12,7 @@ from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import listed_and
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.result import Result
-from cmg_mj.results.summary_keys import KEYS, written
+from cmg_mj.results.summary_keys import KEYS, format_figure
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 Numbers = Mapping[str, np.ndarray]
@@ -132,7 +132,7 @@ def _in_words(measure: Measured) -> str:
     parts = []
     for angles, numbers in measure.numbers.items():
         means = [known_interval(numbers[name]) for name in ("homogeneous", "ltv", "linear")]
-        shown = ", ".join(written(measure.key, None if mean is None else mean.mean) for mean in means)
+        shown = ", ".join(format_figure(measure.key, None if mean is None else mean.mean) for mean in means)
         parts.append(f"{shown} with the law on {angles} angles, where the order {measure.orders[angles]}")
     label = KEYS[measure.key].heading
     return f"{label[0].upper()}{label[1:]}: {'; '.join(parts)}."

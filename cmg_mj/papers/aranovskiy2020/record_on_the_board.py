@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from cmg_mj.papers.aranovskiy2020.on_the_board import RECORDED, count
-from cmg_mj.results.trajectory import whole_file
+from cmg_mj.results.files import whole_file
 
 if __name__ == "__main__":
     with whole_file(RECORDED) as temporary:

@@ -10,7 +10,7 @@ from cmg_mj.papers.aranovskiy2020.paper import printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import listed_and
-from cmg_mj.results.summary_keys import written
+from cmg_mj.results.summary_keys import format_figure
 from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
@@ -227,7 +227,7 @@ def _conditions(found: Factorial, standing: Sequence[str]) -> str:
 
 
 def _error(fate: Fate) -> str:
-    return written("velocity_rms_error_rad_s", fate.error)
+    return format_figure("velocity_rms_error_rad_s", fate.error)
 
 
 def _picture(found: Factorial) -> Picture:

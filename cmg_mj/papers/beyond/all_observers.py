@@ -13,7 +13,7 @@ from cmg_mj.papers.beyond.push_recovery import ERROR
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.results import markdown
 from cmg_mj.results.intervals import Interval
-from cmg_mj.results.summary_keys import heading, written
+from cmg_mj.results.summary_keys import format_figure, heading
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED, WORLDS = 90_000, 100
@@ -120,7 +120,7 @@ def _mean(row: Row, key: str) -> str:
     if row[key] is None:
         return "-"
     half = Interval(row[key], row[f"{key}_low"], row[f"{key}_high"]).half
-    return f"{written(key, row[key])} +- {written(key, half)}"
+    return f"{format_figure(key, row[key])} +- {format_figure(key, half)}"
 
 
 def _trade_off(rows: Sequence[Row]) -> Picture:

@@ -8,7 +8,7 @@ from typing import Any
 from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.results.intervals import Interval, known_interval
-from cmg_mj.results.summary_keys import written
+from cmg_mj.results.summary_keys import format_figure
 
 SEED, WORLDS = 90_001, 100
 FRICTION_N_M = 0.05
@@ -62,7 +62,7 @@ def friction_claim(figures: dict[str, Any]) -> Claim:
     """
     smooth, rubbing, due = (figures[f"gain_{which}_friction_rad_s"] for which in (*WITH.values(), "due_to"))
     errors = (figures[f"with_friction_in_the_plant_{knows}_in_the_observer_rad_s"] for knows in WITH.values())
-    before, after = (written(ERROR, error) for error in errors)
+    before, after = (format_figure(ERROR, error) for error in errors)
     return Claim(
         place="Future work of both papers: friction in the observer",
         says="a friction model in the velocity estimator would reduce its modelling errors",

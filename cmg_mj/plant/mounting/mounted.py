@@ -13,7 +13,7 @@ import mujoco
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.includes import check_files
 from cmg_mj.plant.mjcf import check_rig
-from cmg_mj.results.trajectory import whole_file
+from cmg_mj.results.files import whole_file
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
 from cmg_mj.observers.protocol import BIAS, extra_signals
 from cmg_mj.plant.plant import Plant
+from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.result import Outcome, Result
-from cmg_mj.results.summary_keys import NESTED, finite
+from cmg_mj.results.summary_keys import NESTED, Summary, finite
 from cmg_mj.scenario.schema import CompareSettings, Scenario
 from cmg_mj.simulation.experiment import Experiment, load_scenario_plant, prepare
 
@@ -41,7 +41,7 @@ class ComparedObserver:
         return [outcome for outcome in self.result.outcomes if outcome.kind == "stopped"]
 
     @property
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> Summary:
         """Means over the worlds that stood to the end, by the names of a run's summary, and the share of falls."""
         result, scenario = self.result, self.experiment.scenario
         worlds = len(result.outcomes)
@@ -56,14 +56,14 @@ class ComparedObserver:
                 "stopped_fraction": len(self.stopped) / worlds,
                 "settled_fraction": sum(summary["settle_time_s"] is not None for summary in result.summaries) / worlds,
                 **{key: result.mean(key) for key in result.summaries[0] if key not in NESTED},
-                "velocity_rms_error_std_rad_s": spread_of(result.values("velocity_rms_error_rad_s")),
+                "velocity_rms_error_std_rad_s": standard_deviation(result.values("velocity_rms_error_rad_s")),
             }
         )
 
 
-def spread_of(values: np.ndarray) -> float | None:
-    """Standard deviation over the worlds that have a figure, (n_worlds,); None of fewer than two."""
-    known = values[np.isfinite(values)]
+def standard_deviation(values: np.ndarray) -> float | None:
+    """Compute the standard deviation over the worlds that have a figure, (n_worlds,); None of fewer than two."""
+    known = finite_values(values)
     return float(known.std(ddof=1)) if len(known) > 1 else None
 
 
@@ -88,10 +88,10 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
 
 
 def _untrimmed(scenario: Scenario, plant: Plant) -> Scenario:
-    """The same without trimming the integrator, if the observer does not estimate the bias that takes."""
+    """Turn the integrator's trim off where the observer does not estimate the bias that it takes."""
     controller, sensors = scenario.controller, scenario.sensors
-    given = 1.0 / controller.rate_hz, plant.reduced, plant.parameters.noise(sensors)
-    if not controller.bias_trim_s or BIAS in extra_signals(scenario.observer.make(*given)):
+    arguments = 1.0 / controller.rate_hz, plant.reduced, plant.parameters.noise(sensors)
+    if not controller.bias_trim_s or BIAS in extra_signals(scenario.observer.make(*arguments)):
         return scenario
     return scenario.model_copy(update={"controller": controller.model_copy(update={"bias_trim_s": 0.0})})
 
@@ -120,30 +120,30 @@ def compare(
         result = experiment.run_many(worlds, keep_trajectory=False, on_progress=report)
         if any(outcome.kind == "interrupted" for outcome in result.outcomes):
             break
-        example = experiment.run(on_progress=lambda time, report=report, end=duration: report(end))
-        if example.outcomes[0].kind == "interrupted":
+        world_0 = experiment.run(on_progress=lambda time, report=report, end=duration: report(end))
+        if world_0.outcomes[0].kind == "interrupted":
             break
-        compared.append(ComparedObserver(experiment, result, example))
+        compared.append(ComparedObserver(experiment, result, world_0))
     return compared
 
 
 def rerunnable(scenario: Scenario, experiments: Sequence[Experiment], worlds: int) -> Experiment:
-    """The experiment whose scenario, written out, runs to the same comparison again.
+    """Choose the experiment whose scenario, written out, runs to the same comparison again.
 
     Args:
-        scenario: What was to be compared.
-        experiments: Those of `prepare_comparison`.
+        scenario: The scenario that was to be compared.
+        experiments: The experiments of `prepare_comparison`.
         worlds: How many worlds.
 
     Returns:
-        That of the scenario's own observer, whose parameters count, if it is there, and one that keeps
-        `controller.bias_trim_s` otherwise; with the observers and the number of worlds in [compare].
+        The experiment of the scenario's own observer, whose parameters count, if it is there. Otherwise one that keeps
+        `controller.bias_trim_s`. With the observers and the number of worlds in [compare].
     """
-    own = [e for e in experiments if e.scenario.observer.kind == scenario.observer.kind]
+    same = [e for e in experiments if e.scenario.observer.kind == scenario.observer.kind]
     trimmed = [e for e in experiments if e.scenario.controller.bias_trim_s]
-    kept = (own or trimmed or list(experiments))[0]
+    choice = (same or trimmed or list(experiments))[0]
     settings = CompareSettings(observers=[e.scenario.observer.kind for e in experiments], worlds=worlds)
-    controller = (trimmed or [kept])[0].scenario.controller
+    controller = (trimmed or [choice])[0].scenario.controller
     return dataclasses.replace(
-        kept, scenario=kept.scenario.model_copy(update={"compare": settings, "controller": controller})
+        choice, scenario=choice.scenario.model_copy(update={"compare": settings, "controller": controller})
     )

@@ -1,17 +1,18 @@
-"""How every figure of a comparison is distributed over the worlds."""
+"""A plot of the distribution of every figure of a comparison over the worlds."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cmg_mj.results.files import whole_file
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import KEYS
-from cmg_mj.results.trajectory import whole_file
 from cmg_mj.studies.compare.comparison import ComparedObserver
 from cmg_mj.studies.compare.statistics import ComparisonRow, comparison_rows
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
@@ -19,22 +20,22 @@ from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import pyplot
 
 COLUMNS = 3
-"""Panels beside each other."""
+"""Panels in a row."""
 LOGARITHMIC = 10.0
 """Positive figures that differ by more than this factor are drawn on a logarithmic axis."""
 FAR_OUT = 3.0
-"""On other axes, what lies so many quartile ranges of the observers' means outside them is drawn at the edge."""
+"""On a linear axis, figures this many quartile ranges outside the observers' means are drawn at the edge."""
 
 
 def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) -> None:
     """Draw a panel a figure, with the observers on one axis: every world, the mean and its 95 % interval.
 
-    Worlds that did not stand to the end are crosses, at what the figure was until then; the mean is without them.
+    Worlds that did not stand to the end are crosses, at the figure until then; the mean is without them.
 
     Args:
         path: The PNG to write.
-        compared: What was run.
-        title: Of the scenario.
+        compared: The observers with their runs.
+        title: The scenario's title.
     """
     plt = pyplot()
     rows = comparison_rows(compared)
@@ -51,34 +52,34 @@ def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) ->
     first.set_yticks(range(len(rows)), [_label(row, names[row.name]) for row in rows])
     first.invert_yaxis()  # shared: the table's order in every panel
     worlds = len(rows[0].entry.result.outcomes)
-    said = f"{title or 'Comparison'}: {worlds} worlds an observer. "
-    said += "Lines: mean and its 95 % interval; arrows: beyond the axis."
+    heading = f"{title or 'Comparison'}: {worlds} worlds an observer. "
+    heading += "Lines: mean and its 95 % interval; arrows: beyond the axis."
     if not all(row.entry.result.stood.all() for row in rows):
-        said += " Crosses: worlds that did not stand to the end, until then."
-    figure.suptitle(said, x=0.01, ha="left", parse_math=False)
+        heading += " Crosses: worlds that did not stand to the end, until then."
+    figure.suptitle(heading, x=0.01, ha="left", parse_math=False)
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=100, format="png")
     plt.close(figure)
 
 
 def _label(row: ComparisonRow, name: str) -> str:
-    """A row's name, and how many worlds did not stand."""
+    """Label a row with its name and the number of worlds that did not stand."""
     lost = int((~row.entry.result.stood).sum())
     return f"{name} ({lost} lost)" if lost and not row.reference else name
 
 
 class _Panel:
-    """One figure of every world.
+    """The panel of one figure, with every world of every row.
 
     Attributes:
-        any: Whether any world has it.
+        any: Whether any world has the figure.
     """
 
     def __init__(self, key: str, rows: Sequence[ComparisonRow]) -> None:
         self.key = key
         self.stood = [row.values(key) for row in rows]
         self.lost = [_until_the_end(row, key) for row in rows]
-        self.colours = [hexadecimal(of) for of in colours(row.name for row in rows).values()]
+        self.colours = [hexadecimal(colour) for colour in colours(row.name for row in rows).values()]
         values = np.concatenate([*self.stood, *self.lost])
         self.any = bool(np.isfinite(values).any())
         if self.any:
@@ -101,46 +102,43 @@ class _Panel:
         self.limits = low - margin, high + margin
 
     def draw(self, axes: Any) -> None:
-        """Draw it."""
-        about = KEYS[self.key]
+        """Draw the panel."""
         axes.set_xscale(self.scale)
         axes.set_xlim(*self.limits)
         if self.scale == "log":
             ticks = _ticks(*self.limits)
             axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axes.minorticks_off()
-        axes.set_title(about.heading, loc="left", fontsize="medium")
+        axes.set_title(KEYS[self.key].heading, loc="left", fontsize="medium")
         axes.grid(alpha=0.3, axis="x")
         for place, (stood, lost, color) in enumerate(zip(self.stood, self.lost, self.colours, strict=True)):
-            self._scatter(axes, place, stood, color=color, marker="o", s=9, alpha=0.6, linewidth=0)
-            self._scatter(axes, place, lost, color="red", marker="x", s=14, linewidth=0.8)
+            self._scatter(partial(axes.scatter, color=color, alpha=0.6, linewidth=0), place, stood, "o", 9)
+            self._scatter(partial(axes.scatter, color="red", linewidth=0.8), place, lost, "x", 14)
             interval = known_interval(stood)
             if interval is not None:
                 axes.plot([interval.low, interval.high], [place, place], color="black", linewidth=2.0)
                 axes.plot([interval.mean], [place], "|", color="black", markersize=9)
 
-    def _scatter(self, axes: Any, place: int, values: np.ndarray, **style: Any) -> None:
-        """Worlds beside each other in their order; those outside the axis as arrow heads at its edge."""
-        beside = place + np.linspace(-0.3, 0.3, len(values)) if len(values) > 1 else np.full(len(values), float(place))
+    def _scatter(self, draw: partial[None], place: int, values: np.ndarray, marker: str, size: float) -> None:
+        """Draw the worlds in their order across a row; those outside the axis as arrow heads at its edge."""
+        rows = place + np.linspace(-0.3, 0.3, len(values)) if len(values) > 1 else np.full(len(values), float(place))
         low, high = self.limits
         inside = (values >= low) & (values <= high)
-        axes.scatter(values[inside], beside[inside], **style)
+        draw(values[inside], rows[inside], marker=marker, s=size)
         for out, edge, head in ((values < low, low, "<"), (values > high, high, ">")):
             if out.any():
-                axes.scatter(
-                    np.full(out.sum(), edge), beside[out], **style | {"marker": head, "s": 16}, clip_on=False, zorder=3
-                )
+                draw(np.full(out.sum(), edge), rows[out], marker=head, s=16, clip_on=False, zorder=3)
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """Round numbers on a logarithmic axis, of which there is room for a handful."""
-    few = (1,) if high > 100.0 * low else (1, 3) if high > 30.0 * low else (1, 2, 5)
+    """Choose round numbers on a logarithmic axis, which has room for a handful."""
+    first_digits = (1,) if high > 100.0 * low else (1, 3) if high > 30.0 * low else (1, 2, 5)
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    return [tick for decade in decades for first in few if low <= (tick := float(f"{first}e{decade}")) <= high]
+    return [tick for decade in decades for first in first_digits if low <= (tick := float(f"{first}e{decade}")) <= high]
 
 
 def _until_the_end(row: ComparisonRow, key: str) -> np.ndarray:
-    """A figure of the worlds that did not stand to the end, (n_worlds,); NaN for the others."""
+    """Return a figure of the worlds that did not stand to the end, (n_worlds,); NaN for the others."""
     figures = [world.get(key) for world in row.entry.result.rows(row.reference)]
     values = np.array([np.nan if figure is None else figure for figure in figures], dtype=float)
     return np.where(row.entry.result.stood, np.nan, values)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cmg_mj.results.baselines import REFERENCES
-from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.intervals import finite_mean, finite_values, known_interval
 from cmg_mj.results.per_world_table import as_table
-from cmg_mj.results.summary_keys import KEYS, finite
-from cmg_mj.studies.compare.comparison import ComparedObserver, spread_of
+from cmg_mj.results.summary_keys import KEYS, Summary, finite, open_loop_figures
+from cmg_mj.studies.compare.comparison import ComparedObserver, standard_deviation
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -26,7 +26,7 @@ class ComparisonRow:
 
     Attributes:
         entry: An observer in the loop.
-        reference: What rode along there, if the row is not the observer's own.
+        reference: The baseline on that motion, if the row is not the observer's own.
     """
 
     entry: ComparedObserver
@@ -34,66 +34,68 @@ class ComparisonRow:
 
     @property
     def name(self) -> str:
-        """What stands before the row."""
+        """The row's label."""
         return self.reference or self.entry.kind
 
     def values(self, key: str) -> np.ndarray:
-        """A figure of every world, (n_worlds,); NaN where a world did not stand to the end or has no such figure."""
+        """Return a figure of every world, (n_worlds,); NaN where a world did not stand or has no such figure."""
         result = self.entry.result
-        figures = result.summaries[0]["references"][self.reference] if self.reference else result.summaries[0]
+        summary = result.summaries[0]
+        figures = open_loop_figures(summary)[self.reference] if self.reference else summary
         return result.values(key, self.reference) if key in figures else np.full(len(result.outcomes), np.nan)
 
     @property
-    def summary(self) -> dict[str, Any]:
-        """The means, as of `ComparedObserver.summary`.
+    def summary(self) -> Summary:
+        """Return the means, as `ComparedObserver.summary` does.
 
-        None for what a reference does not have, since it closes no loop.
+        None for what a baseline does not have, since it closes no loop.
         """
-        own = self.entry.summary
+        loop = self.entry.summary
         if self.reference is None:
-            return own
-        means = {key: _mean(self.values(key)) for key in own if key in KEYS}
+            return loop
+        means = {key: finite_mean(self.values(key)) for key in loop if key in KEYS}
         return finite(
             {
-                **dict.fromkeys(own),
+                **dict.fromkeys(loop),
                 "observer": self.reference,
                 "in_loop_of": self.entry.kind,
-                "seed": own["seed"],
-                "differs": own["differs"],
-                "worlds": own["worlds"],
+                "seed": loop["seed"],
+                "differs": loop["differs"],
+                "worlds": loop["worlds"],
                 **means,
-                "velocity_rms_error_std_rad_s": spread_of(self.values(ERROR)),
+                "velocity_rms_error_std_rad_s": standard_deviation(self.values(ERROR)),
             }
         )
 
 
 def best_observer(compared: Sequence[ComparedObserver], key: str) -> ComparedObserver | None:
-    """The observer with the best mean of a figure, among those that stood in the most worlds; None if none has one."""
+    """Find the observer with the best mean of a figure, among those that stood in the most worlds."""
     most = max(entry.result.stood.sum() for entry in compared)
     sign = -1.0 if KEYS[key].better == "more" else 1.0
-    means = [(_mean(ComparisonRow(entry).values(key)), entry) for entry in compared if entry.result.stood.sum() == most]
+    candidates = [entry for entry in compared if entry.result.stood.sum() == most]
+    means = [(finite_mean(ComparisonRow(entry).values(key)), entry) for entry in candidates]
     known = [(sign * mean, entry) for mean, entry in means if mean is not None]
     return min(known, key=lambda pair: pair[0])[1] if known else None
 
 
 def comparison_rows(compared: Sequence[ComparedObserver]) -> list[ComparisonRow]:
-    """The rows of a comparison: every observer, then the references on the motion of the best of them.
+    """List the rows of a comparison: every observer, then the baselines on the motion of the best of them.
 
-    The best is the one with the least error in the push window, or over the whole run if there is no push.
+    The best observer is the one with the least error in the push window, or over the whole run if there is no push.
     """
     leader = best_observer(compared, PUSH_ERROR) or best_observer(compared, ERROR)
     return [*map(ComparisonRow, compared), *(ComparisonRow(leader, name) for name in REFERENCES if leader)]
 
 
-def standings(compared: Sequence[ComparedObserver]) -> list[dict[str, Any]]:
-    """What `cmg-mj compare --json` prints.
+def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
+    """Compute what `cmg-mj compare --json` prints.
 
     Args:
         compared: What was run.
 
     Returns:
-        For each row its means; `intervals`: key -> ends of the mean's 95 % interval; `minus_best`: key -> how much more
-        it is than that of the best observer in this figure, over the worlds in which both have it, with its interval.
+        For each row its means; `intervals`: key -> ends of the mean's 95 % interval; `minus_best`: key -> the
+        difference to the best observer in this figure, over the worlds in which both have it, with its interval.
     """
     rows = comparison_rows(compared)
     keys = [key for entry in compared for key in entry.summary if key in KEYS and key in entry.result.summaries[0]]
@@ -116,13 +118,8 @@ def standings(compared: Sequence[ComparedObserver]) -> list[dict[str, Any]]:
 
 
 def worlds_table(compared: Sequence[ComparedObserver]) -> pa.Table:
-    """Every world of every row of a comparison, as `Result.table` has them."""
+    """Make a table of every world of every row of a comparison, as `Result.table` does."""
     return as_table(world for row in comparison_rows(compared) for world in row.entry.result.rows(row.reference))
-
-
-def _mean(values: np.ndarray) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else None
 
 
 def _ends(values: np.ndarray) -> list[float] | None:
@@ -130,12 +127,12 @@ def _ends(values: np.ndarray) -> list[float] | None:
     return None if interval is None else [interval.low, interval.high]
 
 
-def _paired_difference(row: ComparisonRow, leader: ComparisonRow, key: str) -> dict[str, Any]:
-    """A figure less the best observer's, world by world."""
+def _paired_difference(row: ComparisonRow, leader: ComparisonRow, key: str) -> Summary:
+    """Compare a figure with the best observer's, world by world."""
     differences = row.values(key) - leader.values(key)
     return {
         "best": leader.name,
-        "worlds": int(np.isfinite(differences).sum()),
-        "mean": _mean(differences),
+        "worlds": len(finite_values(differences)),
+        "mean": finite_mean(differences),
         "interval": _ends(differences),
     }

@@ -18,7 +18,7 @@ from cmg_mj.plant.mounting.mount import mount_on_request
 from cmg_mj.plant.mounting.mounted import check_target, with_scenario
 from cmg_mj.plant.mounting.request import MountRequest
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.results.trajectory import whole_file
+from cmg_mj.results.files import whole_file
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.studies.sweeps.axes import parse_axis
+from cmg_mj.studies.sweeps.axes import Variation, parse_axis
 from cmg_mj.studies.sweeps.cells import Trials, cells_in_blocks
 from cmg_mj.studies.sweeps.checks import listed_names
 from cmg_mj.studies.sweeps.chunk import compute
-from cmg_mj.studies.sweeps.order import order_rows, order_table
+from cmg_mj.studies.sweeps.order import order_counts, order_rows, order_table
 from cmg_mj.studies.sweeps.sobol import index_rows, index_table
 from cmg_mj.studies.sweeps.study import SamplingDesign, SweepStudy, check_values
 from cmg_mj.studies.sweeps.trials import table_of
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 WORLDS = 20
-"""A cell, if nothing else is said."""
+"""Worlds a cell by default."""
 
 
 @dataclass(frozen=True)
 class SweepResult:
-    """What a sweep has found.
+    """The tables of a sweep.
 
     Attributes:
-        study: What was asked.
+        study: The sweep.
         trials: A row a trial: its point, what is varied, observer, world, outcome, and the figures of its run.
         cells: A row a point and observer: means with 95 % intervals, the share of falls with Wilson's interval, and the
             paired difference to the best observer of the point.
@@ -47,7 +47,7 @@ class SweepResult:
 
 def sweep(
     scenario: Scenario | str,
-    vary: Mapping[str, Any],
+    vary: Mapping[str, Variation],
     observers: Sequence[str] | None = None,
     worlds: int = WORLDS,
     sample: int | None = None,
@@ -59,11 +59,11 @@ def sweep(
     Args:
         scenario: The scenario, or its name.
         vary: Field, named as with `--set` -> a list of values, or one, or text as `--vary` takes it, such as "-1:1:5".
-        observers: Those in the loop; by default the scenario's own.
+        observers: The observers in the loop; by default the scenario's own.
         worlds: Trials a cell: world i has the same noise in every cell.
-        sample: So many points of a quasi-random design of the ranges and lists, instead of every combination.
-        sobol: A design for Sobol indices instead, a power of two.
-        order: Observers, the best first: how often that holds is counted.
+        sample: Number of points of a quasi-random design of the ranges and lists, instead of every combination.
+        sobol: Rows of a design for Sobol indices instead, a power of two.
+        order: Observers, the best first; the result counts how often this order holds.
 
     Returns:
         The trials and cells, as tables.
@@ -74,11 +74,11 @@ def sweep(
     if sample is not None and sobol is not None:
         raise InputError("sample and sobol: one of them")
     design: SamplingDesign = "sample" if sample is not None else "sobol" if sobol is not None else "grid"
-    of = load_scenario(scenario) if isinstance(scenario, str) else scenario
-    axes = tuple(parse_axis(field, said, f"vary: {field!r}") for field, said in vary.items())
-    n: Any = 0 if design == "grid" else sample if design == "sample" else sobol
-    names = (of.observer.kind,) if observers is None else listed_names(observers, "observers")
-    study = SweepStudy(of, axes, names, worlds, design, n, listed_names(order, "order"))
+    base = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    axes = tuple(parse_axis(field, values, f"vary: {field!r}") for field, values in vary.items())
+    n = next((points for points in (sample, sobol) if points is not None), 0)
+    names = (base.observer.kind,) if observers is None else listed_names(observers, "observers")
+    study = SweepStudy(base, axes, names, worlds, design, n, listed_names(order, "order"))
     import pyarrow as pa
 
     check_values(study)
@@ -88,7 +88,7 @@ def sweep(
         study,
         table,
         pa.concat_tables(cells_in_blocks(trials)),
-        order_table(study, order_rows(trials)) if study.order else None,
+        order_table(study, order_rows(study, order_counts(trials))) if study.order else None,
         index_table(index_rows(trials)) if design == "sobol" else None,
     )
 

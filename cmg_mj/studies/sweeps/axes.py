@@ -1,24 +1,40 @@
-"""What a sweep varies: `--vary FIELD=...`, a list or a range."""
+"""The varied fields of a sweep: `--vary FIELD=...`, a list or a range."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Protocol, TypeAlias, TypeGuard, runtime_checkable
 
 import numpy as np
 
 from cmg_mj.errors import InputError, shown
 
+FieldValue: TypeAlias = "float | str | Sequence[FieldValue] | Mapping[str, FieldValue]"
+"""A value of a scenario's field, as TOML has it."""
+
+
+@runtime_checkable
+class Array(Protocol):
+    """Numbers of numpy, pandas or the like."""
+
+    def tolist(self) -> FieldValue:
+        """Make plain numbers."""
+        ...
+
+
+Variation: TypeAlias = "FieldValue | Array"
+"""Values of a field: a list of them, a single one, or text as `--vary` takes it."""
+
 MOST_VALUES = 10_000
-"""Of one field."""
+"""Values of one field."""
 LOG = "log:"
 TOGETHER = "+"
 """Between fields that take the same values."""
 DIGITS = 12
-"""Of a range's values: 0.3 is to be 0.3, in the table too."""
+"""Significant digits of a range's values: 0.3 is to be 0.3, in the table too."""
 
 
 @dataclass(frozen=True)
@@ -26,16 +42,16 @@ class VariedField:
     """One varied field, or several that take the same values together.
 
     Attributes:
-        field: As with `--set`; of several the first, which names the axis in tables and pictures.
-        values: What it takes, in a list or a range with a count; none for a range of which any value may be sampled.
-        low: The range's lower end, for one to be sampled.
-        high: Its upper end.
-        log: Whether it is sampled evenly in its logarithm.
+        field: The field, as with `--set`; of several the first, which names the axis in tables and pictures.
+        values: The values of a list or of a range with a count; none for a range of which any value may be sampled.
+        low: Lower end of a range to be sampled.
+        high: Upper end of a range to be sampled.
+        log: Whether the range is sampled evenly in its logarithm.
         also: Fields that take the same value at every point.
     """
 
     field: str
-    values: tuple[Any, ...] = ()
+    values: tuple[FieldValue, ...] = ()
     low: float = math.nan
     high: float = math.nan
     log: bool = False
@@ -43,55 +59,55 @@ class VariedField:
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """All that it sets."""
+        """All fields that take the value."""
         return (self.field, *self.also)
 
     @property
-    def written(self) -> str:
-        """Its fields as `--vary` takes them."""
+    def option(self) -> str:
+        """The fields as `--vary` takes them."""
         return TOGETHER.join(self.fields)
 
     @property
     def is_range(self) -> bool:
-        """Whether it is a range to be sampled."""
+        """Whether the values are a range to be sampled."""
         return not self.values
 
-    def at(self, shares: np.ndarray) -> list[Any]:
-        """Its values at shares of the range between 0 and 1, (n,); of a list each has an equal part of them."""
+    def at(self, shares: np.ndarray) -> list[FieldValue]:
+        """Choose values at shares of the range between 0 and 1, (n,); of a list each value has an equal part."""
         if not self.is_range:
             return [self.values[min(int(share * len(self.values)), len(self.values) - 1)] for share in shares]
         if self.log:
-            found = np.exp(math.log(self.low) + shares * (math.log(self.high) - math.log(self.low)))
+            values = np.exp(math.log(self.low) + shares * (math.log(self.high) - math.log(self.low)))
         else:
-            found = self.low + shares * (self.high - self.low)
-        return [_rounded(value) for value in found]
+            values = self.low + shares * (self.high - self.low)
+        return [float(f"{value:.{DIGITS}g}") for value in values]
 
-    def said(self) -> Any:
-        """As a study file says it: a list of values, or `low:high`."""
+    def as_field(self) -> FieldValue:
+        """Write the values as a study file has them: a list, or `low:high`."""
         return list(self.values) if self.values else f"{LOG if self.log else ''}{self.low!r}:{self.high!r}"
 
 
-def parse_axis(field: str, said: Any, where: str) -> VariedField:
-    """Read what a field is to take.
+def parse_axis(field: str, variation: Variation, where: str) -> VariedField:
+    """Read the values of a varied field.
 
     Args:
         field: The field; several that take the same values with `+` between.
-        said: A list of values, or a single one; or text: values with commas between, `first:last:count` for as many
-            evenly spaced, `low:high` for a range to be sampled, each also with `log:` before it.
-        where: What to call it in an error.
+        variation: A list of values, or a single one; or text: values with commas between, `first:last:count` for as
+            many evenly spaced, `low:high` for a range to be sampled, each also with `log:` before it.
+        where: The setting's name in an error.
 
     Returns:
         The axis.
 
     Raises:
-        InputError: It is not written so.
+        InputError: The field or its values are not written so.
     """
     field, *also = (part.strip() for part in field.split(TOGETHER))
     if not field or "" in also:
         raise InputError(f"{where}: write FIELD=VALUES, for example plant.equilibrium_bias_deg=-1.5:1.5:13")
-    if isinstance(said, str) and ":" in said and not said.lstrip().startswith(("[", '"')):
-        return replace(_range(field, said, where), also=tuple(also))
-    values = _listed(said, where) if isinstance(said, str) else _given(said, where)
+    if isinstance(variation, str) and ":" in variation and not variation.lstrip().startswith(("[", '"')):
+        return replace(_parse_range(field, variation.strip(), where), also=tuple(also))
+    values = _parse_list(variation, where) if isinstance(variation, str) else _as_list(variation, where)
     if not values:
         raise InputError(f"{where}: no values; write FIELD=VALUES, such as plant.equilibrium_bias_deg=0,0.5")
     if len(values) > MOST_VALUES:
@@ -102,17 +118,17 @@ def parse_axis(field: str, said: Any, where: str) -> VariedField:
     return VariedField(field, tuple(values), also=tuple(also))
 
 
-def _range(field: str, said: str, where: str) -> VariedField:
-    log = said.strip().startswith(LOG)
-    parts = said.strip().removeprefix(LOG).split(":")
+def _parse_range(field: str, text: str, where: str) -> VariedField:
+    log = text.startswith(LOG)
+    parts = text.removeprefix(LOG).split(":")
     how = "write first:last:count, or low:high for --sample and --sobol, with log: before it for a logarithmic one"
     try:
         low, high = (float(part) for part in parts[:2])
         count = int(parts[2]) if len(parts) == 3 else None
     except ValueError:
-        raise InputError(f"{where}: {said.strip()!r} is no range; {how}") from None
+        raise InputError(f"{where}: {text!r} is no range; {how}") from None
     if len(parts) > 3:
-        raise InputError(f"{where}: {said.strip()!r} is no range; {how}")
+        raise InputError(f"{where}: {text!r} is no range; {how}")
     if not (math.isfinite(low) and math.isfinite(high)) or low == high:
         raise InputError(f"{where}: an empty range; its ends must be two different numbers")
     if log and not (low > 0.0 and high > 0.0):
@@ -127,34 +143,34 @@ def _range(field: str, said: str, where: str) -> VariedField:
     return VariedField(field, tuple(VariedField(field, (), low, high, log).at(shares)))
 
 
-def _given(said: Any, where: str) -> list[Any]:
-    """Values that are no text; numbers of numpy as Python's."""
-    if hasattr(said, "tolist"):
-        said = said.tolist()
-    if isinstance(said, (bool, int, float)):
-        return [said]
-    if isinstance(said, Mapping) or not isinstance(said, Iterable):
-        raise InputError(f"{where}: {shown(said)}: must be a list of values, or text such as '-1:1:5'")
-    return [value.tolist() if hasattr(value, "tolist") else value for value in said]
+def _as_list(variation: Variation, where: str) -> list[FieldValue]:
+    """Make values that are no text into a list, with numpy's numbers as Python's."""
+    values = variation.tolist() if isinstance(variation, Array) else variation
+    if isinstance(values, (bool, int, float)):
+        return [values]
+    if isinstance(values, Mapping) or not isinstance(values, Iterable):
+        raise InputError(f"{where}: {shown(values)}: must be a list of values, or text such as '-1:1:5'")
+    return [value.tolist() if isinstance(value, Array) else value for value in values]
 
 
-def _listed(said: str, where: str) -> list[Any]:
-    """Values with commas between; a bare word is a string, as with `--set`."""
+def _parse_list(text: str, where: str) -> list[FieldValue]:
+    """Read values with commas between; a bare word is a string, as with `--set`."""
     try:
-        return tomllib.loads(f"values = [{said}]")["values"]
+        return tomllib.loads(f"values = [{text}]")["values"]
     except (ValueError, RecursionError):
-        words = [word.strip() for word in said.split(",")]
-        if "" in words or any(mark in said for mark in "[]{}\"'="):
-            raise InputError(f"{where}: {said!r} is no list; write values with commas between") from None
+        words = [word.strip() for word in text.split(",")]
+        if "" in words or any(mark in text for mark in "[]{}\"'="):
+            raise InputError(f"{where}: {text!r} is no list; write values with commas between") from None
         return [_word(word) for word in words]
 
 
-def _word(word: str) -> Any:
+def _word(word: str) -> FieldValue:
     try:
         return tomllib.loads(f"value = {word}")["value"]
     except ValueError:
         return word
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+def is_number(value: FieldValue) -> TypeGuard[float]:
+    """Tell a number from a truth value, a text and a list."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

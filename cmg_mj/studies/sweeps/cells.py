@@ -1,4 +1,4 @@
-"""Cells: every point with every observer, over its worlds. `cells.parquet`."""
+"""The cells of a sweep: every point with every observer, over its worlds. `cells.parquet`."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.results.intervals import Interval, known_interval
-from cmg_mj.results.summary_keys import KEYS
+from cmg_mj.results.intervals import Interval, finite_values, known_interval
+from cmg_mj.results.summary_keys import KEYS, Figures, Summary
 from cmg_mj.studies.sweeps.failure_reasons import Reasons
 from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.studies.sweeps.trials import as_table, point_columns
@@ -19,28 +19,26 @@ from cmg_mj.studies.sweeps.trials import as_table, point_columns
 if TYPE_CHECKING:
     import pyarrow as pa
 
-COMPARED = [key for key, of in KEYS.items() if of.compared and of.better and not key.endswith("_fraction")]
-"""Of which a cell has the mean, and how far it is behind the best observer's."""
-
-
+COMPARED = [key for key, about in KEYS.items() if about.compared and about.better and not key.endswith("_fraction")]
+"""Figures of which a cell has the mean, and the difference to the best observer's."""
 COLUMNS = ["point", "observer", "world", "outcome", "reason", *COMPARED]
-"""Of the trials, by which cells are made."""
+"""Columns of the trials that cells are made of."""
 BLOCK = 1024
 """Cells whose rows are held together."""
 
 
 class Trials:
-    """How a sweep's trials ended, and their figures, by cell: 8 bytes a figure.
+    """The outcomes and figures of a sweep's trials, by cell: 8 bytes a figure.
 
     Args:
         study: The sweep.
-        tables: Its trials, in any order and in any number of tables, which are looked at one after the other.
+        tables: The trials, in any order and in any number of tables, which are read one after the other.
 
     Attributes:
         study: The sweep.
-        outcome: How each ended, (n_points, n_observers, n_worlds).
-        stood: Whether to the end.
-        reasons: Why some were refused or stopped, counted.
+        outcome: How each trial ended, (n_points, n_observers, n_worlds).
+        stood: Whether each trial stood to the end, (n_points, n_observers, n_worlds).
+        reasons: Counts of the reasons why trials were refused or stopped.
     """
 
     def __init__(self, study: SweepStudy, tables: Iterable[pa.Table]) -> None:
@@ -67,35 +65,35 @@ class Trials:
 
     @property
     def fell(self) -> np.ndarray:
-        """Whether each fell, (n_points, n_observers, n_worlds); one refused or stopped neither fell nor stood."""
+        """Whether each trial fell, (n_points, n_observers, n_worlds); one refused or stopped neither fell nor stood."""
         return self.outcome == "fell"
 
     def figure(self, key: str) -> np.ndarray:
-        """A figure of every trial, (n_points, n_observers, n_worlds); NaN where the rig did not stand to the end."""
+        """Return a figure of every trial, (n_points, n_observers, n_worlds); NaN where it did not stand."""
         return np.where(self.stood, self._figures[key], math.nan)
 
 
 def _texts(column: pa.ChunkedArray) -> np.ndarray:
-    """A column of few words, each of which is one object, (n,)."""
+    """Read a column of few words, each of which is one string object, (n,)."""
     encoded = column.combine_chunks().dictionary_encode()
     return np.array(encoded.dictionary.to_pylist(), dtype=object)[encoded.indices.to_numpy()]
 
 
 @cache  # of few different counts, at 0.3 ms each
 def fell_interval(fell: int, trials: int) -> Interval:
-    """The share of falls with Wilson's 95 % interval."""
+    """Compute the share of falls with Wilson's 95 % interval."""
     from scipy.stats import binomtest
 
-    found = binomtest(fell, trials).proportion_ci(0.95, method="wilson")
-    return Interval(fell / trials, float(found.low), float(found.high))
+    ends = binomtest(fell, trials).proportion_ci(0.95, method="wilson")
+    return Interval(fell / trials, float(ends.low), float(ends.high))
 
 
-def cells_of(trials: Trials) -> Iterator[dict[str, Any]]:
-    """A row a cell, point by point: how many stood and fell, every figure's mean, and how far it is behind the best.
+def cells_of(trials: Trials) -> Iterator[Summary]:
+    """Make a row a cell, point by point: counts of falls, every figure's mean, and its difference to the best.
 
-    The best observer of a point is that of the smallest (or largest, where more is better) mean among those that stood
-    in every world; differences are taken world by world. The share of falls is that among those that fell or stood;
-    a cell of which all trials were refused or stopped has none.
+    The best observer of a point has the smallest (or largest, where more is better) mean among those that stood in
+    every world; differences are taken world by world. The share of falls is among the trials that fell or stood; a
+    cell of which all trials were refused or stopped has none.
     """
     fallen = trials.fell
     figures = {key: trials.figure(key) for key in COMPARED}
@@ -105,7 +103,7 @@ def cells_of(trials: Trials) -> Iterator[dict[str, Any]]:
             n = trials.study.worlds
             fell, stood = int(fallen[number, place].sum()), int(trials.stood[number, place].sum())
             share = fell_interval(fell, fell + stood) if fell + stood else None
-            row: dict[str, Any] = {"point": number, **point, "observer": observer, "trials": n, "stood": stood}
+            row: Summary = {"point": number, **point, "observer": observer, "trials": n, "stood": stood}
             row |= {"fell": fell, "stopped": n - stood - fell}
             mean, low, high = share or (None, None, None)
             row |= {"fell_share": mean, "fell_low": low, "fell_high": high}
@@ -119,24 +117,24 @@ def cells_of(trials: Trials) -> Iterator[dict[str, Any]]:
 
 
 def _best(values: np.ndarray, key: str) -> int | None:
-    """Which observer has the best mean among those that stood in every world, (n_observers, n_worlds)."""
+    """Find the observer with the best mean among those that stood in every world, (n_observers, n_worlds)."""
     means = values.mean(axis=1)
     if not np.isfinite(means).any():
         return None
     return int(np.nanargmin(means if KEYS[key].better == "less" else -means))
 
 
-def _with_ends(key: str, values: np.ndarray) -> dict[str, float | None]:
-    """The mean of those that are known, and its interval: of one, that itself and no interval."""
+def _with_ends(key: str, values: np.ndarray) -> Figures:
+    """Average the known values, with the mean's interval; a single value has none."""
     interval = known_interval(values)
     if interval is not None:
         return {key: interval.mean, f"{key}_low": interval.low, f"{key}_high": interval.high}
-    alone = values[np.isfinite(values)]
+    alone = finite_values(values)
     return {key: float(alone[0]) if len(alone) else None, f"{key}_low": None, f"{key}_high": None}
 
 
 def cells_schema(study: SweepStudy) -> pa.Schema:
-    """The columns of `cells_of`."""
+    """Declare the columns of `cells_of`."""
     import pyarrow as pa
 
     counts = [(name, "int64") for name in ("trials", "stood", "fell", "stopped")]
@@ -146,7 +144,7 @@ def cells_schema(study: SweepStudy) -> pa.Schema:
         column
         for key in COMPARED
         for column in [
-            *((f"{of}{end}", "float64") for of in (key, f"{key}_behind_best") for end in ends),
+            *((f"{name}{end}", "float64") for name in (key, f"{key}_behind_best") for end in ends),
             (f"{key}_best", "string"),
         ]
     ]
@@ -154,7 +152,7 @@ def cells_schema(study: SweepStudy) -> pa.Schema:
 
 
 def cells_in_blocks(trials: Trials) -> Iterator[pa.Table]:
-    """All cells, some thousand at a time."""
+    """Make all cells, some thousand at a time."""
     rows = cells_of(trials)
     while block := list(itertools.islice(rows, BLOCK)):
         yield as_table(block, cells_schema(trials.study))

@@ -1,10 +1,10 @@
-"""What a study cannot be: its numbers, names and fields, whoever asks: the command line, a study file or Python."""
+"""Checks of a study's numbers, names and fields, from the command line, a study file or Python."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TypeGuard
 
 import numpy as np
 
@@ -13,29 +13,29 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.simulation.pool import UNUSED
 from cmg_mj.studies.sweeps.axes import VariedField
 
-TOLD_OTHERWISE = {
+NOT_VARIED = {
     "seed": "worlds differ in it already: --worlds says how many, --seed which",
     "observer": "--observers names them",
     "observer.kind": "--observers names them",
     "open_loop_observers": "a sweep runs without them; --observers puts each in the loop",
     **dict.fromkeys(sorted(UNUSED), "no trial depends on it"),
 }
-"""Fields that a sweep does not vary, and why; all below them neither, but for an observer's own."""
+"""Fields that a sweep does not vary, and why. Fields below them are not varied either, but for an observer's own."""
 
 
-def listed_names(said: Any, what: str) -> tuple[Any, ...]:
-    """A list of names that Python gave, as a tuple.
+def listed_names(names: Iterable[str], argument: str) -> tuple[str, ...]:
+    """Make a list of names that Python gave into a tuple.
 
     Raises:
-        InputError: It is none.
+        InputError: It is no list.
     """
-    if isinstance(said, str) or not isinstance(said, Iterable):
-        raise InputError(f"{what} = {shown(said)}: must be a list of observers' names, such as ['linear', 'ltv']")
-    return tuple(said)
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise InputError(f"{argument} = {shown(names)}: must be a list of observers' names, such as ['linear', 'ltv']")
+    return tuple(names)
 
 
 def check_axes(axes: Sequence[VariedField], design: str) -> None:
-    """Something is varied, each field once, and so that it makes a difference; a range to be sampled is sampled."""
+    """Check that something is varied, each field once, so that it makes a difference, and that a range is sampled."""
     if not axes:
         raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
     fields = [field for axis in axes for field in axis.fields]
@@ -44,7 +44,7 @@ def check_axes(axes: Sequence[VariedField], design: str) -> None:
         raise InputError(f"--vary {twice}: given twice")
     for field in fields:
         section = field.partition(".")[0]
-        why = TOLD_OTHERWISE.get(field) or (TOLD_OTHERWISE.get(section) if section != "observer" else None)
+        why = NOT_VARIED.get(field) or (None if section == "observer" else NOT_VARIED.get(section))
         if why is not None:
             raise InputError(f"--vary {field}: is not varied: {why}")
     for axis in axes:
@@ -54,14 +54,14 @@ def check_axes(axes: Sequence[VariedField], design: str) -> None:
             )
 
 
-def check_worlds(worlds: Any) -> None:
-    """There is one at least."""
+def check_worlds(worlds: int) -> None:
+    """Check that there is one at least."""
     if not _counts(worlds):
         raise InputError(f"worlds = {shown(worlds)}: must be a whole number, 1 or more")
 
 
-def check_points(design: str, n: Any, axes: int) -> None:
-    """A design has points, one for indices as many as Saltelli's scheme wants; a grid's are counted by its values."""
+def check_points(design: str, n: int, axes: int) -> None:
+    """Check a design's number of points: for indices as many as Saltelli's scheme wants, none for a grid."""
     if design == "grid":
         if n != 0:
             raise InputError(f"n = {shown(n)}: is for the designs sample and sobol; a grid is every combination")
@@ -78,8 +78,8 @@ def check_points(design: str, n: Any, axes: int) -> None:
             )
 
 
-def check_observers(observers: Sequence[Any]) -> None:
-    """They exist, as far as can be told without importing them, and are there once."""
+def check_observers(observers: Sequence[str]) -> None:
+    """Check that observers exist, as far as is known without importing them, and are there once."""
     if not observers:
         raise InputError("observers: there must be one at least")
     for i, name in enumerate(observers):
@@ -92,21 +92,21 @@ def check_observers(observers: Sequence[Any]) -> None:
             raise InputError(f"observers: {name!r} is there twice")
 
 
-def check_order(order: Sequence[Any], observers: Sequence[str]) -> None:
-    """It orders observers that run here."""
-    said = f"--order {','.join(map(str, order))}"
+def check_order(order: Sequence[str], observers: Sequence[str]) -> None:
+    """Check that an order is one of observers that run here."""
+    option = f"--order {','.join(map(str, order))}"
     if any(not isinstance(name, str) for name in order):
-        raise InputError(f"{said}: must be observers' names, the best first")
+        raise InputError(f"{option}: must be observers' names, the best first")
     if len(order) < 2 or len(set(order)) < len(order):
-        raise InputError(f"{said}: write two observers or more, each once, the best first")
+        raise InputError(f"{option}: write two observers or more, each once, the best first")
     for name in order:
         if name not in observers:
-            raise InputError(f"{said}: {name} does not run here; --observers are {', '.join(observers)}")
+            raise InputError(f"{option}: {name} does not run here; --observers are {', '.join(observers)}")
 
 
-def _counts(number: Any) -> bool:
+def _counts(number: float | str | None) -> bool:
     return _is_whole(number) and number >= 1
 
 
-def _is_whole(number: Any) -> bool:
+def _is_whole(number: float | str | None) -> TypeGuard[int]:
     return isinstance(number, (int, np.integer)) and not isinstance(number, bool)

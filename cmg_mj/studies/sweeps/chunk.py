@@ -1,13 +1,14 @@
-"""One chunk computed: a row a trial."""
+"""Computes one chunk of a sweep: a row a trial."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cmg_mj.errors import InputError, raised
 from cmg_mj.results.per_world_table import ID_COLUMNS
+from cmg_mj.results.summary_keys import Summary
 from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.simulation.pool import batch_key
 from cmg_mj.studies.sweeps.points import Point, Points
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from cmg_mj.results.result import Result
 
 REFUSED = "refused"
-"""How a trial ends whose values do not fit each other: it never begins."""
+"""Outcome of a trial whose values do not fit each other: it never begins."""
 
 
 def compute(
@@ -27,27 +28,27 @@ def compute(
     *,
     points: Points | Mapping[int, Point] | None = None,
     threads: int = 0,
-) -> list[dict[str, Any]]:
+) -> list[Summary]:
     """Run the trials of a chunk.
 
-    What fails is a row with its reason: values that do not fit, a rig whose physics fails, an observer that raises.
+    A trial that fails is a row with the reason: values that do not fit, physics that fails, an observer that raises.
 
     Args:
         study: The sweep.
-        chunk: Which of its trials.
+        chunk: The trials.
         on_progress: Called after every tick with the share of the chunk that is done.
-        points: Those of the chunk by their numbers, which then are not made of the whole study's.
-        threads: On which its worlds are stepped; 0: as many as there are processors.
+        points: The chunk's points by their numbers; by default they are made from the study.
+        threads: Number of threads that step the worlds; 0: as many as there are processors.
 
     Returns:
-        A row a trial, in the chunk's order: its point's number, what is varied, and the figures of its run.
+        A row a trial, in the chunk's order: the point's number, the varied values, and the figures of the run.
     """
-    at = study.points if points is None else points
+    points = study.points if points is None else points
     base = prepare(study.scenario.with_observer(chunk.observer).model_copy(update={"open_loop_observers": []}))
-    found: dict[tuple[int, int], dict[str, Any]] = {}
-    pools: dict[str, list[tuple[int, int]]] = {}
+    results: dict[tuple[int, int], Summary] = {}
+    batches: dict[str, list[tuple[int, int]]] = {}
     experiments: dict[int, Experiment] = {}
-    pool_of: dict[int, str] = {}
+    batch_of: dict[int, str] = {}
     refused: dict[int, str] = {}
     for trial in chunk.trials:
         number = trial[0]
@@ -55,32 +56,32 @@ def compute(
             continue
         if number not in experiments:
             try:
-                experiments[number] = base.with_settings(at[number])
-                pool_of[number] = _pool_of(experiments[number])
+                experiments[number] = base.with_settings(points[number])
+                batch_of[number] = _batch_of(experiments[number])
             except InputError as error:
                 refused[number] = str(error)
                 continue
-        pools.setdefault(pool_of[number], []).append(trial)
-    for trials in pools.values():
-        done, share = len(found) / len(chunk.trials), len(trials) / len(chunk.trials) / study.scenario.duration_s
+        batches.setdefault(batch_of[number], []).append(trial)
+    for trials in batches.values():
+        done, share = len(results) / len(chunk.trials), len(trials) / len(chunk.trials) / study.scenario.duration_s
         tick = partial(_chunk_progress, on_progress, done, share) if on_progress else None
         rows = _run([experiments[number] for number, _ in trials], trials, tick, threads)
-        found |= zip(trials, rows, strict=True)
+        results |= zip(trials, rows, strict=True)
     for trial in chunk.trials:
         if trial[0] in refused:
-            found[trial] = _unfinished(REFUSED, refused[trial[0]])
+            results[trial] = _unfinished(REFUSED, refused[trial[0]])
     return [
-        {"point": number, **_plain(at[number]), **_identity(study, chunk, world), **found[number, world]}
+        {"point": number, **_as_columns(points[number]), **_identity(study, chunk, world), **results[number, world]}
         for number, world in chunk.trials
     ]
 
 
-def rows_of_failed_chunk(study: SweepStudy, chunk: Chunk, reason: str) -> list[dict[str, Any]]:
-    """Rows of a chunk that could not be computed: the reason in each."""
+def rows_of_failed_chunk(study: SweepStudy, chunk: Chunk, reason: str) -> list[Summary]:
+    """Make the rows of a chunk that could not be computed: the reason in each."""
     return [
         {
             "point": number,
-            **_plain(study.points[number]),
+            **_as_columns(study.points[number]),
             **_identity(study, chunk, world),
             **_unfinished("stopped", reason),
         }
@@ -97,21 +98,21 @@ def _run(
     trials: Sequence[tuple[int, int]],
     tick: Callable[[float], None] | None,
     threads: int,
-) -> list[dict[str, Any]]:
-    """Rows of trials that run in one batch; where one raises, those that it stopped run again, without it at last.
+) -> list[Summary]:
+    """Run trials in one batch. Where one raises, those that it stopped run again, without it at last.
 
-    They are halved until each of them is through or has raised by itself, so that no row depends on another's.
+    They are halved until each trial is through or has raised by itself, so that no row depends on another's.
     """
-    rows: dict[int, dict[str, Any]] = {}
+    rows: dict[int, Summary] = {}
     onward = _monotonic_progress(tick) if tick else None
     parts = [list(range(len(trials)))]
     while parts:
         part = parts.pop()
-        own = _run_once([experiments[i] for i in part], [trials[i][1] for i in part], onward, threads)
-        rows |= {i: row for i, row in zip(part, own, strict=True) if row is not None}
+        part_rows = _run_once([experiments[i] for i in part], [trials[i][1] for i in part], onward, threads)
+        rows |= {i: row for i, row in zip(part, part_rows, strict=True) if row is not None}
         again = [i for i in part if i not in rows]
         half = (len(again) + 1) // 2
-        parts += [some for some in (again[half:], again[:half]) if some]
+        parts += [trials_left for trials_left in (again[half:], again[:half]) if trials_left]
     return [rows[i] for i in range(len(trials))]
 
 
@@ -120,8 +121,8 @@ def _run_once(
     worlds: Sequence[int],
     tick: Callable[[float], None] | None,
     threads: int,
-) -> list[dict[str, Any] | None]:
-    """Rows of one batch; None for a trial that may have been stopped by another one."""
+) -> list[Summary | None]:
+    """Run one batch once; None for a trial that may have been stopped by another one."""
     try:
         result: Result = run_batch(experiments, worlds, keep_trajectory=False, on_progress=tick, threads=threads)
     except Exception as error:  # a user's observer may fail in any way
@@ -129,45 +130,45 @@ def _run_once(
         return [_unfinished("stopped", raised(error)) if alone else None for _ in worlds]
     if any(outcome.kind == "interrupted" for outcome in result.outcomes):
         raise KeyboardInterrupt
-    taken = {"observer", "in_loop_of", "world", "seed"}
+    identity = {"observer", "in_loop_of", "world", "seed"}
     return [
-        None if outcome.with_others else {key: value for key, value in row.items() if key not in taken}
+        None if outcome.with_others else {key: value for key, value in row.items() if key not in identity}
         for outcome, row in zip(result.outcomes, result.rows(), strict=True)
     ]
 
 
 def _monotonic_progress(tick: Callable[[float], None]) -> Callable[[float], None]:
-    """The same, told of no time before the latest: what runs again is no step back."""
+    """Report no time before the latest: what runs again is no step back."""
     latest = 0.0
 
-    def told(time: float) -> None:
+    def report(time: float) -> None:
         nonlocal latest
         latest = max(latest, time)
         tick(latest)
 
-    return told
+    return report
 
 
-def _pool_of(experiment: Experiment) -> str:
-    """Worlds with the same can run in one batch."""
+def _batch_of(experiment: Experiment) -> str:
+    """Make a key: worlds with the same one can run in one batch."""
     physics = experiment.plant.model.opt
     return repr((batch_key(experiment.scenario, experiment.design), physics.timestep, int(physics.integrator)))
 
 
-def _identity(study: SweepStudy, chunk: Chunk, world: int) -> dict[str, Any]:
+def _identity(study: SweepStudy, chunk: Chunk, world: int) -> Summary:
     return {"observer": chunk.observer, "world": world, "seed": study.scenario.seed}
 
 
-def _unfinished(outcome: str, reason: str) -> dict[str, Any]:
+def _unfinished(outcome: str, reason: str) -> Summary:
     return {"outcome": outcome, "stood": False, "end_time_s": 0.0, "reason": reason}
 
 
-def _plain(point: Point) -> Point:
-    """As a table can hold it: a list is its text."""
+def _as_columns(point: Point) -> Point:
+    """Make a point's values into what a table can hold: a list becomes its text."""
     return {
         field: value if isinstance(value, (int, float, str, bool)) else repr(value) for field, value in point.items()
     }
 
 
 COLUMNS = [name for name in ID_COLUMNS if name != "in_loop_of"]
-"""Of a trial, beside what is varied, before its figures."""
+"""Columns of a trial, after what is varied and before its figures."""

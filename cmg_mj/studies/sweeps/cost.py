@@ -1,11 +1,11 @@
-"""What a sweep costs beside its physics: processor time of the whole loop by that of MuJoCo's batch alone."""
+"""The cost of a sweep relative to its physics: processor time of the whole loop by that of MuJoCo's batch alone."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import ParamSpec, TypedDict, TypeVar
 
 from mujoco.batch import Batch
 from rich import box
@@ -18,8 +18,8 @@ from cmg_mj.studies.sweeps.chunk import compute
 from cmg_mj.studies.sweeps.study import SweepStudy
 
 SCENARIO, DURATION_S = "push_recovery", 15.0
-WORLDS_A_RIG = 4
-RIGS = {
+WORLDS_A_PLANT = 4
+PLANTS = {
     "plant.equilibrium_bias_deg": "-0.8:0.8",
     "plant.gimbal_armature_kg_m2": "0:0.002",
     "plant.gimbal_friction_n_m": "0:0.05",
@@ -27,13 +27,35 @@ RIGS = {
     "sensors.accelerometer.noise_density_ug_rthz": "100:800",
     "push.0.torque_n_m": "1:3",
 }
-"""What the rigs differ in."""
+"""Fields in which the plants differ."""
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
-def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float], None]) -> dict[str, Any]:
-    """Time a chunk of two sweeps for each observer: many worlds of one rig, and many rigs.
+class ChunkCost(TypedDict):
+    """The cost of a chunk; the CPU times are of all, and of MuJoCo's batch alone [s]."""
 
-    On one thread: a pool's threads that wait for work are processor time as well, which is nobody's.
+    observer: str
+    rigs: int
+    trials: int
+    stood: int
+    cpu_s: float
+    batch_cpu_s: float
+    cpu_over_batch: float
+
+
+class SweepCost(TypedDict):
+    """The cost of a sweep, as `bench --sweep --json` prints it."""
+
+    scenario: str
+    duration_s: float
+    figures: list[ChunkCost]
+
+
+def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float], None]) -> SweepCost:
+    """Time a chunk of two sweeps for each observer: many worlds of one plant, and many plants.
+
+    A chunk runs on one thread: threads of a pool that wait for work take processor time as well, which is nobody's.
 
     Args:
         observers: Names of the observers.
@@ -47,9 +69,9 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
         InputError: An observer does not exist.
     """
     cases = [(name, observer) for observer in observers for name in ("worlds", "rigs")]
-    figures = []
+    figures: list[ChunkCost] = []
     for i, (name, observer) in enumerate(cases):
-        study = _of_worlds(observer, worlds) if name == "worlds" else _of_rigs(observer, worlds)
+        study = _one_plant(observer, worlds) if name == "worlds" else _many_plants(observer, worlds)
         chunk = study.chunks[0]
         with _clocked() as clock:
             start = time.process_time()
@@ -60,7 +82,7 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
                 "observer": observer,
                 "rigs": len({number for number, _ in chunk.trials}),
                 "trials": len(rows),
-                "stood": sum(row["stood"] for row in rows),
+                "stood": sum(row["stood"] is True for row in rows),
                 "cpu_s": whole,
                 "batch_cpu_s": clock[0],
                 "cpu_over_batch": whole / clock[0],
@@ -69,38 +91,38 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
     return {"scenario": SCENARIO, "duration_s": DURATION_S, "figures": figures}
 
 
-def table(figures: dict[str, Any]) -> Table:
-    """The table that `cmg-mj bench sweep` prints."""
-    found = Table(
-        title=f"{figures['scenario']}, {figures['duration_s']:g} s, on one thread: processor time of all by that "
+def table(cost: SweepCost) -> Table:
+    """Make the table that `cmg-mj bench sweep` prints."""
+    rows = Table(
+        title=f"{cost['scenario']}, {cost['duration_s']:g} s, on one thread: processor time of all by that "
         "in MuJoCo's batch",
         box=box.SIMPLE_HEAD,
         title_justify="left",
     )
-    found.add_column("observer", vertical="bottom")
+    rows.add_column("observer", vertical="bottom")
     for heading in ("rigs", "trials", "stood", "all [s]", "batch [s]", "ratio", "trials\na second"):
-        found.add_column(heading, justify="right", vertical="bottom")
-    for row in figures["figures"]:
+        rows.add_column(heading, justify="right", vertical="bottom")
+    for row in cost["figures"]:
         counts = (str(row[key]) for key in ("rigs", "trials", "stood"))
         rate = row["trials"] / row["cpu_s"]
         seconds = (f"{row['cpu_s']:.1f}", f"{row['batch_cpu_s']:.1f}", f"{row['cpu_over_batch']:.3f}", f"{rate:.1f}")
-        found.add_row(row["observer"], *counts, *seconds)
-    return found
+        rows.add_row(row["observer"], *counts, *seconds)
+    return rows
 
 
 def _scenario() -> Scenario:
     return load_scenario(SCENARIO, [f"duration_s={DURATION_S}"])
 
 
-def _of_worlds(observer: str, worlds: int) -> SweepStudy:
+def _one_plant(observer: str, worlds: int) -> SweepStudy:
     scenario = _scenario()
     return SweepStudy(scenario, (parse_axis("plant.equilibrium_bias_deg", "0.5", "rig"),), (observer,), worlds)
 
 
-def _of_rigs(observer: str, worlds: int) -> SweepStudy:
-    axes = tuple(parse_axis(field, said, field) for field, said in RIGS.items())
-    rigs = max(1, worlds // WORLDS_A_RIG)
-    return SweepStudy(_scenario(), axes, (observer,), WORLDS_A_RIG, "sample", rigs)
+def _many_plants(observer: str, worlds: int) -> SweepStudy:
+    axes = tuple(parse_axis(field, values, field) for field, values in PLANTS.items())
+    plants = max(1, worlds // WORLDS_A_PLANT)
+    return SweepStudy(_scenario(), axes, (observer,), WORLDS_A_PLANT, "sample", plants)
 
 
 @contextmanager
@@ -109,8 +131,8 @@ def _clocked() -> Iterator[list[float]]:
     spent = [0.0]
     plain = {name: getattr(Batch, name) for name in ("step", "forward")}
 
-    def clocked(call: Callable[..., Any]) -> Callable[..., Any]:
-        def timed(*args: Any, **kwargs: Any) -> Any:
+    def clocked(call: Callable[P, R]) -> Callable[P, R]:
+        def timed(*args: P.args, **kwargs: P.kwargs) -> R:
             start = time.process_time()
             try:
                 return call(*args, **kwargs)

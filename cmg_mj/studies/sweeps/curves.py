@@ -1,16 +1,17 @@
-"""Curves of a sweep over one varied field, an observer a line."""
+"""Curves of a sweep over one varied field, a line an observer."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from cmg_mj.results.intervals import Interval, known_interval
+from cmg_mj.results.intervals import Interval, finite_values, known_interval
 from cmg_mj.results.summary_keys import heading
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
 from cmg_mj.studies.sweeps.plot_scales import (
@@ -28,14 +29,14 @@ CURVES = "curves"
 LOGARITHMIC = 10.0
 """Errors that differ by more than this factor are drawn on a logarithmic axis."""
 ASIDE = 0.3
-"""Of the smallest step between values, over which observers' shares of falls stand beside each other."""
+"""Share of the smallest step between values over which the observers' shares of falls are spread."""
 UNKNOWN = Interval(math.nan, math.nan, math.nan)
 
 
 def curves(trials: Trials, field: str) -> Picture:
-    """A panel a figure, and one of the share of falls if there are any, over the values of a field."""
+    """Draw a panel a figure, and one of the share of falls if there are any, over the values of a field."""
     study = trials.study
-    x = np.array([float(point[field]) for point in study.points])
+    x = np.array([point[field] for point in study.points], dtype=float)
     order = np.argsort(x, kind="stable")
     x = x[order]
     scale = scale_of(trials, field, x)
@@ -50,51 +51,54 @@ def curves(trials: Trials, field: str) -> Picture:
         values = trials.figure(key)[order]
         if np.isfinite(values).any():
             lines = _error_lines(study.observers, x, values)
-            drawn = np.concatenate([line.y for line in lines])
-            far = np.nanmin(drawn) > 0.0 and np.nanmax(drawn) > LOGARITHMIC * np.nanmin(drawn)
-            more: dict[str, Any] = {"y_scale": "log", "y_ticks": round_values(drawn)} if far else {}
-            panels.append(panel(heading(key), lines, **more))
+            y = np.concatenate([line.y for line in lines])
+            if np.nanmin(y) > 0.0 and np.nanmax(y) > LOGARITHMIC * np.nanmin(y):
+                panels.append(panel(heading(key), lines, y_scale="log", y_ticks=round_values(y)))
+            else:
+                panels.append(panel(heading(key), lines))
     if trials.fell.any():
         lines = _fall_lines(trials, x, order, scale)
         panels.append(panel("share of falls", lines, y_range=(-0.03, 1.03)))
-    names = [*study.observers, *([""] * len(panels[0].lines))] if panels else []
-    labelled = [replace(line, label=name) for line, name in zip(panels[0].lines, names, strict=False)] if panels else []
-    panels[:1] = [replace(first, lines=labelled) for first in panels[:1]]
+    if panels:
+        names = itertools.chain(study.observers, itertools.repeat(""))
+        labelled = [replace(line, label=name) for line, name in zip(panels[0].lines, names, strict=False)]
+        panels[0] = replace(panels[0], lines=labelled)
     return Picture(CURVES, title_of(trials), panels, panel_height=2.9)
 
 
 def _error_lines(observers: Sequence[str], x: np.ndarray, values: np.ndarray) -> list[Line]:
-    """A line an observer, then its marks, of values (n_points, n_observers, n_worlds).
+    """Make a line an observer, then its marks, of values (n_points, n_observers, n_worlds).
 
-    A dot where every world stood, a cross where only some did.
+    A mark is a dot where every world stood, a cross where only some did.
     """
     lines, marks = [], []
     for place, name in enumerate(observers):
-        of = values[:, place]
-        found = [known_interval(worlds) or _alone(worlds) for worlds in of]
-        mean = np.array([interval.mean for interval in found])
-        lines.append(Line(x, mean, color=name, spread=_around(found)))
-        whole = np.isfinite(of).all(axis=1)
+        worlds = values[:, place]
+        intervals = [known_interval(point) or _without_interval(point) for point in worlds]
+        mean = np.array([interval.mean for interval in intervals])
+        lines.append(Line(x, mean, color=name, spread=_heights(intervals)))
+        whole = np.isfinite(worlds).all(axis=1)
         for mark, where in ((".", whole), ("x", np.isfinite(mean) & ~whole)):
             if where.any():
                 marks.append(Line(x[where], mean[where], style=mark, color=name))
     return lines + marks
 
 
-def _alone(worlds: np.ndarray) -> Interval:
-    """Of one world, or none, that stood."""
-    stood = worlds[np.isfinite(worlds)]
+def _without_interval(worlds: np.ndarray) -> Interval:
+    """Take the only world that stood, if one did, for the mean."""
+    stood = finite_values(worlds)
     mean = float(stood[0]) if len(stood) else math.nan
     return Interval(mean, mean, mean)
 
 
-def _around(found: Sequence[Interval]) -> np.ndarray:
-    return np.array([[of.mean - of.low for of in found], [of.high - of.mean for of in found]])
+def _heights(intervals: Sequence[Interval]) -> np.ndarray:
+    """Stack the intervals' heights below and above the mean, (2, n)."""
+    return np.array([[i.mean - i.low for i in intervals], [i.high - i.mean for i in intervals]])
 
 
 def _fall_lines(trials: Trials, x: np.ndarray, order: np.ndarray, scale: Literal["linear", "log"]) -> list[Line]:
-    """A line an observer over x, of points in that order; beside each other, as many are 0 or 1 together."""
-    counts = [found[order] for found in fall_counts(trials)]
+    """Make a line an observer over x, of points in that order, next to each other: many are 0 or 1 together."""
+    counts = [count[order] for count in fall_counts(trials)]
     shares = fall_shares(*counts)
     lines = []
     on_axis = np.log(x) if scale == "log" else x
@@ -102,8 +106,7 @@ def _fall_lines(trials: Trials, x: np.ndarray, order: np.ndarray, scale: Literal
     for place, name in enumerate(trials.study.observers):
         aside = ASIDE * (step if math.isfinite(step) else 0.0) * (place / max(1, len(trials.study.observers) - 1) - 0.5)
         at = np.exp(on_axis + aside) if scale == "log" else on_axis + aside
-        found = [
-            fell_interval(fell, of) if of else UNKNOWN for fell, of in zip(*(n[:, place] for n in counts), strict=True)
-        ]
-        lines.append(Line(at, shares[:, place], style=".-", color=name, spread=_around(found), bars=True))
+        pairs = zip(*(count[:, place] for count in counts), strict=True)
+        intervals = [fell_interval(fell, known) if known else UNKNOWN for fell, known in pairs]
+        lines.append(Line(at, shares[:, place], style=".-", color=name, spread=_heights(intervals), bars=True))
     return lines

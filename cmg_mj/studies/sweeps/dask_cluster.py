@@ -16,7 +16,7 @@ from cmg_mj.errors import InputError, RunStopped, raised
 from cmg_mj.studies.sweeps import dask_worker as on_worker
 from cmg_mj.studies.sweeps.chunk import rows_of_failed_chunk
 from cmg_mj.studies.sweeps.chunk_store import GOES_ON, Store
-from cmg_mj.studies.sweeps.dask_worker import Part, computed, part_of
+from cmg_mj.studies.sweeps.dask_worker import Part, compute_part, part_of
 from cmg_mj.studies.sweeps.trials import from_bytes, table_of
 
 if TYPE_CHECKING:
@@ -24,71 +24,71 @@ if TYPE_CHECKING:
 
 LOCAL = "local:"
 MOST_LOCAL = 256
-"""Workers on this machine."""
+"""Most workers on this machine."""
 ADDRESS = re.compile(r"((tcp|tls)://)?[^/\s]+:\d{1,5}")
 LOOPBACK = "127.0.0.1"
 PATIENCE_S = 10.0
-"""For how long a cluster may fail to answer."""
+"""Time for which a cluster may fail to answer."""
 LOOK_S = 0.25
-"""How often Ctrl-C is looked for while nothing comes back."""
+"""Interval at which Ctrl-C is looked for while nothing comes back."""
 WINDOW = 2
 """Chunks a worker that are handed over at once: one computed, one to go on with. More would only take memory, and
 those that wait on a worker count as killers when it dies."""
 KILLS = 3
-"""Workers that a chunk may kill before it is given up."""
+"""Workers that a chunk may kill before it is abandoned."""
 
 
 @contextmanager
-def on_cluster(said: str, tell: Callable[[str], None]) -> Iterator[Cluster]:
-    """A cluster to run sweeps on.
+def on_cluster(address: str, note: Callable[[str], None]) -> Iterator[Cluster]:
+    """Connect to a cluster to run sweeps on.
 
     Args:
-        said: The address of its scheduler, or `local:N` for one of N workers that is started here, on the loopback,
+        address: The scheduler's address, or `local:N` for a cluster of N workers that is started here, on the loopback,
             and ended with the context.
-        tell: Takes a line for the user.
+        note: Takes a line for the user.
 
     Yields:
         The cluster.
 
     Raises:
-        InputError: It cannot be reached, or `distributed` is not installed.
+        InputError: The cluster cannot be reached, or `distributed` is not installed.
     """
     if find_spec("distributed") is None:
         raise InputError('--cluster: distributed is not installed: python -m pip install "cmg_mj[cluster]"')
-    workers = local_workers(said)
+    workers = local_workers(address)
     import distributed
 
     for name in ("distributed", "distributed.client", "distributed.gc"):  # what goes wrong is said here, in a line
         logging.getLogger(name).setLevel(logging.CRITICAL)
     with ExitStack() as stack:
         try:
-            address: Any = said if workers is None else stack.enter_context(_started(workers))
-            client = stack.enter_context(distributed.Client(address, timeout=PATIENCE_S, set_as_default=False))
+            scheduler = address if workers is None else stack.enter_context(_started(workers))
+            client = stack.enter_context(distributed.Client(scheduler, timeout=PATIENCE_S, set_as_default=False))
         except Exception as error:  # among others OSError, and RuntimeError where a worker does not start
-            what = "reached" if workers is None else "started"
-            raise InputError(f"--cluster {said}: cannot be {what}: {raised(error)}") from error
-        yield Cluster(said, client, tell)
+            verb = "reached" if workers is None else "started"
+            raise InputError(f"--cluster {address}: cannot be {verb}: {raised(error)}") from error
+        yield Cluster(address, client, note)
 
 
-def local_workers(said: str) -> int | None:
-    """How many workers to start here; None for the address of a scheduler.
+def local_workers(address: str) -> int | None:
+    """Read how many workers to start here; None for the address of a scheduler.
 
     Raises:
-        InputError: It is written as neither.
+        InputError: The address is written as neither.
     """
-    if not said.startswith(LOCAL):
-        if not ADDRESS.fullmatch(said):
-            raise InputError(f"--cluster {said}: write tcp://HOST:PORT of a scheduler that is running, or {LOCAL}2")
+    if not address.startswith(LOCAL):
+        if not ADDRESS.fullmatch(address):
+            raise InputError(f"--cluster {address}: write tcp://HOST:PORT of a scheduler that is running, or {LOCAL}2")
         return None
-    count = said.removeprefix(LOCAL)
+    count = address.removeprefix(LOCAL)
     if not (count.isascii() and count.isdecimal() and 1 <= int(count[:9]) <= MOST_LOCAL):
-        raise InputError(f"--cluster {said}: write {LOCAL}N with the number of workers, 1 to {MOST_LOCAL}")
+        raise InputError(f"--cluster {address}: write {LOCAL}N with the number of workers, 1 to {MOST_LOCAL}")
     return int(count)
 
 
 @contextmanager
 def _started(workers: int) -> Iterator[Any]:
-    """A cluster on this machine that only this machine can see."""
+    """Start a cluster on this machine that only this machine can see."""
     from dask import config
     from dask.system import CPU_COUNT  # of those that this process may use
     from distributed import LocalCluster
@@ -112,11 +112,11 @@ def _started(workers: int) -> Iterator[Any]:
 
 
 def on_dask(part: Part) -> bytes:
-    """What a worker is asked to run."""
+    """Compute a chunk on a worker."""
     from distributed import get_worker
 
     worker = get_worker()
-    return computed(part, worker.state.nthreads, worker.address)
+    return compute_part(part, worker.state.nthreads, worker.address)
 
 
 @dataclass
@@ -124,29 +124,29 @@ class Cluster:
     """A cluster that computes chunks.
 
     Attributes:
-        said: As the user named it.
+        address: The address that the user gave.
         client: The connection.
-        tell: Takes a line for the user.
-        running: Numbers of the chunks that are handed over.
-        killed: A chunk's number -> how many workers died while they had it.
+        note: Takes a line for the user.
+        running: Future -> number of a chunk that is handed over.
+        killed: A chunk's number -> number of workers that died while they had it.
     """
 
-    said: str
+    address: str
     client: Client
-    tell: Callable[[str], None]
+    note: Callable[[str], None]
     running: dict[Future, int] = field(default_factory=dict)
     killed: Counter[int] = field(default_factory=Counter)
 
     def run(self, store: Store, on_progress: Callable[[float], None] | None = None) -> None:
-        """Run what is not finished. The result does not depend on the workers, their number or their order.
+        """Run the chunks that are not finished. The result does not depend on the workers, their number or their order.
 
-        A chunk whose workers died is handed over again; where that was nearly too often it is tried alone, at the end,
-        as a neighbour on the same worker may have been the one; if that kills too, its rows say so.
+        A chunk whose workers died is handed over again. After nearly too many deaths it is tried alone, at the end, as
+        a neighbour on the same worker may have been the cause; if that kills too, its rows say so.
 
         Args:
-            store: The sweep's, opened.
-            on_progress: Called several times a second with the trials done; a KeyboardInterrupt it raises ends the
-                sweep, what is finished is kept.
+            store: The sweep's store, opened.
+            on_progress: Called several times a second with the trials done. A KeyboardInterrupt that it raises ends the
+                sweep; what is finished is kept.
 
         Raises:
             InputError: A worker lacks something.
@@ -185,19 +185,19 @@ class Cluster:
 
     def _window(self) -> int:
         try:
-            there: Any = self.client.nthreads()
+            threads: Any = self.client.nthreads()
         except Exception as error:
             raise self._gone() from error
-        if not there and not self.running:
-            self.tell(f"--cluster {self.said}: no worker is there yet; waiting for one")
-        return WINDOW * max(1, len(there))
+        if not threads and not self.running:
+            self.note(f"--cluster {self.address}: no worker is there yet; waiting for one")
+        return WINDOW * max(1, len(threads))
 
     def _hand_over(self, store: Store, number: int) -> None:
         part = part_of(store.study, store.study.chunks[number])
         self.running[self.client.submit(on_dask, part, pure=False)] = number
 
     def _ended(self) -> list[tuple[Future, int]]:
-        """Those that have ended meanwhile, well or not; they are no longer running."""
+        """Take the chunks that have ended meanwhile, well or not, off the running ones."""
         from distributed import CancelledError, wait
 
         try:
@@ -221,12 +221,12 @@ class Cluster:
         except CancelledError as error:
             raise self._gone() from error
         except InputError as error:
-            raise InputError(f"--cluster {self.said}: {error}") from None
+            raise InputError(f"--cluster {self.address}: {error}") from None
         except Exception as error:
             why = raised(error.__cause__ or error)
-            raise RunStopped(f"--cluster {self.said}: a chunk cannot be computed there: {why}") from error
+            raise RunStopped(f"--cluster {self.address}: a chunk cannot be computed there: {why}") from error
         store.keep(number, from_bytes(table))
         return True
 
     def _gone(self) -> RunStopped:
-        return RunStopped(f"--cluster {self.said}: is gone; {GOES_ON}")
+        return RunStopped(f"--cluster {self.address}: is gone; {GOES_ON}")

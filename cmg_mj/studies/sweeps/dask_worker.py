@@ -1,4 +1,4 @@
-"""One chunk on a worker of a cluster: what is sent there, and the table that comes back."""
+"""One chunk on a worker of a cluster: its input, its computation, and the table that comes back."""
 
 from __future__ import annotations
 
@@ -10,16 +10,19 @@ from collections.abc import Mapping
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import folder
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.chunk import compute
+from cmg_mj.studies.sweeps.chunk_store import release_free_memory
 from cmg_mj.studies.sweeps.points import Point
-from cmg_mj.studies.sweeps.release_memory import release_free_memory
 from cmg_mj.studies.sweeps.study import Chunk, SweepStudy
 from cmg_mj.studies.sweeps.trials import as_bytes, table_of
+
+if TYPE_CHECKING:
+    from distributed import Worker
 
 _one_at_a_time = threading.Lock()
 """A worker with many threads is handed as many chunks: one is computed, on all of its threads."""
@@ -27,14 +30,14 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True)
 class Part:
-    """A chunk with all that it takes to compute it elsewhere, and no more: it is sent with every chunk.
+    """A chunk with all that it takes to compute it elsewhere, and no more: every chunk is sent so.
 
     Attributes:
         study: The sweep, without its points.
-        chunk: Which of its trials.
-        points: Those of the chunk, by their numbers.
-        bundled: The file of the model, if that comes with the package, which a worker may have in another folder.
-        versions: What the figures depend on, name -> version.
+        chunk: The trials.
+        points: The chunk's points by their numbers.
+        bundled: The file of a model that comes with the package, which a worker may have in another folder.
+        versions: Name -> version that the figures depend on.
     """
 
     study: SweepStudy
@@ -44,13 +47,13 @@ class Part:
     versions: Mapping[str, str]
 
 
-def dask_setup(worker: Any) -> None:
-    """Called by Dask on every worker that is started on this machine: Ctrl-C is the client's to hear."""
+def dask_setup(worker: Worker) -> None:
+    """Ignore Ctrl-C, which is the client's to hear. Dask calls this on every worker that is started on this machine."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def part_of(study: SweepStudy, chunk: Chunk) -> Part:
-    """What to send for a chunk."""
+    """Collect what a worker needs for a chunk."""
     model = Path(study.scenario.plant.model).resolve()
     return Part(
         dataclasses.replace(study),  # anew: the points that this one has made stay behind
@@ -61,19 +64,19 @@ def part_of(study: SweepStudy, chunk: Chunk) -> Part:
     )
 
 
-def computed(part: Part, threads: int, where: str) -> bytes:
+def compute_part(part: Part, threads: int, where: str) -> bytes:
     """Compute a chunk.
 
     Args:
         part: The chunk.
         threads: The worker's share of its machine.
-        where: What to call the worker in an error.
+        where: The worker's name in an error.
 
     Returns:
         The chunk's table, as `as_bytes` has it.
 
     Raises:
-        InputError: The worker is not fit for it: other versions, an observer or a model file that it does not have.
+        InputError: The worker has other versions, or lacks an observer or a model file.
     """
     with _one_at_a_time, redirect_stdout(sys.stderr):  # a user's observer may print
         here = versions()

@@ -1,29 +1,48 @@
-"""A study file: a scenario, a [vary] table, and who is to run."""
+"""A study file: a scenario, a [vary] table, and the observers."""
 
 from __future__ import annotations
 
 import copy
 import tomllib
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TypedDict, get_args
 
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, TomlValue, nearest
 from cmg_mj.inputs.bundled import bundled, find
 from cmg_mj.inputs.overrides import override
 from cmg_mj.scenario.loading import find_model, load_scenario, parse_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.studies.sweeps.axes import VariedField, parse_axis
+from cmg_mj.studies.sweeps.axes import FieldValue, VariedField, parse_axis
 from cmg_mj.studies.sweeps.study import SamplingDesign
 
 SECTIONS = ("sweep", "vary", "scenario")
-ASKED = {"observers": list, "worlds": int, "design": str, "n": int, "order": list}
+SWEEP_TYPES = {"observers": list, "worlds": int, "design": str, "n": int, "order": list}
+"""Types of the fields of [sweep]."""
 
 
-def study_file(name: str) -> dict[str, Any] | None:
-    """The content of a study file; None of what is a scenario.
+class SweepFields(TypedDict, total=False):
+    """The fields of [sweep]."""
+
+    observers: list[str]
+    worlds: int
+    design: str
+    n: int
+    order: list[str]
+
+
+class StudyFile(TypedDict, total=False):
+    """The sections of a study file."""
+
+    sweep: SweepFields
+    vary: dict[str, FieldValue]
+    scenario: str | dict[str, TomlValue]
+
+
+def study_file(name: str) -> StudyFile | None:
+    """Read a study file; None of a scenario.
 
     Raises:
-        InputError: It is neither.
+        InputError: The file is neither.
     """
     path = find("scenarios", name, ".toml", "scenario")
     if path.stem in bundled("scenarios"):
@@ -41,21 +60,21 @@ def study_file(name: str) -> dict[str, Any] | None:
         if not isinstance(fields.get(section, {}), dict):
             raise InputError(f"{name}: {section}: must be a table")
     for key, value in fields.get("sweep", {}).items():
-        if key not in ASKED:
-            raise InputError(f"{name}: sweep.{key}: no such field; {nearest(key, ASKED)}")
-        if type(value) is not ASKED[key]:
-            raise InputError(f"{name}: sweep.{key} = {value!r}: must be of type {ASKED[key].__name__}")
-    return fields
+        if key not in SWEEP_TYPES:
+            raise InputError(f"{name}: sweep.{key}: no such field; {nearest(key, SWEEP_TYPES)}")
+        if type(value) is not SWEEP_TYPES[key]:
+            raise InputError(f"{name}: sweep.{key} = {value!r}: must be of type {SWEEP_TYPES[key].__name__}")
+    return StudyFile(**fields)
 
 
-def scenario_of(name: str, fields: Mapping[str, Any], settings: Sequence[str] = ()) -> Scenario:
-    """A study file's scenario, a table or a name, with settings `section.field=value` that replace its own."""
-    given = fields.get("scenario")
-    if isinstance(given, str):
-        return load_scenario(given, settings)
-    if not isinstance(given, dict):
+def scenario_of(name: str, fields: StudyFile, settings: Sequence[str] = ()) -> Scenario:
+    """Load a study file's scenario, a table or a name, with settings `section.field=value` that replace its own."""
+    scenario_fields = fields.get("scenario")
+    if isinstance(scenario_fields, str):
+        return load_scenario(scenario_fields, settings)
+    if not isinstance(scenario_fields, dict):
         raise InputError(f"{name}: scenario: must be there, as a table or as a scenario's name")
-    changed = copy.deepcopy({key: value for key, value in given.items() if key != "versions"})
+    changed = copy.deepcopy({key: value for key, value in scenario_fields.items() if key != "versions"})
     for setting in settings:
         override(changed, setting)
     where = " ".join([name, *(["with"] if settings else []), *(f"--set {setting}" for setting in settings)])
@@ -65,15 +84,16 @@ def scenario_of(name: str, fields: Mapping[str, Any], settings: Sequence[str] = 
     return find_model(scenario, find("scenarios", name, ".toml", "scenario").parent)
 
 
-def axes_of(name: str, fields: Mapping[str, Any]) -> list[VariedField]:
-    """A study file's [vary]."""
-    return [parse_axis(field, said, f"{name}: vary.{field}") for field, said in fields.get("vary", {}).items()]
+def axes_of(name: str, fields: StudyFile) -> list[VariedField]:
+    """Read a study file's [vary]."""
+    return [parse_axis(field, value, f"{name}: vary.{field}") for field, value in fields.get("vary", {}).items()]
 
 
-def design_of(name: str, asked: Mapping[str, Any]) -> tuple[SamplingDesign, int]:
-    """A study file's design, and how many points it has."""
-    design: Any = asked.get("design", "grid")
-    known: Sequence[str] = ("grid", "sample", "sobol")
-    if design not in known:
-        raise InputError(f"{name}: sweep.design = {design!r}: must be one of {', '.join(known)}")
-    return design, asked.get("n", 0)
+def design_of(name: str, fields: SweepFields) -> tuple[SamplingDesign, int]:
+    """Read a study file's design, and how many points it has."""
+    text = fields.get("design", "grid")
+    designs: tuple[SamplingDesign, ...] = get_args(SamplingDesign)
+    for design in designs:
+        if text == design:
+            return design, fields.get("n", 0)
+    raise InputError(f"{name}: sweep.design = {text!r}: must be one of {', '.join(designs)}")

@@ -1,4 +1,4 @@
-"""What a study is, and which chunks are its own: each carries a mark in its file's metadata."""
+"""Fingerprints of a study and of its chunks; each chunk carries its own in its file's metadata."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TypeAlias
 
 import tomli_w
 
@@ -16,22 +16,25 @@ from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.includes import check_files
 from cmg_mj.scenario.loading import as_fields
 from cmg_mj.simulation.experiment import prepare
+from cmg_mj.studies.sweeps.axes import FieldValue
 from cmg_mj.studies.sweeps.study import SweepStudy
 
 KEY = b"cmg_mj.chunk"
 FREE = "order"
-"""What a study file says in [sweep] that no trial depends on: another one is no other study."""
+"""Field of [sweep] that no trial depends on: another value is no other study."""
+StudyFields: TypeAlias = "dict[str, dict[str, FieldValue]]"
+"""A study file's sections."""
 
 
 @dataclass(frozen=True)
 class ChunkFingerprint:
-    """What a chunk's figures depend on.
+    """Hashes and versions of everything that a chunk's figures depend on.
 
     Attributes:
         study: Hash of the study.
         model: Hash of its models' files.
-        chunk: Which one, such as `2 of 8`.
-        versions: With which it was computed, name -> version.
+        chunk: The chunk's number, such as `2 of 8`.
+        versions: Name -> version with which the chunk was computed.
     """
 
     study: str
@@ -40,12 +43,12 @@ class ChunkFingerprint:
     versions: Mapping[str, str]
 
     def as_metadata(self) -> dict[bytes, bytes]:
-        """As its file has it."""
+        """Make metadata of a file."""
         return {KEY: json.dumps(asdict(self)).encode()}
 
 
-def mark_in(metadata: Mapping[bytes, bytes] | None) -> ChunkFingerprint | None:
-    """The mark of a file; None if it has none."""
+def fingerprint_in(metadata: Mapping[bytes, bytes] | None) -> ChunkFingerprint | None:
+    """Read the fingerprint of a file; None if it has none."""
     try:
         return ChunkFingerprint(**json.loads((metadata or {})[KEY]))
     except (LookupError, ValueError, TypeError):
@@ -53,7 +56,7 @@ def mark_in(metadata: Mapping[bytes, bytes] | None) -> ChunkFingerprint | None:
 
 
 def not_ours(there: ChunkFingerprint | None, ours: ChunkFingerprint) -> str | None:
-    """Why a chunk is not the one that it should be, in words; None if it is, with whatever versions."""
+    """Say why a chunk is not the expected one; None if it is, with whatever versions."""
     if there is None or there.study != ours.study:
         return "holds no trials of this study"
     if there.model != ours.model:
@@ -61,26 +64,26 @@ def not_ours(there: ChunkFingerprint | None, ours: ChunkFingerprint) -> str | No
     return None if there.chunk == ours.chunk else f"is chunk {there.chunk}, in the place of {ours.chunk}"
 
 
-def other_version(there: Mapping[str, Any], ours: Mapping[str, str]) -> str | None:
-    """The first version that differs, with both; None if none does."""
+def other_version(there: Mapping[str, FieldValue], ours: Mapping[str, str]) -> str | None:
+    """Name the first version that differs, with both values; None if none does."""
     for name, version in ours.items():
         if there.get(name) != version:
             return f"{name} {there.get(name, 'of no known version')} there, {version} here"
     return None
 
 
-def hash_of_study(fields: Mapping[str, Any]) -> str:
-    """Hash of a resolved study, without its versions and what else no trial depends on."""
+def hash_of_study(fields: StudyFields) -> str:
+    """Hash a resolved study, without its versions and what else no trial depends on."""
     return hashlib.sha256(json.dumps(without_asides(as_read(fields)), sort_keys=True).encode()).hexdigest()
 
 
 def hash_of_models(study: SweepStudy) -> str:
-    """Hash of the files of the study's model, or of those that it varies, with all that they include.
+    """Hash the files of the study's model, or of those that it varies, with all that they include.
 
     Raises:
-        InputError: One cannot be read.
+        InputError: A file cannot be read.
     """
-    varied = [value for axis in study.axes if "plant.model" in axis.fields for value in axis.values]
+    varied = [str(value) for axis in study.axes if "plant.model" in axis.fields for value in axis.values]
     digest = hashlib.sha256()
     for model in varied or [study.scenario.plant.model]:
         for path in check_files(find("models", model, ".xml", "plant.model =")):
@@ -94,13 +97,13 @@ def hash_of_models(study: SweepStudy) -> str:
     return digest.hexdigest()
 
 
-def as_read(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields as they come back from a study file."""
-    return tomllib.loads(tomli_w.dumps(dict(fields)))
+def as_read(fields: StudyFields) -> StudyFields:
+    """Make fields into what comes back from a study file."""
+    return tomllib.loads(tomli_w.dumps(fields))
 
 
-def without_asides(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """A study's fields without those that may change without its being another."""
+def without_asides(fields: StudyFields) -> StudyFields:
+    """Discard a study's fields that may change without its being another."""
     asides = {"sweep": FREE, "scenario": "versions"}
     return {
         name: {key: value for key, value in part.items() if key != asides[name]} if name in asides else part
@@ -108,27 +111,24 @@ def without_asides(fields: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def difference(there: Any, here: Any, at: str = "") -> str | None:
-    """The first field in which two studies differ, with both values, shortened; None if they are equal."""
+def first_difference(there: FieldValue | None, here: FieldValue | None, at: str = "") -> str | None:
+    """Find the first field in which two studies differ, with both values, shortened; None if they are equal."""
     if there == here:
         return None
     if isinstance(there, Mapping) and isinstance(here, Mapping):
         pairs = [(f"{at}.{key}".strip("."), there.get(key), here.get(key)) for key in sorted({*there, *here})]
-        return next(found for name, a, b in pairs if (found := difference(a, b, name)))
+        return next(text for name, a, b in pairs if (text := first_difference(a, b, name)))
     if isinstance(there, list) and isinstance(here, list) and shown(there) == shown(here):
         if len(there) != len(here):
             return f"{at} has {len(there)} values there, {len(here)} here"
         pairs = [(f"{at}.{i}", a, b) for i, (a, b) in enumerate(zip(there, here, strict=True))]
-        return next(found for name, a, b in pairs if (found := difference(a, b, name)))
-    return f"{at} = {_said(there)} there, {_said(here)} here"
+        return next(text for name, a, b in pairs if (text := first_difference(a, b, name)))
+    there_text, here_text = ("nothing" if value is None else shown(value) for value in (there, here))
+    return f"{at} = {there_text} there, {here_text} here"
 
 
-def _said(value: Any) -> str:
-    return "nothing" if value is None else shown(value)
-
-
-def resolved(study: SweepStudy) -> dict[str, Any]:
-    """The study with every default of its scenario written out: it reruns from that."""
+def resolved(study: SweepStudy) -> StudyFields:
+    """Write every default of a study's scenario out: the study reruns from that."""
     fields = prepare(study.scenario).resolved()
     varied = [field for axis in study.axes for field in axis.fields]
     for field in varied:
@@ -139,7 +139,7 @@ def resolved(study: SweepStudy) -> dict[str, Any]:
     if study.scenario.plant.timestep_s is None:
         fields["plant"].pop("timestep_s", None)
     weights = study.scenario.controller.lqr
-    if weights is not None:  # solved for anew on every rig
+    if weights is not None:  # solved for anew on every plant
         fields["controller"]["lqr"] = weights.model_dump(mode="json")
     if weights is not None or any(f"{field}.".startswith("controller.lqr.") for field in varied):
         fields["controller"].pop("gains", None)

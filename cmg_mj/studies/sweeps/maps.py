@@ -1,4 +1,4 @@
-"""Maps of a sweep over two varied fields: the best observer of every cell."""
+"""Maps of a sweep over two varied fields, with the best observer of every cell."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ MAPS = {ERRORS[0]: "map_velocity_error", ERRORS[1]: "map_push_error", "fell": "m
 
 
 def maps(trials: Trials, across: str, up: str) -> list[Picture]:
-    """A map a figure, and one of the share of falls if there are any; both fields in a grid."""
+    """Draw a map a figure, and one of the share of falls if there are any; both fields in a grid."""
     study = trials.study
     values = {axis.field: np.array(axis.values, dtype=float) for axis in study.axes if axis.field in (across, up)}
     x_order, y_order = np.argsort(values[across]), np.argsort(values[up])
     x, y = values[across][x_order], values[up][y_order]
 
-    def gridded(of: np.ndarray) -> np.ndarray:
+    def gridded(points: np.ndarray) -> np.ndarray:
         """(n_points, ...) -> (n_y, n_x, ...); points go through the second field first."""
-        return of.reshape(len(x), len(y), *of.shape[1:]).swapaxes(0, 1)[y_order][:, x_order]
+        return points.reshape(len(x), len(y), *points.shape[1:]).swapaxes(0, 1)[y_order][:, x_order]
 
-    fell, of = (gridded(counts) for counts in fall_counts(trials))
-    shares = fall_shares(fell, of)
+    fell, known = (gridded(counts) for counts in fall_counts(trials))
+    shares = fall_shares(fell, known)
     halves = {name: shares[:, :, i] for i, name in enumerate(study.observers)}
     boundaries = {name: half for name, half in halves.items() if (half < 0.5).any() and (half > 0.5).any()}
-    found = []
+    pictures = []
     for key, name in MAPS.items():
         if key == "fell":
             if not trials.fell.any():
                 continue
-            best, sure, least = _least_falls(fell, of)
+            best, sure, least = _least_falls(fell, known)
             label, value, levels, nobody = "share of falls", "share", (0.1, 0.9), "several alike"
         else:
             figure = gridded(trials.figure(key))
@@ -52,7 +52,7 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
                 continue
             best, sure, least = _least_error(figure)
             label, value, levels, nobody = heading(key), "mean", round_values(least), "none stood in every world"
-        drawn = Map(x, y, study.observers, best, sure, least, levels, boundaries, nobody, "half of the worlds fall")
+        cells = Map(x, y, study.observers, best, sure, least, levels, boundaries, nobody, "half of the worlds fall")
         panel = Panel(
             up,
             (),
@@ -62,16 +62,16 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
             scale_of(trials, up, y),
             x_ticks=ticks_of(x),
             y_ticks=ticks_of(y),
-            map=drawn,
+            map=cells,
         )
-        found.append(Picture(name, title_of(trials, label), [panel], panel_height=4.7))
-    return found
+        pictures.append(Picture(name, title_of(trials, label), [panel], panel_height=4.7))
+    return pictures
 
 
 def _least_error(figure: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The best by its mean among those that stood in every world, (n_y, n_x, n_observers, n_worlds) -> (n_y, n_x) each.
+    """Find the best mean among those that stood in every world, (n_y, n_x, n_observers, n_worlds) -> (n_y, n_x) each.
 
-    Surely, if the mean difference to every other, world by world, is beyond its 95 % interval.
+    The best is sure if its mean difference to every other, world by world, is beyond its 95 % interval.
     """
     means = figure.mean(axis=3)
     best, least = _smallest(means)
@@ -83,24 +83,24 @@ def _least_error(figure: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return best, sure, least
 
 
-def _least_falls(fell: np.ndarray, of: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Who falls the least, unless several do, (n_y, n_x, n_observers) -> (n_y, n_x) each.
+def _least_falls(fell: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find who falls the least, unless several do, (n_y, n_x, n_observers) -> (n_y, n_x) each.
 
-    Surely, if its Wilson interval is below those of all others.
+    The best is sure if its Wilson interval is below those of all others.
     """
-    shares = fall_shares(fell, of)
+    shares = fall_shares(fell, known)
     best, least = _smallest(shares)
     best[(shares == least[:, :, None]).sum(axis=2) > 1] = -1
     sure = np.zeros(best.shape, dtype=bool)
     for at in zip(*np.nonzero(best >= 0), strict=True):
-        found = [fell_interval(n, known) for n, known in zip(fell[at], of[at], strict=True) if known]
-        low = sorted(found, key=lambda interval: interval.mean)
+        intervals = [fell_interval(n, trials) for n, trials in zip(fell[at], known[at], strict=True) if trials]
+        low = sorted(intervals, key=lambda interval: interval.mean)
         sure[at] = all(low[0].high < other.low for other in low[1:])
     return best, sure, least
 
 
 def _smallest(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Place of the smallest along the last axis, -1 where there is none, and its value."""
+    """Find the place of the smallest along the last axis, -1 where there is none, and its value."""
     filled = np.where(np.isfinite(values), values, np.inf)
     least = filled.min(axis=-1)
     return np.where(np.isfinite(least), filled.argmin(axis=-1), -1), np.where(np.isfinite(least), least, math.nan)

@@ -1,14 +1,15 @@
-"""Whether a named order of observers holds: each with a smaller error than the next. `order.parquet`."""
+"""Counts how often a named order of observers holds: each with a smaller error than the next. `order.parquet`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cmg_mj.results.intervals import Interval
+from cmg_mj.results.summary_keys import Summary
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
 from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.studies.sweeps.trials import as_table, point_columns
@@ -16,7 +17,7 @@ from cmg_mj.studies.sweeps.trials import as_table, point_columns
 if TYPE_CHECKING:
     import pyarrow as pa
 
-JUDGED = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "tilt_rms_deg")
+ORDER_FIGURES = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "tilt_rms_deg")
 """Figures that an order is counted by, where a trial has them; each is better when it is less."""
 
 
@@ -24,53 +25,61 @@ class OrderCount(NamedTuple):
     """How often an order held.
 
     Attributes:
-        times: So often.
-        of: Of so many that can tell.
+        held: Number of worlds, or points, in which the order held.
+        decided: Number of worlds, or points, that can tell.
     """
 
-    times: int
-    of: int
+    held: int
+    decided: int
 
     @property
     def share(self) -> Interval | None:
-        """With Wilson's 95 % interval; None of nothing."""
-        return fell_interval(self.times, self.of) if self.of else None
+        """The share with Wilson's 95 % interval; None of nothing."""
+        return fell_interval(self.held, self.decided) if self.decided else None
+
+    @property
+    def words(self) -> str:
+        """Both numbers, as tables show them."""
+        return f"{self.held} of {self.decided}"
 
 
 def figures_of(trials: Trials) -> list[str]:
-    """Those of JUDGED that the trials have."""
-    return [key for key in JUDGED if np.isfinite(trials.figure(key)).any()] or [JUDGED[0]]
+    """List the figures of ORDER_FIGURES that the trials have."""
+    return [key for key in ORDER_FIGURES if np.isfinite(trials.figure(key)).any()] or [ORDER_FIGURES[0]]
 
 
-def order_at(trials: Trials, key: str) -> list[OrderCount]:
-    """In how many of each point's worlds the study's order holds.
+def order_counts(trials: Trials) -> dict[str, list[OrderCount]]:
+    """Count, for each figure and point, the worlds in which the study's order holds.
+
+    A fall is worse than any error. A world in which two next to each other fell cannot tell, unless the others break
+    the order. Nor can a world in which a trial was refused or stopped, whatever the others are: that is no merit of
+    theirs.
 
     Args:
         trials: The trials.
-        key: The figure that decides. A fall is worse than any.
 
     Returns:
-        A point each. A world in which two next to each other fell cannot tell, unless the others break the order;
-        nor can one in which a trial was refused or stopped, whatever the others are: that is no merit of theirs.
+        Figure that decides -> a count for each point.
     """
-    return [_held(values) for values in _errors(trials, key, trials.study.order)]
+    order = trials.study.order
+    return {key: [_count(values) for values in _errors(trials, key, order)] for key in figures_of(trials)}
 
 
 def order_of_points(trials: Trials, key: str, order: Sequence[str]) -> OrderCount:
-    """At how many points it holds for the means over the worlds.
+    """Count the points at which an order holds for the means over the worlds.
 
-    One that fell in some world is worse than any mean; a point with a trial that was refused or stopped cannot tell.
+    A fall in some world is worse than any mean; a point with a trial that was refused or stopped cannot tell.
     """
-    return _held(_errors(trials, key, order).mean(axis=2).T)
+    return _count(_errors(trials, key, order).mean(axis=2).T)
 
 
 def pairs_of(order: Sequence[str]) -> list[tuple[str, str]]:
-    """The comparisons that an order is made of."""
+    """List the comparisons that an order is made of."""
     return list(pairwise(order))
 
 
 def log_ratio(trials: Trials, key: str, better: str, worse: str) -> np.ndarray:
-    """Logarithm of one observer's figure by another's, (n_points, n_worlds); NaN where one did not stand."""
+    """Compute the logarithm of two observers' ratio, (n_points, n_worlds); NaN where one did not stand."""
     places = [trials.study.observers.index(name) for name in (better, worse)]
     first, second = np.moveaxis(trials.figure(key)[:, places], 1, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -78,13 +87,13 @@ def log_ratio(trials: Trials, key: str, better: str, worse: str) -> np.ndarray:
 
 
 def _errors(trials: Trials, key: str, order: Sequence[str]) -> np.ndarray:
-    """Of an order's observers, (n_points, n_order, n_worlds); infinite where one fell, NaN where nothing is known."""
+    """Stack the errors of an order's observers, (n_points, n_order, n_worlds); infinite where one fell, or NaN."""
     places = [trials.study.observers.index(name) for name in order]
     return np.where(trials.fell[:, places], np.inf, trials.figure(key)[:, places])
 
 
-def _held(errors: np.ndarray) -> OrderCount:
-    """Of errors (n_order, n); those with a NaN cannot tell."""
+def _count(errors: np.ndarray) -> OrderCount:
+    """Count the columns of errors (n_order, n) in which the order holds; those with a NaN cannot tell."""
     errors = errors[:, ~np.isnan(errors).any(axis=0)]
     better, worse = errors[:-1], errors[1:]
     holds = (better < worse).all(axis=0)
@@ -92,53 +101,46 @@ def _held(errors: np.ndarray) -> OrderCount:
     return OrderCount(int(holds.sum()), int((holds | broken).sum()))
 
 
-def order_table(study: SweepStudy, rows: Sequence[dict[str, Any]]) -> pa.Table:
-    """The rows of `order_rows` as a table."""
+def order_table(study: SweepStudy, rows: Sequence[Summary]) -> pa.Table:
+    """Make the rows of `order_rows` into a table."""
     import pyarrow as pa
 
+    counts = [("order", "string"), ("held", "int64"), ("worlds", "int64")]
     ends = [(name, "float64") for name in ("share", "low", "high")]
-    columns = [
-        ("figure", "string"),
-        *point_columns(study),
-        ("order", "string"),
-        ("held", "int64"),
-        ("worlds", "int64"),
-        *ends,
-    ]
-    return as_table(rows, pa.schema(columns))
+    return as_table(rows, pa.schema([("figure", "string"), *point_columns(study), *counts, *ends]))
 
 
-def order_rows(trials: Trials) -> list[dict[str, Any]]:
-    """A row a figure and point: in how many worlds the order held, of how many, and the share with its interval."""
-    rows = []
-    for key in figures_of(trials):
-        for number, (point, held) in enumerate(zip(trials.study.points, order_at(trials, key), strict=True)):
-            share = held.share
-            low, high = (None, None) if share is None else (share.low, share.high)
-            row = {"figure": key, "point": number, **point, "order": ",".join(trials.study.order)}
-            row |= {"held": held.times, "worlds": held.of, "share": None if share is None else share.mean}
-            rows.append(row | {"low": low, "high": high})
+def order_rows(study: SweepStudy, counts: Mapping[str, Sequence[OrderCount]]) -> list[Summary]:
+    """Make a row for each figure and point: in how many worlds the order held, and the share with its interval."""
+    rows: list[Summary] = []
+    for key, points in counts.items():
+        for number, (point, count) in enumerate(zip(study.points, points, strict=True)):
+            share, low, high = count.share or (None, None, None)
+            row: Summary = {"figure": key, "point": number, **point, "order": ",".join(study.order)}
+            row |= {"held": count.held, "worlds": count.decided, "share": share, "low": low, "high": high}
+            rows.append(row)
     return rows
 
 
 def by_quarters(trials: Trials, key: str) -> list[tuple[str, float, float, OrderCount]]:
-    """How often the order holds where a field is low, and where it is high.
+    """Count how often the order holds where a field is low, and where it is high.
 
     Args:
         trials: The trials of a sampled design.
         key: The figure that decides.
 
     Returns:
-        Of each quarter of a field's range, and of each number in a list: the field, the lowest and the highest value,
-        and at how many of the points there it holds for the means over the worlds.
+        For each quarter of a field's range, and each number in a list: the field, the lowest and the highest value,
+        and at how many of the points there the order holds for the means over the worlds.
     """
     errors = _errors(trials, key, trials.study.order).mean(axis=2)
-    found = []
+    quarters = []
     for axis in trials.study.axes:
         values = np.array([point[axis.field] for point in trials.study.points])
         if np.issubdtype(values.dtype, np.number):
             groups = values if axis.values else np.digitize(values, np.quantile(values, (0.25, 0.5, 0.75)))
             for group in np.unique(groups):
-                there = values[groups == group]
-                found.append((axis.field, there.min().item(), there.max().item(), _held(errors[groups == group].T)))
-    return found
+                members = values[groups == group]
+                count = _count(errors[groups == group].T)
+                quarters.append((axis.field, members.min().item(), members.max().item(), count))
+    return quarters

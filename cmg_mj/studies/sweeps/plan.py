@@ -1,57 +1,69 @@
-"""What a sweep would take, from pieces of it that are begun."""
+"""The cost of a sweep, estimated from pieces of it that are begun."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import Any
+from typing import TypedDict
 
 from cmg_mj.simulation.pool import can_vary_in_batch
 from cmg_mj.studies.sweeps.chunk import compute
 from cmg_mj.studies.sweeps.study import CHUNK, MOST_TRIALS, Chunk, SweepStudy
 
 TRIALS, SECONDS, STRETCHES = 256, 1.5, 8
-"""So many trials stand for a chunk and are run for so long once they have begun, in so many places."""
+"""Trials that stand for a chunk, how long they run once they have begun [s], and in how many places."""
 POINTS = 4096
-"""Of a study beyond `MOST_TRIALS` so many stand for all."""
+"""Points that stand for all of a study beyond `MOST_TRIALS`."""
 MB_AT_LEAST, MB_A_WORLD, MB_A_WORLD_S, MB_A_POINT, BYTES_A_TRIAL = 230.0, 0.015, 0.008, 0.12, 200.0
-"""Of the process with its pictures; of each of a chunk's trials and its seconds, and of its points; of all trials.
+"""Memory of the process with its pictures; of a chunk's trials, their seconds, and its points; of every trial.
 
 By the peaks (VmHWM) of four sweeps on Linux: of 0.05 s, 2 points x 50 worlds, 1,000 x 100, 5,000 x 1: 232, 252 and
 372 MB; of 15 s, 1 x 1,024: 365 MB.
 """
 
 
-def estimate_cost(study: SweepStudy) -> dict[str, Any]:
-    """Points, trials, chunks; minutes on this machine and memory, as far as a piece of every observer can say."""
-    looked_at = _thinned(study)
-    seconds = sum(_seconds_a_trial(looked_at, observer) for observer in study.observers)
-    of_an_observer = study.n_points * study.worlds
-    of_a_chunk = min(CHUNK, of_an_observer)
-    rigs = min(study.n_points, -(-of_a_chunk // study.worlds))
+class Cost(TypedDict):
+    """The cost of a sweep, as `--plan --json` prints it."""
+
+    points: int
+    observers: int
+    worlds: int
+    trials: int
+    chunks: int
+    minutes: float
+    memory_mb: float
+
+
+def estimate_cost(study: SweepStudy) -> Cost:
+    """Estimate minutes on this machine and memory, as far as a piece of every observer can say."""
+    thinned = _thinned(study)
+    seconds = sum(_seconds_a_trial(thinned, observer) for observer in study.observers)
+    trials_an_observer = study.n_points * study.worlds
+    trials_a_chunk = min(CHUNK, trials_an_observer)
+    plants = min(study.n_points, -(-trials_a_chunk // study.worlds))
     return {
         "points": study.n_points,
         "observers": len(study.observers),
         "worlds": study.worlds,
         "trials": study.trials,
         "chunks": study.chunks.count,
-        "minutes": seconds * of_an_observer / 60.0,
+        "minutes": seconds * trials_an_observer / 60.0,
         "memory_mb": MB_AT_LEAST
-        + (MB_A_WORLD + MB_A_WORLD_S * study.scenario.duration_s) * of_a_chunk
-        + MB_A_POINT * rigs
+        + (MB_A_WORLD + MB_A_WORLD_S * study.scenario.duration_s) * trials_a_chunk
+        + MB_A_POINT * plants
         + BYTES_A_TRIAL * study.trials / 2**20,
     }
 
 
 def _thinned(study: SweepStudy) -> SweepStudy:
-    """The study, or of a very large one, whose points would take long to draw and much memory, some that lie alike."""
+    """Thin a very large study, whose points would take long to draw and much memory, to points that lie alike."""
     if study.trials <= MOST_TRIALS or study.n_points <= POINTS:
         return study
     return replace(study, design="sample", n=POINTS)
 
 
 def _seconds_a_trial(study: SweepStudy, observer: str) -> float:
-    """Of an observer, by some of its trials; by several stretches of them if not all can run in one batch."""
+    """Time some of an observer's trials, in several stretches if not all can run in one batch [s]."""
     trials = study.n_points * study.worlds
     pooled = all(
         can_vary_in_batch(field, study.scenario.controller.kind) for axis in study.axes for field in axis.fields
@@ -59,12 +71,12 @@ def _seconds_a_trial(study: SweepStudy, observer: str) -> float:
     stretches = 1 if pooled else min(STRETCHES, trials)
     count = min(TRIALS, trials // stretches)
     starts = [trials * i // stretches for i in range(stretches)]
-    taken = [_seconds(study, Chunk(0, observer, study.chunks.stretch(first, count))) for first in starts]
-    return sum(taken) / len(taken) / count
+    seconds = [_seconds(study, Chunk(0, observer, study.chunks.stretch(first, count))) for first in starts]
+    return sum(seconds) / len(seconds) / count
 
 
 def _seconds(study: SweepStudy, piece: Chunk) -> float:
-    """What a piece takes, by what makes it ready and by its pace once it has begun."""
+    """Time a piece by its preparation and by its pace once it has begun [s]."""
     begun: list[tuple[float, float]] = []
     enough = False
 

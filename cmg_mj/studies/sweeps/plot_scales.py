@@ -1,4 +1,4 @@
-"""What curves and maps of a sweep share: figures, scales, marks, shares of falls."""
+"""Scales, ticks, titles and shares of falls of a sweep's curves and maps."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from typing import Literal
 import numpy as np
 
 from cmg_mj.studies.sweeps.cells import Trials
+from cmg_mj.studies.sweeps.study import counted
 
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
-"""Figures that are drawn, and whose indices are shown, where a trial has them; the first is that of the tables."""
+"""Figures that are drawn, and whose indices are shown, where a trial has them; tables show the first."""
 MOST_TICKS = 10
 
 
 def is_logarithmic(values: Sequence[float] | np.ndarray) -> bool:
-    """Whether values are spaced more evenly in their logarithm, such as 100, 200, 500, 1000."""
+    """Judge whether values are spaced more evenly in their logarithm, such as 100, 200, 500, 1000."""
     sorted_values = np.unique(np.asarray(values, dtype=float))
     if len(sorted_values) < 3 or sorted_values[0] <= 0.0:
         return False
@@ -25,18 +26,18 @@ def is_logarithmic(values: Sequence[float] | np.ndarray) -> bool:
 
 
 def scale_of(trials: Trials, field: str, values: np.ndarray) -> Literal["linear", "log"]:
-    """The scale of a varied field's axis."""
+    """Choose the scale of a varied field's axis."""
     axis = next(axis for axis in trials.study.axes if axis.field == field)
     return "log" if (axis.log if axis.is_range else is_logarithmic(values)) else "linear"
 
 
 def ticks_of(values: np.ndarray) -> list[float]:
-    """Values to mark, not too many."""
+    """Choose values to mark, not too many."""
     return [float(value) for value in values[:: math.ceil(len(values) / MOST_TICKS)]]
 
 
 def round_values(values: np.ndarray) -> tuple[float, ...]:
-    """Round numbers between the least and the greatest value, at most seven; none if they are too alike."""
+    """Choose at most seven round numbers between the least and the greatest value; none if they are too alike."""
     known = values[np.isfinite(values) & (values > 0.0)]
     if not len(known) or known.min() == known.max():
         return ()
@@ -53,18 +54,18 @@ def round_values(values: np.ndarray) -> tuple[float, ...]:
 
 
 def fall_counts(trials: Trials) -> tuple[np.ndarray, np.ndarray]:
-    """How many worlds fell, and of how many that fell or stood, (n_points, n_observers) each."""
+    """Count the worlds that fell, and those that fell or stood, (n_points, n_observers) each."""
     fell = trials.fell
     return fell.sum(axis=2), (fell | trials.stood).sum(axis=2)
 
 
-def fall_shares(fell: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """Shares of falls of such counts; NaN where every world was refused or stopped, which says neither."""
-    return np.divide(fell, of, out=np.full(fell.shape, math.nan), where=of > 0)
+def fall_shares(fell: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Compute shares of falls from such counts; NaN where every world was refused or stopped, which says neither."""
+    return np.divide(fell, known, out=np.full(fell.shape, math.nan), where=known > 0)
 
 
-def title_of(trials: Trials, shown: str = "") -> str:
-    """Of a picture, with what it shows."""
+def title_of(trials: Trials, figure: str = "") -> str:
+    """Title a picture with the scenario, the figure that it shows and the number of worlds."""
     study = trials.study
-    worlds = f"{study.worlds} {'world' if study.worlds == 1 else 'worlds'} a cell"
-    return ": ".join([study.scenario.title or "Sweep", ", ".join([*([shown] if shown else []), worlds])])
+    worlds = f"{counted(study.worlds, 'world')} a cell"
+    return f"{study.scenario.title or 'Sweep'}: {f'{figure}, {worlds}' if figure else worlds}"

@@ -1,4 +1,4 @@
-"""The points of a sweep: what is varied, by its number, made when it is asked for."""
+"""The points of a sweep: the values of the varied fields, made from a point's number on demand."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from typing import Any, overload
 
 import numpy as np
 
-from cmg_mj.studies.sweeps.axes import VariedField
+from cmg_mj.studies.sweeps.axes import FieldValue, VariedField
 
-Point = dict[str, Any]
-"""Field -> its value."""
+Point = dict[str, FieldValue]
+"""Varied field -> its value."""
 
 
 class Points:
     """Points by their numbers. A hundred thousand of them as dictionaries would take 30 MB and more.
 
     Args:
-        axes: What is varied.
-        shares: Where each point lies in the axes' ranges, (n_points, n_axes), of a design; None for a grid: every
+        axes: The varied fields.
+        shares: The place of a design's points in the axes' ranges, (n_points, n_axes); None for a grid: every
             combination of values, of which the last field's change first.
     """
 
     def __init__(self, axes: Sequence[VariedField], shares: np.ndarray | None = None) -> None:
         self._fields = [axis.fields for axis in axes]
-        self._columns: list[Sequence[Any]] | None = None
+        self._columns: list[Sequence[FieldValue]] | None = None
         if shares is None:
             self._values = [axis.values for axis in axes]
             self._length = math.prod(len(values) for values in self._values)
@@ -48,7 +48,7 @@ class Points:
 
     def __getitem__(self, number: int | slice) -> Point | list[Point]:
         if isinstance(number, slice):
-            return [self[each] for each in range(self._length)[number]]
+            return [self[index] for index in range(self._length)[number]]
         if not 0 <= number < self._length:
             raise IndexError(number)
         if self._columns is not None:
@@ -61,20 +61,22 @@ class Points:
         return {field: value for fields, value in zip(self._fields, row, strict=True) for field in fields}
 
 
-def _packed(values: list[Any]) -> Sequence[Any]:
-    """As few bytes as they take."""
-    return array("d", values) if all(type(value) is float for value in values) else values
+def _packed(values: list[FieldValue]) -> Sequence[FieldValue]:
+    """Store numbers in as few bytes as they take."""
+    floats = [value for value in values if type(value) is float]
+    return array("d", floats) if len(floats) == len(values) else values
 
 
 def sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray:
-    """Points in the unit cube, evenly spread, (n_points, dimensions).
+    """Spread points evenly in the unit cube, (n_points, dimensions).
 
-    For indices they are those of Saltelli's scheme, as `scipy.stats.sobol_indices` wants them: A, B, then A with each
-    column in turn from B.
+    For indices the points are those of Saltelli's scheme, as `scipy.stats.sobol_indices` wants them: A, B, then A with
+    each column in turn from B.
     """
     from scipy.stats import qmc  # half a second
 
-    generator: Any = {"seed": np.random.default_rng(seed)}  # called `rng` since 1.15; this name all versions take
+    # The argument is called `rng` since 1.15; all versions take this name.
+    generator: Any = {"seed": np.random.default_rng(seed)}
 
     if not indices:
         import warnings

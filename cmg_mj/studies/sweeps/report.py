@@ -1,64 +1,82 @@
-"""What a sweep says: tables for the terminal and `report.md`, and the files it writes."""
+"""A sweep's report: tables for the terminal and `report.md`, pictures, and the files of its folder."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from cmg_mj.errors import InputError
+from cmg_mj.results.files import write_parquet
 from cmg_mj.results.run_folder import RunFolder, Writers, write_text
-from cmg_mj.studies.sweeps import report_cells
-from cmg_mj.studies.sweeps import report_sections as report_parts
+from cmg_mj.studies.sweeps import report_sections as sections
+from cmg_mj.studies.sweeps.axes import is_number
 from cmg_mj.studies.sweeps.cells import Trials, cells_in_blocks, cells_schema
 from cmg_mj.studies.sweeps.chunk_store import GOES_ON, TRIALS, Store, merged
-from cmg_mj.studies.sweeps.figures import NAMES, pictures_of
-from cmg_mj.studies.sweeps.order import order_rows, order_table
-from cmg_mj.studies.sweeps.report_cells import CELLS, MOST_ROWS
-from cmg_mj.studies.sweeps.sobol import index_rows, index_table
+from cmg_mj.studies.sweeps.curves import CURVES, curves
+from cmg_mj.studies.sweeps.maps import MAPS, maps
+from cmg_mj.studies.sweeps.order import OrderCount, order_counts, order_rows, order_table
+from cmg_mj.studies.sweeps.report_sections import CELLS, INDICES, ORDER
+from cmg_mj.studies.sweeps.sobol import IndexRow, index_rows, index_table
 from cmg_mj.studies.sweeps.study import counted
-from cmg_mj.studies.sweeps.trials import write_table, write_tables
+from cmg_mj.studies.sweeps.trials import write_tables
 from cmg_mj.visualization.plots.figure_spec import Picture
 from cmg_mj.visualization.plots.run_plot import draw
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-ORDER, INDICES, REPORT = "order.parquet", "indices.parquet", "report.md"
-FILES = (TRIALS, CELLS, ORDER, INDICES, REPORT, *NAMES)
-"""Those that may be written."""
+REPORT = "report.md"
+PICTURES = tuple(f"{name}.png" for name in (*MAPS.values(), CURVES))
+FILES = (TRIALS, CELLS, ORDER, INDICES, REPORT, *PICTURES)
+"""Files that may be written."""
 
 
 class SweepTables(NamedTuple):
-    """What a finished sweep has found.
+    """The results of a finished sweep.
 
     Attributes:
-        trials: Its trials.
-        order: A row a point, with a named order.
-        indices: A row a figure, observer and field, of a design for them.
+        trials: The sweep's trials.
+        order: Figure -> a count for each point, of a study with a named order.
+        indices: A row a figure, observer and field, of a design for Sobol indices.
     """
 
     trials: Trials
-    order: list[dict[str, Any]]
-    indices: list[dict[str, Any]]
+    order: dict[str, list[OrderCount]]
+    indices: list[IndexRow]
 
 
-def found_of(trials: Trials) -> SweepTables:
-    """What the trials say."""
+def tables_of(trials: Trials) -> SweepTables:
+    """Evaluate the trials."""
     study = trials.study
     return SweepTables(
         trials,
-        order_rows(trials) if study.order else [],
+        order_counts(trials) if study.order else {},
         index_rows(trials) if study.design == "sobol" else [],
     )
 
 
-def save(folder: RunFolder, store: Store, found: SweepTables) -> Path:
+def pictures_of(trials: Trials) -> list[Picture]:
+    """Draw curves over one varied numeric field, a map a figure over two in a grid; else nothing."""
+    study = trials.study
+    axes = [axis for axis in study.axes if axis.is_range or len(axis.values) > 1]
+    if not all(is_number(value) for axis in axes for value in axis.values):
+        return []
+    if len(axes) == 1 and study.design != "sobol":
+        pictures = [curves(trials, axes[0].field)]
+    elif len(axes) == 2 and study.design == "grid":
+        pictures = maps(trials, axes[0].field, axes[1].field)
+    else:
+        return []
+    return [picture for picture in pictures if picture.panels]
+
+
+def save(folder: RunFolder, store: Store, tables: SweepTables) -> Path:
     """Write the tables, the pictures and the report of a finished sweep.
 
     Raises:
-        InputError: One cannot be written.
+        InputError: A file cannot be written.
     """
-    study, trials = store.study, found.trials
+    study, trials = store.study, tables.trials
     pictures = pictures_of(trials)
     files: Writers = {
         TRIALS: lambda path: merged(store, path),
@@ -66,41 +84,39 @@ def save(folder: RunFolder, store: Store, found: SweepTables) -> Path:
         **{f"{picture.name}.png": lambda path, picture=picture: draw(path, picture) for picture in pictures},
     }
     if study.order:
-        files[ORDER] = lambda path: write_table(path, order_table(study, found.order))
+        files[ORDER] = lambda path: write_parquet(
+            path, order_table(study, order_rows(study, tables.order)), durable=True
+        )
     if study.design == "sobol":
-        files[INDICES] = lambda path: write_table(path, index_table(found.indices))
-    files[REPORT] = lambda path: write_text(path, report(found, pictures))
+        files[INDICES] = lambda path: write_parquet(path, index_table(tables.indices), durable=True)
+    files[REPORT] = lambda path: write_text(path, report(tables, pictures))
     try:
         return folder.write(files)
     except InputError as error:
         raise InputError(f"{error}; {GOES_ON}") from None
 
 
-def report(found: SweepTables, pictures: Sequence[Picture]) -> str:
-    """The report as Markdown."""
-    study = found.trials.study
-    counts = ", ".join(
-        counted(n, what)
-        for n, what in ((len(study.points), "point"), (len(study.observers), "observer"), (study.worlds, "world"))
-    )
+def report(tables: SweepTables, pictures: Sequence[Picture]) -> str:
+    """Write the report as Markdown."""
+    trials, study = tables.trials, tables.trials.study
+    sizes = ((len(study.points), "point"), (len(study.observers), "observer"), (study.worlds, "world"))
+    counts = ", ".join(counted(n, noun) for n, noun in sizes)
     parts = [f"# {study.scenario.title or 'Sweep'}", f"{counts}: {counted(study.trials, 'trial')}."]
-    parts += report_cells.varied(study)
-    parts += report_parts.pictures(found.trials, pictures)
+    parts += sections.varied(study)
+    parts += sections.pictures(trials, pictures)
     if study.order:
-        parts += report_parts.order(found.trials, found.order, MOST_ROWS)
+        parts += sections.order(trials, tables.order)
     if study.design == "sobol":
-        parts += report_parts.indices(study, found.indices)
-    parts += report_cells.unfinished(found.trials)
-    return "\n\n".join([*parts, *report_cells.cells(found.trials)])
+        parts += sections.indices(study, tables.indices)
+    return "\n\n".join([*parts, *sections.unfinished(trials), *sections.cells(trials)])
 
 
-def summary(found: SweepTables) -> str:
-    """For the terminal: the cells, why some trials have no figures, how often the order holds, the total indices."""
-    study = found.trials.study
-    parts = [report_cells.in_short(found.trials)]
-    parts += filter(None, [report_cells.unfinished_in_short(found.trials)])
+def summary(tables: SweepTables) -> str:
+    """Write for the terminal: cells, reasons of unfinished trials, how often the order holds, total indices."""
+    trials, study = tables.trials, tables.trials.study
+    parts = [sections.cells_in_short(trials), *sections.unfinished_in_short(trials)]
     if study.order:
-        parts.append(report_parts.order_in_short(found.trials))
+        parts.append(sections.order_in_short(trials))
     if study.design == "sobol":
-        parts.append(report_parts.indices_in_short(found.indices))
+        parts.append(sections.indices_in_short(tables.indices))
     return "\n\n".join(parts)

@@ -1,9 +1,9 @@
-"""Sobol indices of a sweep: which of the varied fields an observer's figures depend on. `indices.parquet`."""
+"""Sobol indices of a sweep: the fields that an observer's figures depend on. `indices.parquet`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,10 +19,26 @@ RESAMPLES = 999
 FEWEST = 16
 """Rows of a design by whose intervals anything is called decisive: those of fewer are too narrow."""
 LOST, LOG_RATIO = "lost_share", "log_ratio_of_"
-"""What is decomposed beside the figures: the share of worlds that fell or stopped, and, before a figure's name, the
-logarithm of two observers' ratio."""
+"""Quantities that are decomposed besides the figures: the share of worlds that fell or stopped; before a figure's name,
+the logarithm of two observers' ratio."""
 AT_ONCE = 2_000_000
 """Values of resamples held together."""
+
+
+class IndexRow(NamedTuple):
+    """A row of `indices.parquet`: the indices of a figure, observer and field, or why there are none."""
+
+    figure: str
+    observer: str
+    field: str
+    first: float | None = None
+    first_low: float | None = None
+    first_high: float | None = None
+    total: float | None = None
+    total_low: float | None = None
+    total_high: float | None = None
+    decisive: bool | None = None
+    refused: str | None = None
 
 
 class Indices(NamedTuple):
@@ -52,7 +68,7 @@ class Indices(NamedTuple):
 
 
 def indices(values: np.ndarray, n: int, seed: int) -> Indices:
-    """First-order and total indices of a function at the points of a design for them.
+    """Compute first-order and total indices of a function at the points of a design for them.
 
     S_i = mean(f_B (f_AB_i - f_A)) / var, ST_i = mean((f_A - f_AB_i)^2) / (2 var) (`scipy.stats.sobol_indices`).
     Intervals: percentiles of resampled rows of the design, by a seed so that they come out the same again.
@@ -60,7 +76,7 @@ def indices(values: np.ndarray, n: int, seed: int) -> Indices:
     Args:
         values: At A, B, and A with each column in turn from B, (n (n_fields + 2),); finite, and not all the same.
         n: Rows of the design.
-        seed: Of the resampling.
+        seed: Seed of the resampling.
 
     Returns:
         The indices with their intervals.
@@ -79,46 +95,52 @@ def indices(values: np.ndarray, n: int, seed: int) -> Indices:
 
 
 def _estimated(blocks: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First-order and total indices by some rows of the design, (n_resamples, n) -> (n_resamples, n_fields) each."""
+    """Estimate both indices by some rows of the design, (n_resamples, n) -> (n_resamples, n_fields) each."""
     from scipy.stats import sobol_indices  # half a second
 
-    taken = blocks[:, rows]
-    found = sobol_indices(func={"f_A": taken[0], "f_B": taken[1], "f_AB": taken[2:]}, n=rows.shape[1])
-    return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)
+    f = blocks[:, rows]
+    result = sobol_indices(func={"f_A": f[0], "f_B": f[1], "f_AB": f[2:]}, n=rows.shape[1])
+    return np.atleast_2d(result.first_order), np.atleast_2d(result.total_order)
 
 
-def index_table(rows: Sequence[dict[str, Any]]) -> pa.Table:
-    """The rows of `index_rows` as a table."""
+def index_table(rows: Sequence[IndexRow]) -> pa.Table:
+    """Make the rows of `index_rows` into a table."""
     import pyarrow as pa
 
     names = [(name, "string") for name in ("figure", "observer", "field")]
-    found = [(name, "float64") for name in Indices._fields]
-    return as_table(rows, pa.schema([*names, *found, ("decisive", "bool"), ("refused", "string")]))
+    figures = [(name, "float64") for name in Indices._fields]
+    return as_table(
+        (row._asdict() for row in rows), pa.schema([*names, *figures, ("decisive", "bool"), ("refused", "string")])
+    )
 
 
-def index_rows(trials: Trials) -> list[dict[str, Any]]:
-    """A row a quantity, observer and field; without indices, and with the reason, where they cannot be had.
+def index_rows(trials: Trials) -> list[IndexRow]:
+    """Make a row for each quantity, observer and field; without indices, and with the reason, where there are none.
 
-    What is decomposed is the mean over a point's worlds, whose noise is the same at every point.
+    The indices decompose the mean over a point's worlds, whose noise is the same at every point.
     """
     study = trials.study
     fields = [axis.field for axis in study.axes]
-    rows = []
+    rows: list[IndexRow] = []
     for figure, observer, values, outcome in _quantities(trials):
         why = _refused(values, outcome, study.n)
-        found = None if why else indices(values.mean(axis=1), study.n, study.scenario.seed)
+        if why:
+            rows += (IndexRow(figure, observer, field, refused=why) for field in fields)
+            continue
+        result = indices(values.mean(axis=1), study.n, study.scenario.seed)
         for i, field in enumerate(fields):
-            row: dict[str, Any] = {"figure": figure, "observer": observer, "field": field}
-            row |= {name: None if found is None else float(found[j][i]) for j, name in enumerate(Indices._fields)}
-            row["decisive"] = None if found is None else bool(found.decisive[i]) and study.n >= FEWEST
-            rows.append(row | {"refused": why})
+            figures = (float(values[i]) for values in result)
+            rows.append(
+                IndexRow(figure, observer, field, *figures, decisive=bool(result.decisive[i]) and study.n >= FEWEST)
+            )
     return rows
 
 
 def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
-    """What is decomposed: its name, whose it is, the values and the outcomes, (n_points, n_worlds) each.
+    """List what is decomposed: name, observer, values and outcomes, (n_points, n_worlds) each.
 
-    Every observer's figures; how often it did not stand; and by a named order the logarithm of the ratio of two errors.
+    Quantities are every observer's figures, how often it did not stand, and the logarithms of the ratios of a named
+    order's errors.
     """
     observers = trials.study.observers
     for key in COMPARED:
@@ -137,7 +159,7 @@ def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarr
 
 
 def _refused(values: np.ndarray, outcome: np.ndarray, n: int) -> str | None:
-    """Why a quantity has no indices, with counts; of a design of n rows."""
+    """Say why a quantity of a design of n rows has no indices, with counts; None if it has."""
     means = values.mean(axis=1)
     if np.isfinite(means).all():
         if np.ptp(means) == 0.0:

@@ -1,4 +1,4 @@
-"""What a sweep is to find out: a scenario, what is varied in it and how, the observers, the worlds."""
+"""The study of a sweep: a scenario, what is varied in it and how, the observers, the worlds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from cmg_mj.scenario.loading import as_fields, parse_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.simulation.experiment import load_scenario_plant, prepare
 from cmg_mj.simulation.pool import can_vary_in_batch
-from cmg_mj.studies.sweeps.axes import VariedField
+from cmg_mj.studies.sweeps.axes import FieldValue, VariedField
 from cmg_mj.studies.sweeps.checks import check_axes, check_observers, check_order, check_points, check_worlds
 from cmg_mj.studies.sweeps.points import Points, sampled
 
@@ -25,9 +25,9 @@ SamplingDesign = Literal["grid", "sample", "sobol"]
 MOST_TRIALS = 1_000_000
 """Beyond it a sweep must be asked for twice (`--yes`)."""
 CHUNK = 1024
-"""Trials that are computed and kept together: so many fill a batch, and take minutes at most."""
+"""Trials of a chunk: so many fill a batch, and take minutes at most."""
 MOST_ALONE = 200
-"""So many values of a field that is varied alone are tried before the sweep, at 5 ms each, and the last."""
+"""Values of a field that is varied alone that are tried before the sweep, at 5 ms each; the last one is, too."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class Chunk:
     """Trials of one observer that are computed and kept together.
 
     Attributes:
-        number: Its place among all.
+        number: Place among all chunks.
         observer: The observer in the loop.
-        trials: (number of the point, world), each.
+        trials: (number of the point, world) of each trial.
     """
 
     number: int
@@ -53,17 +53,17 @@ class Chunks:
 
     @property
     def _trials(self) -> int:
-        """Of one observer."""
+        """Trials of one observer."""
         return self.study.n_points * self.study.worlds
 
     @property
-    def _of_one(self) -> int:
+    def _per_observer(self) -> int:
         return -(-self._trials // CHUNK)
 
     @property
     def count(self) -> int:
-        """How many there are, also where that is more than `len` can say."""
-        return self._of_one * len(self.study.observers)
+        """Number of chunks, also where that is more than `len` can say."""
+        return self._per_observer * len(self.study.observers)
 
     def __len__(self) -> int:
         return self.count
@@ -74,19 +74,19 @@ class Chunks:
     def __getitem__(self, number: int) -> Chunk:
         if not 0 <= number < len(self):
             raise IndexError(number)
-        observer, piece = divmod(number, self._of_one)
+        observer, piece = divmod(number, self._per_observer)
         trials = self.stretch(piece * CHUNK, self.size(number))
         return Chunk(number, self.study.observers[observer], trials)
 
     def stretch(self, first: int, count: int) -> tuple[tuple[int, int], ...]:
-        """So many of an observer's trials from one on, in the order in which they are run."""
+        """List so many of an observer's trials from one on, in the order in which they are run."""
         order, worlds = self.study._order, self.study.worlds
         places = (divmod(place, worlds) for place in range(first, first + count))
         return tuple((int(order[at]), world) for at, world in places)
 
     def size(self, number: int) -> int:
-        """How many trials a chunk has."""
-        return min(CHUNK, self._trials - number % self._of_one * CHUNK)
+        """Count the trials of a chunk."""
+        return min(CHUNK, self._trials - number % self._per_observer * CHUNK)
 
 
 @dataclass(frozen=True)
@@ -94,14 +94,14 @@ class SweepStudy:
     """A sweep.
 
     Attributes:
-        scenario: What every trial starts from.
-        axes: What is varied.
-        observers: Those in the loop.
+        scenario: The scenario that every trial starts from.
+        axes: The varied fields.
+        observers: The observers in the loop.
         worlds: Trials a point and observer: world i has the same noise at every point, for every observer.
         design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges and lists.
             `sobol`: one for Sobol indices.
-        n: Points of the design; of one for indices that many times the number of axes and two.
-        order: Observers, the best first, as someone expects them; how often that holds is counted. No
+        n: Points of the design; a design for indices has as many for each axis, and for two more.
+        order: Observers, the best first, as someone expects them. The report counts how often the order holds; no
             trial depends on it.
     """
 
@@ -114,10 +114,10 @@ class SweepStudy:
     order: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """See that it can be one.
+        """Check the study.
 
         Raises:
-            InputError: It cannot.
+            InputError: A number, a name or a field does not fit.
         """
         check_axes(self.axes, self.design)
         check_worlds(self.worlds)
@@ -128,7 +128,7 @@ class SweepStudy:
 
     @cached_property
     def points(self) -> Points:
-        """What is varied, a point each."""
+        """The values of the varied fields, a point each."""
         if self.design == "grid":
             return Points(self.axes)
         shares = sampled(len(self.axes), self.n, self.scenario.seed, indices=self.design == "sobol")
@@ -136,7 +136,7 @@ class SweepStudy:
 
     @property
     def n_points(self) -> int:
-        """How many points it has, without drawing them."""
+        """Number of points, without drawing them."""
         if self.design == "grid":
             return math.prod(len(axis.values) for axis in self.axes)
         return self.n * (len(self.axes) + 2 if self.design == "sobol" else 1)
@@ -148,12 +148,12 @@ class SweepStudy:
 
     @property
     def trials(self) -> int:
-        """How many runs it takes."""
+        """Number of runs."""
         return self.cells * self.worlds
 
     @cached_property
     def _order(self) -> np.ndarray:
-        """Numbers of the points, those that can run in one batch together, (n_points,)."""
+        """Numbers of the points, those that can run in one batch next to each other, (n_points,)."""
         law = self.scenario.controller.kind
         apart = [field for axis in self.axes for field in axis.fields if not can_vary_in_batch(field, law)]
         if not apart:
@@ -167,27 +167,35 @@ class SweepStudy:
 
     @property
     def chunks(self) -> Chunks:
-        """All trials: those that can run in one batch stand together."""
+        """All trials; those that can run in one batch are next to each other."""
         return Chunks(self)
 
-    def as_fields(self, scenario: Mapping[str, Any]) -> dict[str, Any]:
-        """As a study file says it, with the scenario as given."""
-        how: dict[str, Any] = {"observers": list(self.observers), "worlds": self.worlds, "design": self.design}
+    def as_fields(self, scenario: Mapping[str, FieldValue]) -> dict[str, dict[str, FieldValue]]:
+        """Make the sections of a study file, with the scenario as given."""
+        design: dict[str, FieldValue] = {
+            "observers": list(self.observers),
+            "worlds": self.worlds,
+            "design": self.design,
+        }
         if self.design != "grid":
-            how["n"] = self.n
+            design["n"] = self.n
         if self.order:
-            how["order"] = list(self.order)
-        return {"sweep": how, "vary": {axis.written: axis.said() for axis in self.axes}, "scenario": dict(scenario)}
+            design["order"] = list(self.order)
+        return {
+            "sweep": design,
+            "vary": {axis.option: axis.as_field() for axis in self.axes},
+            "scenario": dict(scenario),
+        }
 
 
 def check_values(study: SweepStudy) -> None:
-    """See that every observer can run, that every field exists and takes each of its values by itself.
+    """Check that every observer can run, and that every field takes each of its values by itself.
 
-    An observer's own is tried with every observer. Where nothing else is varied, a value must fit the scenario, too;
-    what does not fit together is found when it is run, and costs its own trials alone.
+    An observer's field is tried with every observer. A value that is varied alone must fit the scenario, too.
+    Values that do not fit each other are found when they are run, and cost their own trials alone.
 
     Raises:
-        InputError: One does not.
+        InputError: An observer cannot run, or a field or value does not fit.
     """
     plant = load_scenario_plant(study.scenario)
     base = study.scenario.model_copy(update={"open_loop_observers": []})
@@ -195,23 +203,24 @@ def check_values(study: SweepStudy) -> None:
         prepare(base.with_observer(observer), plant)
     fields = as_fields(base)
     for axis in study.axes:
-        own = {field.partition(".")[2] for field in axis.fields if field.startswith("observer.")}
+        parameters = {field.partition(".")[2] for field in axis.fields if field.startswith("observer.")}
         values = axis.values or (axis.low, axis.high)
         for i, value in enumerate(values):
             changed = copy.deepcopy(fields)
             for field in axis.fields:
                 assign(changed, field, value, f"--vary {field}")
-            scenario = parse_scenario(changed, f"--vary {axis.written}={value}")
+            scenario = parse_scenario(changed, f"--vary {axis.option}={value}")
             if "plant.model" in axis.fields:
-                find("models", str(value), ".xml", f"--vary {axis.written}: plant.model =")
+                find("models", str(value), ".xml", f"--vary {axis.option}: plant.model =")
             alone = len(study.axes) == 1 and (i < MOST_ALONE or i == len(values) - 1)
-            rig = load_scenario_plant(scenario, plant) if alone else plant
-            for observer in study.observers if own else study.observers[: int(alone)]:
-                given = dict.fromkeys(own, value)
-                its = scenario.observer if observer == base.observer.kind else ObserverSettings(kind=observer, **given)
-                prepare(scenario.model_copy(update={"observer": its}), rig)
+            changed_plant = load_scenario_plant(scenario, plant) if alone else plant
+            for observer in study.observers if parameters else study.observers[: int(alone)]:
+                settings = scenario.observer
+                if observer != base.observer.kind:
+                    settings = ObserverSettings.model_validate({"kind": observer, **dict.fromkeys(parameters, value)})
+                prepare(scenario.model_copy(update={"observer": settings}), changed_plant)
 
 
-def counted(n: int, what: str) -> str:
-    """Such as `1 world`, `2 worlds`."""
-    return f"{n} {what}" if n == 1 else f"{n} {what}s"
+def counted(n: int, noun: str) -> str:
+    """Put a number before a noun: `1 world`, `2 worlds`."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"

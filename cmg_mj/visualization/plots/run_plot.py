@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.results.summary_keys import written
-from cmg_mj.results.trajectory import Trajectory, whole_file
+from cmg_mj.results.files import whole_file
+from cmg_mj.results.summary_keys import format_figure
+from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.plots.colours import colour, colours, hexadecimal
 from cmg_mj.visualization.plots.figure_spec import Panel, Picture
 from cmg_mj.visualization.plots.map_plot import draw_map
@@ -219,7 +220,10 @@ def _draw_estimates(
         rms = summaries[name].get(ranking_key)
         rates.plot(t, estimates[name], **style, label=f"{label} $\\hat x_2$")
         errors.plot(
-            t, estimates[name] - true, **style, label=f"{label} {written(ranking_key, rms)}" if ranking_key else label
+            t,
+            estimates[name] - true,
+            **style,
+            label=f"{label} {format_figure(ranking_key, rms)}" if ranking_key else label,
         )
     rates.set_ylabel("tilt rate\n[rad/s]")
     errors.set_ylabel("error $\\hat x_2 - x_2$\n[rad/s]")

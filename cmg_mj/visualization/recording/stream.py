@@ -12,7 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from cmg_mj.errors import InputError
-from cmg_mj.results.trajectory import whole_file
+from cmg_mj.results.files import whole_file
 from cmg_mj.visualization.recording.signals import Lines
 
 LONGEST_LIST = 120

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import rerun as rr
 
 from cmg_mj.results import markdown
-from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, heading, written
+from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, format_figure, heading
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.scenario.schema import MetricsSettings
@@ -92,7 +92,7 @@ def _estimates(run: Run) -> list[str]:
     parts = [f"{intro} {BOLD}" if len(run.observers) > FEW else intro]
     for keys in OPEN_LOOP_TABLES:
         rows = [
-            (name, *(written(key, summary.get(key)) for key in keys))
+            (name, *(format_figure(key, summary.get(key)) for key in keys))
             for name, summary in zip(names, summaries, strict=True)
         ]
         parts.append(markdown.table(("", *map(heading, keys)), rows))
@@ -103,7 +103,7 @@ def _by_column(runs: Sequence[Run]) -> str:
     """Write a table with a column for each run."""
     rows = [("Outcome", *map(_outcome, runs))]
     rows += [
-        (heading(key), *(written(key, run.summary.get(key)) for run in runs))
+        (heading(key), *(format_figure(key, run.summary.get(key)) for run in runs))
         for key in KEYS
         if any(key in run.summary for run in runs)
     ]
@@ -115,7 +115,7 @@ def _by_row(runs: Sequence[Run]) -> list[str]:
     first = [_marked([run.name for run in runs], best_runs(runs)), [_outcome(run) for run in runs]]
     tables = []
     for i, keys in enumerate(ROW_TABLES):
-        columns = [[written(key, run.summary.get(key)) for run in runs] for key in keys]
+        columns = [[format_figure(key, run.summary.get(key)) for run in runs] for key in keys]
         text = first if i == 0 else first[:1]
         headings = (*("", "Outcome")[: len(text)], *map(heading, keys))
         tables.append(markdown.table(headings, list(zip(*text, *columns, strict=True)), text_columns=len(text)))

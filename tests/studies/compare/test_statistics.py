@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import math
 import statistics
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -40,8 +41,8 @@ def entry(
     )
 
 
-def by_name(compared: list[ComparedObserver]) -> dict[str, dict[str, Any]]:
-    return {row["observer"]: row for row in standings(compared)}
+def by_name(compared: Sequence[ComparedObserver]) -> dict[str, dict[str, Any]]:
+    return {str(row["observer"]): row for row in standings(compared)}
 
 
 def student(values: list[float]) -> list[float]:
@@ -96,7 +97,8 @@ def test_a_plot_of_fits_shows_the_best() -> None:
     compared = [entry(kind, [0.1, 0.2], more={FIT: fit}) for kind, fit in fits.items()]
     for of in compared:
         for summary in of.result.summaries:
-            summary["references"]["mems_gyro"][FIT] = 0.96
+            references: Any = summary["references"]
+            references["mems_gyro"][FIT] = 0.96
     low, high = _Panel(FIT, comparison_rows(compared)).limits
     assert -5.0 < low < -0.1
     assert 0.96 < high < 1.1
@@ -166,9 +168,8 @@ def test_the_table_has_every_world_of_every_row() -> None:
 def test_what_stood_averages_to_what_is_printed() -> None:
     """And the figures of those that fell are there, marked."""
     table = worlds_table(compared())
-    for row in standings(compared()):
-        of = table.filter(pc.field("observer") == row["observer"])
-        stood = of.filter(pc.field("stood"))
+    for observer, row in by_name(compared()).items():
+        stood = table.filter((pc.field("observer") == observer) & pc.field("stood"))
         for key in row["intervals"]:
             known = [value for value in stood[key].to_pylist() if value is not None]
             assert (row[key] is None) == (not known), key

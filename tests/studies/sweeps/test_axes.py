@@ -12,7 +12,7 @@ from cmg_mj.studies.sweeps.axes import VariedField, parse_axis
 
 
 @pytest.mark.parametrize(
-    ("said", "values"),
+    ("variation", "values"),
     [
         ("0,0.5,1.0", (0, 0.5, 1.0)),
         ("-1.5:1.5:7", (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5)),
@@ -25,8 +25,8 @@ from cmg_mj.studies.sweeps.axes import VariedField, parse_axis
         ([1.0, 2.0], (1.0, 2.0)),
     ],
 )
-def test_what_is_varied(said: Any, values: tuple) -> None:
-    assert parse_axis("a.b", said, "--vary").values == values
+def test_what_is_varied(variation: Any, values: tuple) -> None:
+    assert parse_axis("a.b", variation, "--vary").values == values
 
 
 def test_a_range_to_be_sampled() -> None:
@@ -34,7 +34,7 @@ def test_a_range_to_be_sampled() -> None:
     assert axis.is_range
     assert axis.at(np.array([0.0, 1.0])) == [100.0, 800.0]
     assert axis.at(np.array([0.5])) == pytest.approx([np.sqrt(80_000.0)])
-    assert parse_axis("a.b", axis.said(), "file") == axis
+    assert parse_axis("a.b", axis.as_field(), "file") == axis
 
 
 def test_of_a_list_each_value_has_an_equal_part_of_the_shares() -> None:
@@ -43,7 +43,7 @@ def test_of_a_list_each_value_has_an_equal_part_of_the_shares() -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "complaint"),
+    ("variation", "complaint"),
     [
         ("", "no values"),
         ("1,,2", "is no list"),
@@ -58,9 +58,9 @@ def test_of_a_list_each_value_has_an_equal_part_of_the_shares() -> None:
         ("1,1", "1 is there twice"),
     ],
 )
-def test_what_is_no_list_and_no_range(said: str, complaint: str) -> None:
+def test_what_is_no_list_and_no_range(variation: str, complaint: str) -> None:
     with pytest.raises(InputError, match=f"--vary a.b.*{complaint}"):
-        parse_axis("a.b", said, f"--vary a.b={said}")
+        parse_axis("a.b", variation, f"--vary a.b={variation}")
 
 
 def test_no_field() -> None:
@@ -69,4 +69,4 @@ def test_no_field() -> None:
 
 
 def test_an_axis_of_values_says_them() -> None:
-    assert VariedField("a", (1.0, 2.0)).said() == [1.0, 2.0]
+    assert VariedField("a", (1.0, 2.0)).as_field() == [1.0, 2.0]

@@ -19,7 +19,7 @@ import pytest
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps.axes import parse_axis
-from cmg_mj.studies.sweeps.dask_worker import computed, part_of
+from cmg_mj.studies.sweeps.dask_worker import compute_part, part_of
 from cmg_mj.studies.sweeps.study import SweepStudy
 from tests.command import COMMAND, ROOT, Said, cmg_mj, cmg_mj_process, environment
 
@@ -198,7 +198,7 @@ def test_a_worker_of_another_version_is_refused() -> None:
     part = part_of(study, study.chunks[0])
     other = dataclasses.replace(part, versions={**part.versions, "mujoco": "2.0"})
     with pytest.raises(InputError, match=r"^worker tcp://there: mujoco \S+ there, 2\.0 here; they must be the same$"):
-        computed(other, 1, "tcp://there")
+        compute_part(other, 1, "tcp://there")
 
 
 def test_without_distributed_it_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

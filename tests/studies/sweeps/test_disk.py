@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from cmg_mj.results import files
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.studies.sweeps import chunk_store as store
-from cmg_mj.studies.sweeps import trials
 from tests.command import cmg_mj
 
 SWEEP = ["sweep", "push_recovery", "--vary", "plant.equilibrium_bias_deg=0,1", "--worlds", "2", "--set", "push=[]"]
@@ -39,7 +39,7 @@ def times(folder: Path) -> dict[str, int]:
 
 def test_a_disk_that_is_full_in_the_middle(tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count()
-    monkeypatch.setattr(trials.os, "fsync", lambda number: next(calls) == 2 and full())  # the study, a chunk, a chunk
+    monkeypatch.setattr(files.os, "fsync", lambda number: next(calls) == 2 and full())  # the study, a chunk, a chunk
     said = cmg_mj(*SWEEP, tmp_path)
     assert said.complaint == f"{tmp_path / 'chunks' / '000001.parquet'}: {GOES_ON}"
     kept = times(tmp_path / "chunks")
@@ -66,10 +66,10 @@ def test_a_disk_that_is_full_at_the_end(tmp_path: Path, whole: bytes, monkeypatc
 
 
 def test_a_disk_that_is_full_at_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store, "_write", full)
+    monkeypatch.setattr(store, "write_bytes", full)
     assert cmg_mj(*SWEEP, tmp_path).complaint == f"{tmp_path}: cannot be written: No space left on device"
     monkeypatch.undo()
-    monkeypatch.setattr(trials.os, "fsync", full)  # the study too is to outlast a power cut
+    monkeypatch.setattr(files.os, "fsync", full)  # the study too is to outlast a power cut
     assert cmg_mj(*SWEEP, tmp_path).complaint == f"{tmp_path}: cannot be written: No space left on device"
 
 

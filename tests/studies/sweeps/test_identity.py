@@ -15,7 +15,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.chunk_store import Store, run
-from cmg_mj.studies.sweeps.fingerprint import KEY, difference
+from cmg_mj.studies.sweeps.fingerprint import KEY, first_difference
 from cmg_mj.studies.sweeps.study import SweepStudy
 from tests.command import cmg_mj
 
@@ -124,14 +124,14 @@ def test_what_is_no_study_and_what_is_no_folder(tmp_path: Path) -> None:
 def test_the_first_field_that_differs_is_named_in_short() -> None:
     many, push = list(range(300)), [{"start_s": 2.0, "torque_n_m": 1.0}]
     vary = {"plant.a": many, "plant.b": "0:1"}
-    assert difference({"vary": vary}, {"vary": vary}) is None
-    said = difference({"vary": vary}, {"vary": vary | {"plant.a": many[1:], "plant.b": "0:2"}})
+    assert first_difference({"vary": vary}, {"vary": vary}) is None
+    said = first_difference({"vary": vary}, {"vary": vary | {"plant.a": many[1:], "plant.b": "0:2"}})
     assert said is not None
     assert said.startswith("vary.plant.a = [0, 1, 2, ")
     assert len(said) < 250
-    assert difference(vary, vary | {"plant.a": [*many[:-1], 7]}) == "plant.a.299 = 299 there, 7 here"
-    assert difference(vary, vary | {"plant.a": many[:-1]}) == "plant.a has 300 values there, 299 here"
-    assert difference({"push": push}, {"push": [push[0] | {"torque_n_m": 2.0}]}) == (
+    assert first_difference(vary, vary | {"plant.a": [*many[:-1], 7]}) == "plant.a.299 = 299 there, 7 here"
+    assert first_difference(vary, vary | {"plant.a": many[:-1]}) == "plant.a has 300 values there, 299 here"
+    assert first_difference({"push": push}, {"push": [push[0] | {"torque_n_m": 2.0}]}) == (
         "push.0.torque_n_m = 1.0 there, 2.0 here"
     )
-    assert difference({}, vary) == f"plant.a = nothing there, {str(many)[:80]}... here"
+    assert first_difference({}, vary) == f"plant.a = nothing there, {str(many)[:80]}... here"

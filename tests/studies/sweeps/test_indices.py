@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.studies.sweeps.points import sampled
-from cmg_mj.studies.sweeps.sobol import LOG_RATIO, LOST, Indices, index_rows, indices
+from cmg_mj.studies.sweeps.sobol import LOG_RATIO, LOST, IndexRow, Indices, index_rows, indices
 from cmg_mj.studies.sweeps.study import SweepStudy
 from tests.studies.sweeps.made_up import BIAS, NOISE, VELOCITY, made_up
 
@@ -43,11 +43,11 @@ def test_the_indices_of_a_list() -> None:
         design="sobol",
         n=1024,
     )
-    of = {row["field"]: row for row in index_rows(trials) if row["figure"] == VELOCITY}
+    of = {row.field: row for row in index_rows(trials) if row.figure == VELOCITY}
     for field, variance in ((BIAS, 5.0 / 4.0), (NOISE, 4.0 / 3.0)):
         share = variance / (5.0 / 4.0 + 4.0 / 3.0)
-        assert of[field]["first"] == pytest.approx(share, abs=0.01)
-        assert of[field]["total"] == pytest.approx(share, abs=0.01)
+        assert of[field].first == pytest.approx(share, abs=0.01)
+        assert of[field].total == pytest.approx(share, abs=0.01)
 
 
 @pytest.mark.parametrize(("weights", "decisive"), [((4.0, 1.0), [True, False]), ((1.0, 1.0), [False, False])])
@@ -63,19 +63,19 @@ def test_an_estimate_above_an_interval_is_not_decisive_if_its_own_reaches_down()
     assert Indices(z, z, z, totals[0], totals[1] + 0.06, totals[2]).decisive.tolist() == [True, False]
 
 
-def sobol(error: Any, n: int = 64) -> list[dict[str, Any]]:
+def sobol(error: Any, n: int = 64) -> list[IndexRow]:
     trials = made_up({BIAS: "0:1", NOISE: "100:200"}, ("linear", "ltv"), 2, error, design="sobol", n=n)
     assert isinstance(trials.study, SweepStudy)
-    return [row for row in index_rows(trials) if row["figure"] == VELOCITY]
+    return [row for row in index_rows(trials) if row.figure == VELOCITY]
 
 
 def test_what_is_decomposed_is_the_mean_over_the_worlds() -> None:
     """Worlds that pull apart by the noise, and by nothing in their mean."""
     rows = sobol(lambda point, _, world: point[BIAS] + (2 * world - 1) * point[NOISE])
-    by = {(row["observer"], row["field"]): row for row in rows}
-    assert by["linear", BIAS]["total"] == pytest.approx(1.0, abs=0.1)
-    assert by["linear", NOISE]["total"] == pytest.approx(0.0, abs=1e-9)
-    assert (by["ltv", BIAS]["decisive"], by["ltv", NOISE]["decisive"]) == (True, False)
+    by = {(row.observer, row.field): row for row in rows}
+    assert by["linear", BIAS].total == pytest.approx(1.0, abs=0.1)
+    assert by["linear", NOISE].total == pytest.approx(0.0, abs=1e-9)
+    assert (by["ltv", BIAS].decisive, by["ltv", NOISE].decisive) == (True, False)
 
 
 def test_the_logarithm_of_a_ratio() -> None:
@@ -89,10 +89,10 @@ def test_the_logarithm_of_a_ratio() -> None:
         n=256,
         order=("ltv", "linear"),
     )
-    of = [row for row in index_rows(trials) if row["figure"] == f"{LOG_RATIO}{VELOCITY}"]
-    assert [(row["observer"], row["field"]) for row in of] == [("ltv / linear", BIAS), ("ltv / linear", NOISE)]
-    assert [row["total"] for row in of] == pytest.approx([0.2, 0.8], abs=0.02)
-    assert [row["decisive"] for row in of] == [False, True]
+    of = [row for row in index_rows(trials) if row.figure == f"{LOG_RATIO}{VELOCITY}"]
+    assert [(row.observer, row.field) for row in of] == [("ltv / linear", BIAS), ("ltv / linear", NOISE)]
+    assert [row.total for row in of] == pytest.approx([0.2, 0.8], abs=0.02)
+    assert [row.decisive for row in of] == [False, True]
 
 
 def test_the_share_of_falls_has_indices() -> None:
@@ -104,28 +104,28 @@ def test_the_share_of_falls_has_indices() -> None:
         design="sobol",
         n=256,
     )
-    bias, noise = (row for row in index_rows(trials) if row["figure"] == LOST)
-    assert (bias["first"], bias["total"]) == pytest.approx((1.0, 1.0), abs=0.05)
-    assert (noise["first"], noise["total"]) == pytest.approx((0.0, 0.0), abs=1e-9)
+    bias, noise = (row for row in index_rows(trials) if row.figure == LOST)
+    assert (bias.first, bias.total) == pytest.approx((1.0, 1.0), abs=0.05)
+    assert (noise.first, noise.total) == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
 def test_refused_with_counts_where_a_world_fell() -> None:
     rows = sobol(lambda point, name, world: None if name == "ltv" and world and point[BIAS] > 0.5 else point[BIAS])
     fell = sum(1 for point in made_up_points() if point[BIAS] > 0.5)
     for row in rows:
-        if row["observer"] == "ltv":
-            assert row["refused"] == f"no value at {fell} of 256 points: of 512 trials {fell} fell"
-            assert row["total"] is None
-            assert row["decisive"] is None
+        if row.observer == "ltv":
+            assert row.refused == f"no value at {fell} of 256 points: of 512 trials {fell} fell"
+            assert row.total is None
+            assert row.decisive is None
         else:
-            assert row["refused"] is None
+            assert row.refused is None
     assert 0 < fell < 256
 
 
 def test_refused_with_counts_where_every_point_has_lost_one_of_its_worlds() -> None:
     rows = sobol(lambda point, _, world: None if world else point[BIAS])
-    assert {row["observer"] for row in rows} == {"linear", "ltv"}
-    assert {row["refused"] for row in rows} == {"no value at 256 of 256 points: of 512 trials 256 fell"}
+    assert {row.observer for row in rows} == {"linear", "ltv"}
+    assert {row.refused for row in rows} == {"no value at 256 of 256 points: of 512 trials 256 fell"}
 
 
 def test_refused_where_only_points_of_the_crossed_blocks_differ() -> None:
@@ -141,9 +141,9 @@ def test_refused_where_only_points_of_the_crossed_blocks_differ() -> None:
         design="sobol",
         n=64,
     )
-    for row in (row for row in index_rows(trials) if row["figure"] == LOST):
-        assert row["total"] is None
-        assert row["refused"] == (
+    for row in (row for row in index_rows(trials) if row.figure == LOST):
+        assert row.total is None
+        assert row.refused == (
             "the same at all 128 independent points of the design: no variance to share out "
             "(another value at 1 of the 128 made of them; take more rows)"
         )
@@ -155,8 +155,8 @@ def made_up_points() -> list[dict[str, Any]]:
 
 
 def test_the_same_everywhere_depends_on_nothing() -> None:
-    assert {row["refused"] for row in sobol(lambda *_: 0.1)} == {"the same at every point"}
+    assert {row.refused for row in sobol(lambda *_: 0.1)} == {"the same at every point"}
 
 
 def test_of_few_rows_nothing_is_decisive() -> None:
-    assert not any(row["decisive"] for row in sobol(lambda point, *_: point[BIAS], n=8))
+    assert not any(row.decisive for row in sobol(lambda point, *_: point[BIAS], n=8))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.studies.sweeps.order import by_quarters, order_of_points, order_rows
-from cmg_mj.studies.sweeps.report_sections import order as said
+from cmg_mj.studies.sweeps.order import by_quarters, order_counts, order_of_points, order_rows
+from cmg_mj.studies.sweeps.report_sections import order as section
 from tests.studies.sweeps.made_up import BIAS, NOISE, VELOCITY, made_up
 
 NAMES = ("linear", "ltv", "homogeneous")
@@ -14,12 +14,11 @@ ORDER = ("homogeneous", "ltv", "linear")
 
 
 def counted(*worlds: tuple[float | None, float | None, float | None]) -> tuple[int, int]:
-    """Of one point, with the errors of the order's observers in each world."""
+    """Count at one point, from the errors of the order's observers in each world."""
     trials = made_up(
         {BIAS: "0"}, NAMES, len(worlds), lambda _, name, world: worlds[world][ORDER.index(name)], order=ORDER
     )
-    (row,) = order_rows(trials)
-    return row["held"], row["worlds"]
+    return order_counts(trials)[VELOCITY][0]
 
 
 @pytest.mark.parametrize(
@@ -49,20 +48,19 @@ def test_a_stop_cannot_tell(others: tuple[float | None, ...], stopped: int, how:
     trials = made_up({BIAS: "0"}, NAMES, 2, lambda _, name, world: errors[world][ORDER.index(name)], order=ORDER)
     trials.outcome[0, NAMES.index(ORDER[stopped]), 0] = how
     trials.stood = trials.outcome == "done"
-    (row,) = order_rows(trials)
-    assert (row["held"], row["worlds"]) == (1, 1)
+    assert order_counts(trials) == {VELOCITY: [(1, 1)]}
     assert order_of_points(trials, VELOCITY, ORDER) == (0, 0)
     apart = [name for name in ORDER if name != ORDER[stopped]]
-    assert order_of_points(trials, VELOCITY, apart).of == 1
+    assert order_of_points(trials, VELOCITY, apart).decided == 1
 
 
 def test_the_share_has_wilsons_interval() -> None:
     trials = made_up({BIAS: "0,1"}, NAMES, 10, lambda p, name, w: ORDER.index(name) * (w < 8 or p[BIAS]), order=ORDER)
-    first, second = order_rows(trials)
+    first, second = order_rows(trials.study, order_counts(trials))
     assert (first["held"], first["worlds"], first["share"]) == (8, 10, 0.8)
     assert (first["low"], first["high"]) == pytest.approx((0.4902, 0.9433), abs=1e-4)
     assert (second["held"], second["share"]) == (10, 1.0)
-    first, whole, *_ = said(trials, order_rows(trials), 60)[2].splitlines()[::2]
+    first, whole, *_ = section(trials, order_counts(trials))[2].splitlines()[::2]
     assert first.split("|")[1].strip() == "counted by"
     assert [cell.strip() for cell in whole.split("|")[2:-1]] == ["homogeneous < ltv < linear", "2 of 2", "18 of 20"]
 
@@ -97,8 +95,8 @@ def test_by_quarters_of_a_range_and_values_of_a_list() -> None:
     assert [row[0] for row in rows] == [BIAS] * 4 + [NOISE] * 2
     assert [row[3] for row in rows[:4]] == [(0, 16), (0, 16), (16, 16), (16, 16)]
     assert rows[0][2] <= 1.0 <= rows[1][1]
-    assert [(row[1], row[2], row[3].of) for row in rows[4:]] == [(100, 100, 32), (200, 200, 32)]
-    assert "quarter" in said(trials, order_rows(trials), 60)[-3]
+    assert [(row[1], row[2], row[3].decided) for row in rows[4:]] == [(100, 100, 32), (200, 200, 32)]
+    assert "quarter" in section(trials, order_counts(trials))[-3]
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
-from cmg_mj.studies.sweeps.figures import NAMES, pictures_of
 from cmg_mj.studies.sweeps.plot_scales import is_logarithmic, round_values
+from cmg_mj.studies.sweeps.report import PICTURES, pictures_of
 from cmg_mj.visualization.plots.figure_spec import Map, Picture
 from cmg_mj.visualization.plots.map_plot import edges
 from cmg_mj.visualization.plots.run_plot import draw
@@ -59,7 +59,7 @@ def test_a_map_has_the_best_of_every_cell() -> None:
     assert fell.best.tolist() == [[-1, 0, -1]] * 3
     assert not fell.sure.any()  # none of 4 beside 3 of 4
     assert (velocity.panels[0].x_scale, velocity.panels[0].y_scale) == ("linear", "log")
-    assert {f"{picture.name}.png" for picture in (velocity, falls)} <= set(NAMES)
+    assert {f"{picture.name}.png" for picture in (velocity, falls)} <= set(PICTURES)
 
 
 def test_a_stop_is_no_share_of_falls() -> None:

@@ -6,7 +6,7 @@ from cmg_mj.studies.sweeps import failure_reasons as module
 from cmg_mj.studies.sweeps.api import all_trials
 from cmg_mj.studies.sweeps.cells import Trials
 from cmg_mj.studies.sweeps.failure_reasons import LONGEST, OTHERS, Reasons
-from cmg_mj.studies.sweeps.report import found_of, report, summary
+from cmg_mj.studies.sweeps.report import report, summary, tables_of
 from tests.studies.sweeps.made_up import made_up
 from tests.studies.sweeps.test_trials import FAILS, study
 
@@ -48,7 +48,7 @@ def test_they_are_in_the_report_and_on_the_terminal() -> None:
     counts = {how: table["outcome"].to_pylist().count(how) for how in ("refused", "stopped")}
     assert counts["refused"] == 8
     assert 0 < counts["stopped"] < 8
-    found = found_of(trials)
+    found = tables_of(trials)
     whole = report(found, [])
     assert f"{sum(counts.values())} of 16 trials were refused or stopped" in whole
     assert "- 8 refused: sensors.encoder.rate_hz = 333.7 Hz: does not fit" in whole
@@ -62,5 +62,5 @@ def test_they_are_in_the_report_and_on_the_terminal() -> None:
 
 
 def test_nothing_is_said_where_all_ran() -> None:
-    found = found_of(made_up({"plant.equilibrium_bias_deg": "0,1"}, ("linear",), 2, lambda *_: 1.0))
+    found = tables_of(made_up({"plant.equilibrium_bias_deg": "0,1"}, ("linear",), 2, lambda *_: 1.0))
     assert "refused" not in report(found, []) + summary(found)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.studies.sweeps.cells import Trials
-from cmg_mj.studies.sweeps.report import found_of, report, summary
+from cmg_mj.studies.sweeps.report import report, summary, tables_of
 from tests.studies.sweeps.made_up import BIAS, NOISE, made_up
 
 RATES = "controller.rate_hz+sensors.accelerometer.rate_hz"
@@ -34,7 +34,7 @@ def test_of_a_design_an_observer_has_a_row() -> None:
     trials = sampled()
     trials.outcome[:, 2] = "refused"
     trials.stood = trials.outcome == "done"
-    found = found_of(trials)
+    found = tables_of(trials)
     bias = np.array([point[BIAS] for point in trials.study.points])
     fell = bias > 0.5
     for text in (report(found, []), summary(found)):
@@ -50,23 +50,23 @@ def test_of_a_design_an_observer_has_a_row() -> None:
 
 
 def test_a_report_of_a_design_says_what_is_varied() -> None:
-    lines = report(found_of(sampled()), []).splitlines()
+    lines = report(tables_of(sampled()), []).splitlines()
     assert f"- {BIAS}: 0 to 1" in lines
     assert f"- {NOISE}: 100 to 800, evenly in the logarithm" in lines
     assert f"- {RATES}: 100, 200" in lines
     many = made_up({BIAS: "0:1:30"}, ("linear",), 1, lambda *_: 1.0, design="sample", n=4)
-    assert any(line.endswith(", ..., 1 (30 values)") for line in report(found_of(many), []).splitlines())
+    assert any(line.endswith(", ..., 1 (30 values)") for line in report(tables_of(many), []).splitlines())
 
 
 def test_of_a_grid_a_point_has_a_row() -> None:
     trials = made_up({RATES: "100,200"}, ("linear", "ltv"), 2, lambda _, name, w: None if w and name == "ltv" else 0.5)
-    for text in (report(found_of(trials), []), summary(found_of(trials))):
+    for text in (report(tables_of(trials), []), summary(tables_of(trials))):
         assert [cell.strip() for cell in text.splitlines()[-1].strip("|").split("|")] == [
             "200",
             "0.5000",
             "0.5000 [1 fell]",
         ]
-    assert "With controller.rate_hz go, alike: sensors.accelerometer.rate_hz." in report(found_of(trials), [])
+    assert "With controller.rate_hz go, alike: sensors.accelerometer.rate_hz." in report(tables_of(trials), [])
 
 
 @pytest.mark.parametrize("order", [(), ("ltv", "linear")])
@@ -79,7 +79,7 @@ def test_the_terminal_says_why_there_are_no_indices(order: tuple[str, ...]) -> N
             return None if name in fallen else point[BIAS] + point[NOISE]
 
         return summary(
-            found_of(made_up({BIAS: "0:1", NOISE: "1:2"}, names, 1, error, design="sobol", n=16, order=order))
+            tables_of(made_up({BIAS: "0:1", NOISE: "1:2"}, names, 1, error, design="sobol", n=16, order=order))
         )
 
     said = sobol(names)
@@ -103,6 +103,6 @@ def test_the_terminal_has_the_indices_of_a_ratio() -> None:
         n=16,
         order=("ltv", "linear"),
     )
-    rows = [line for line in summary(found_of(trials)).splitlines() if line.startswith("| log(ltv / linear) ")]
+    rows = [line for line in summary(tables_of(trials)).splitlines() if line.startswith("| log(ltv / linear) ")]
     assert [row.split("|")[2].strip() for row in rows] == [BIAS, NOISE]
     assert all("[" in row for row in rows)

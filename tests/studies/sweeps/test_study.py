@@ -53,7 +53,7 @@ def test_every_trial_is_in_one_chunk() -> None:
 
 def test_trials_that_run_in_one_batch_stand_together() -> None:
     of = study(f"{BIAS}=0,1", "controller.rate_hz=100,200")
-    rates = [of.points[point]["controller.rate_hz"] for point, _ in of.chunks[0].trials]
+    rates: list[Any] = [of.points[point]["controller.rate_hz"] for point, _ in of.chunks[0].trials]
     assert rates == sorted(rates)
 
 
@@ -81,7 +81,7 @@ def test_the_same_study_has_the_same_points() -> None:
         return study(f"{BIAS}=-1:1", f"{NOISE}=log:100:800", design="sample", n=50)
 
     assert list(sampled().points) == list(sampled().points)
-    noise = [point[NOISE] for point in sampled().points]
+    noise: list[Any] = [point[NOISE] for point in sampled().points]
     assert np.median(noise) == pytest.approx(np.sqrt(80_000.0), rel=0.1)
 
 
@@ -91,17 +91,18 @@ def test_a_design_takes_each_value_of_a_list_equally_often(design: Any) -> None:
     of = study(f"{BIAS}=-1:1", f"{rates}=50,100,200,400", f"{NOISE}=log:100:800:4", design=design, n=64)
     assert {type(point[rates]) for point in of.points} == {int}
     for field, values in ((rates, [50, 100, 200, 400]), (NOISE, [100.0, 200.0, 400.0, 800.0])):
-        found, times = np.unique([point[field] for point in list(of.points)[:64]], return_counts=True)
+        found, times = np.unique(np.array([point[field] for point in list(of.points)[:64]]), return_counts=True)
         assert (found.tolist(), times.tolist()) == (values, [16] * 4)
-    pairs = {(point[rates], point[NOISE]) for point in of.points}
+    points: list[dict[str, Any]] = list(of.points)
+    pairs = {(point[rates], point[NOISE]) for point in points}
     assert len(pairs) == 16  # and every combination is there
-    assert len({point[BIAS] for point in list(of.points)[:64]}) == 64
+    assert len({point[BIAS] for point in points[:64]}) == 64
     assert sum(len(chunk.trials) for chunk in of.chunks) == of.trials
 
 
 def test_a_list_that_is_no_power_of_two_comes_out_about_evenly() -> None:
     of = study("controller.rate_hz=50,100,200", design="sample", n=100)
-    _, times = np.unique([point["controller.rate_hz"] for point in of.points], return_counts=True)
+    _, times = np.unique(np.array([point["controller.rate_hz"] for point in of.points]), return_counts=True)
     assert abs(times - 100 / 3).max() < 2.0
 
 

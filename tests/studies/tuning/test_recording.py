@@ -26,7 +26,7 @@ def test_what_is_between_two_pushes_is_not_scored() -> None:
     assert [pytest.approx(window) for window in windows_of(scenario)] == [(2.0, 3.1), (4.0, 5.1)]
     recorded = record(scenario, range(2))
     run = prepare(scenario).run_many(2, keep_trajectory=False)
-    zero = np.array([s["references"]["zero"]["velocity_rms_error_push_rad_s"] for s in run.summaries])
+    zero = run.values("velocity_rms_error_push_rad_s", "zero")
     assert recorded.zero_rms == pytest.approx(zero.mean(), rel=1e-2)  # the gyro's rate, not the true one
     assert recorded.window == pytest.approx((2.0, 5.1))
 

@@ -18,7 +18,7 @@ from rerun.chunk import RrdReader
 from cmg_mj.errors import InputError
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Outcome
-from cmg_mj.results.summary_keys import KEYS, heading, written
+from cmg_mj.results.summary_keys import KEYS, format_figure, heading
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import Scenario, load_scenario
@@ -194,7 +194,7 @@ def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
     assert "# A title" in summary
     assert "+1 N m for 0.1 s at 0.2 s" in summary
     rows = [[cell.strip() for cell in line.split("|")] for line in summary.splitlines()]
-    assert ["", heading("tilt_rms_deg"), written("tilt_rms_deg", run.summary["tilt_rms_deg"]), ""] in rows
+    assert ["", heading("tilt_rms_deg"), format_figure("tilt_rms_deg", run.summary["tilt_rms_deg"]), ""] in rows
     assert ["", "Outcome", "done at 0.5 s", ""] in rows
     (observers,) = static(path, "/observers", "TextDocument:text")
     names = [[cell.strip() for cell in line.split("|")][1] for line in observers.splitlines() if "|" in line]
