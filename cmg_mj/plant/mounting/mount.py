@@ -26,7 +26,7 @@ from cmg_mj.plant.mounting.request import MountRequest
 from cmg_mj.plant.mounting.robot import body_of, check_chains, check_names, free_base, pose_of, read_robot
 from cmg_mj.plant.mounting.stance import axes_along, check_unturned, find_place, posed, stand_upright, under_and_height
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, axes_of
 
 
 @quiet()
@@ -113,7 +113,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, asked: MountRequest) -> Moun
     add_sensors(spec, body, asked.prefix, turn.T @ (under - origin), turn.T @ axes_along(direction), height)
     model = _with_keyframes(spec, names, qpos, [(name, poses | gimbals) for name, poses in own], earlier, path)
     key = model.key(EQUILIBRIUM_KEY).id
-    if not falls_with(model, key, find_axis(model, key, asked.name).line):
+    if not falls_with(model, key, find_axis(model, key, asked.name, axes_of(model)[asked.name]).line):
         raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: it stands by itself")
     return MountedRobot(spec, path, tuple(held), tuple(notes))
 

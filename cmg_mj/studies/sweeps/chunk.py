@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from cmg_mj.errors import InputError, raised
 from cmg_mj.results.per_world_table import ID_COLUMNS
-from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
-from cmg_mj.simulation.pool import batch_key
+from cmg_mj.simulation.batch import BatchKey, PlantStructure, batch_key, plant_structure, run_batch
+from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.sweeps.points import Point, Points
 from cmg_mj.studies.sweeps.study import Chunk, SweepStudy
 
@@ -45,9 +45,9 @@ def compute(
     at = study.points if points is None else points
     base = prepare(study.scenario.with_observer(chunk.observer).model_copy(update={"open_loop_observers": []}))
     found: dict[tuple[int, int], dict[str, Any]] = {}
-    pools: dict[str, list[tuple[int, int]]] = {}
+    pools: dict[tuple[BatchKey, PlantStructure], list[tuple[int, int]]] = {}
     experiments: dict[int, Experiment] = {}
-    pool_of: dict[int, str] = {}
+    pool_of: dict[int, tuple[BatchKey, PlantStructure]] = {}
     refused: dict[int, str] = {}
     for trial in chunk.trials:
         number = trial[0]
@@ -148,10 +148,9 @@ def _monotonic_progress(tick: Callable[[float], None]) -> Callable[[float], None
     return told
 
 
-def _pool_of(experiment: Experiment) -> str:
+def _pool_of(experiment: Experiment) -> tuple[BatchKey, PlantStructure]:
     """Worlds with the same can run in one batch."""
-    physics = experiment.plant.model.opt
-    return repr((batch_key(experiment.scenario, experiment.design), physics.timestep, int(physics.integrator)))
+    return batch_key(experiment), plant_structure(experiment.plant)
 
 
 def _identity(study: SweepStudy, chunk: Chunk, world: int) -> dict[str, Any]:
