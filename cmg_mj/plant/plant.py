@@ -21,7 +21,7 @@ from cmg_mj.controllers.laws import Law, StateFeedback
 from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.controllers.multi_axis import MultiAxisController, YawCoupling
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, TomlValue, nearest
 from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.messages import complaint
 from cmg_mj.observers import Observer
@@ -409,7 +409,7 @@ def load_plant(
     beside: Path | None = None,
     grid: TimeGrid | None = None,
     of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
-    **fields: object,
+    **fields: TomlValue,
 ) -> Plant:
     """Load a rig.
 

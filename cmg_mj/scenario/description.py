@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.controllers.laws.protocol import needs
-from cmg_mj.inputs.toml_values import TomlValue
+from cmg_mj.errors import TomlValue
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.plant_parameters import PlantParameters

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import PurePath
 
-from cmg_mj.inputs.toml_values import TomlValue
+from cmg_mj.errors import TomlValue
 
 LONGEST_NAME = 60
 """Of the differences in a folder's name [characters]."""
@@ -14,13 +14,13 @@ SHOWN = 3
 """So many differences are shown in one line."""
 
 
-def describe_differences(differing: Mapping[str, TomlValue]) -> str:
+def describe_differences(differing: Mapping[str, TomlValue | None]) -> str:
     """Write the first few after a comma, as `--set` takes them; nothing if nothing differs."""
     assignments = [f"{name}={_value(value)}" for name, value in zip(_short(differing), differing.values(), strict=True)]
     return "".join(f", {text}" for text in _first(assignments, SHOWN, " and {} more"))
 
 
-def folder_suffix(differing: Mapping[str, TomlValue]) -> str:
+def folder_suffix(differing: Mapping[str, TomlValue | None]) -> str:
     """Make the end of a folder's name: letters that every system takes, and not too many."""
     assignments = [
         re.sub(r"[^\w.=+-]+", "_", f"{name}={_value(value)}", flags=re.ASCII).strip("_")
@@ -57,7 +57,7 @@ def _short(names: Iterable[str]) -> list[str]:
     return [short(parts) for parts in full]
 
 
-def _value(value: TomlValue) -> str:
+def _value(value: TomlValue | None) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if value is None or value == []:

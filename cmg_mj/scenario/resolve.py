@@ -12,10 +12,10 @@ from typing import Any, TypeGuard
 import tomli_w
 
 from cmg_mj.controllers.laws.registry import BENCH_PARAMETERS as GIVEN_TO_LAWS
+from cmg_mj.errors import TomlValue
 from cmg_mj.inputs.bundled import folder
 from cmg_mj.inputs.field_types import NoEffect
 from cmg_mj.inputs.marks import marked_fields
-from cmg_mj.inputs.toml_values import TomlValue
 from cmg_mj.observers import BENCH_PARAMETERS
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_settings import PlantSettings
@@ -131,7 +131,9 @@ def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[st
     }
 
 
-def _differing(base: TomlValue, other: TomlValue, name: str = "") -> Iterator[tuple[str, TomlValue]]:
+def _differing(
+    base: TomlValue | None, other: TomlValue | None, name: str = ""
+) -> Iterator[tuple[str, TomlValue | None]]:
     below = f"{name}." if name else ""
     if isinstance(base, Mapping) and isinstance(other, Mapping):
         for key in dict.fromkeys([*other, *base]):
@@ -143,5 +145,5 @@ def _differing(base: TomlValue, other: TomlValue, name: str = "") -> Iterator[tu
         yield name, other
 
 
-def _are_sections(value: TomlValue) -> TypeGuard[list[TomlValue]]:
+def _are_sections(value: TomlValue | None) -> TypeGuard[list[TomlValue]]:
     return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
