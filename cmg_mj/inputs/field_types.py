@@ -2,9 +2,53 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import ConfigDict, Field
+
+
+@dataclass(frozen=True)
+class OnGrid:
+    """Marks a rate [Hz] or a time [s] that must fit the physics steps.
+
+    Attributes:
+        unit: `Hz` of a rate, `s` of a time.
+    """
+
+    unit: str
+
+
+@dataclass(frozen=True)
+class Batched:
+    """Marks a number in which worlds of one batch may differ.
+
+    Attributes:
+        law_field: The field of the law that is then an array; the law names it in `arrays`.
+    """
+
+    law_field: str | None = None
+
+
+class PerAxis:
+    """Marks a field of which each axis of several may have its own value."""
+
+
+class OnAllAxes:
+    """Marks a field whose value is the same on all axes."""
+
+
+class OfOneLaw:
+    """Marks a field that another law does not take over."""
+
+
+class WhateverTheLaw:
+    """Marks a field of the loop around the law, which stays when Studio changes the law."""
+
+
+class NoEffect:
+    """Marks a field on which no number of a run depends."""
+
 
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -15,7 +59,11 @@ Duration = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
 """A time that passes [s]."""
 Instant = Annotated[float, Field(ge=0.0, le=LONGEST_S)]
 """A time after the start, or a delay [s]."""
-Rate = Annotated[float, Field(ge=0.1, le=1e6)]
+GridDuration = Annotated[Duration, OnGrid("s")]
+"""A time that passes in whole physics steps [s]."""
+GridInstant = Annotated[Instant, OnGrid("s")]
+"""A time after the start, or a delay, in whole physics steps [s]."""
+Rate = Annotated[float, Field(ge=0.1, le=1e6), OnGrid("Hz")]
 """Ticks or samples a second [Hz]: no slower than a rig falls, no faster than the smallest physics step."""
 
 Line = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]

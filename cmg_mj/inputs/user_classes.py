@@ -73,6 +73,21 @@ class UserClassKind:
         """List the parameters that are the user's choice."""
         return [name for name in self.takes(kind) if name not in self.given]
 
+    def unknown(self, kind: str, names: Iterable[str], common: Iterable[str]) -> list[str]:
+        """Find the fields of a section that are neither every class' nor this one's.
+
+        Args:
+            kind: The class' name.
+            names: The fields.
+            common: Fields that every class has.
+
+        Returns:
+            A clause for each.
+        """
+        known = {*common, *self.own(kind)}
+        wrong = [name for name in names if name not in known and not self.may_take(kind, name)]
+        return [f"{self.section}.{name}: no such field; {nearest(name, known)}" for name in wrong]
+
     def check_names(self, kind: str, names: Iterable[str]) -> None:
         """Refuse the names of parameters that a class does not have.
 

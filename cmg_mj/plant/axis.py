@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,8 +14,8 @@ import numpy as np
 from cmg_mj.elementwise import Scalar
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.effective_inertia import at_keyframe, inertia_about
-from cmg_mj.plant.parts import TILT_ELEMENT, Cube, cubes_of
-from cmg_mj.plant.tilt_line import Line, line_at_site, line_of_joint
+from cmg_mj.plant.parts import TILT_ELEMENT, Cube
+from cmg_mj.plant.tilt_line import Addressed, Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.tilt import RadialTilt
@@ -28,22 +27,22 @@ QUARTER_TURN = math.pi / 2.0
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One axis of a rig, with its names resolved.
+    """One axis of a plant, with its names resolved.
 
     Attributes:
-        name: What its elements' names begin with, without the slash; empty for a rig's only one.
-        line: What it tilts about.
+        name: The prefix of its elements' names, without the slash; empty for a plant's only axis.
+        line: The line that it tilts about.
         frame: The body that carries its sensors.
         point: A point of the line, in the frame's axes [m].
-        direction: Along the line, in the frame's axes, (3,).
+        direction: Unit vector along the line, in the frame's axes, (3,).
         cubes: Addresses of its modules.
-        reduced: Parameters of the reduced model.
+        reduced: The reduced model.
         radial_tilt: The tilt estimate for its accelerometers.
         forces: Addresses in sensordata of inner x, inner z, outer x, outer z.
-        encoders: Those of the gimbals' encoders.
-        gyro: That of the gyro along the line.
-        bias: e [rad].
-        initial_tilt: From the equilibrium, at the start [rad].
+        encoders: Addresses in sensordata of the gimbals' encoders.
+        gyro: Address in sensordata of the gyro along the line.
+        bias: Equilibrium bias e [rad].
+        initial_tilt: Tilt from the equilibrium at the start [rad].
     """
 
     name: str
@@ -76,11 +75,11 @@ class Axis:
         return [cube.direction for cube in self.cubes]
 
     @cached_property
-    def _forces_of(self) -> Callable[[Any], Any]:
+    def _forces_of(self) -> Callable[[list[float]], Sequence[float]]:
         return itemgetter(*self.forces)
 
     @cached_property
-    def _encoders_of(self) -> Callable[[Any], Any]:
+    def _encoders_of(self) -> Callable[[list[float]], Sequence[float]]:
         (only, *others) = self.encoders
         return itemgetter(*self.encoders) if others else lambda sensordata: (sensordata[only],)
 
@@ -90,7 +89,7 @@ class Axis:
         n = len(self.cubes)
         return [(cube.gimbal, cube.direction / n, cube.gimbal_zero) for cube in self.cubes]
 
-    def ideal(self, sensordata: Any, qvel: Any) -> IdealReading:
+    def ideal(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> IdealReading:
         """What perfect sensors show.
 
         Args:
@@ -101,13 +100,13 @@ class Axis:
         Returns:
             The ideal readings, of the elements' own type (float, or array (n_worlds,)).
         """
-        if type(sensordata) is list:  # of one world, at every tick
+        if isinstance(sensordata, list):  # of one world, at every tick
             forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
         else:
             forces, encoders = sensordata[self.forces], [sensordata[address] for address in self.encoders]
         return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel)))
 
-    def gimbal_angle(self, qpos: Any) -> Scalar:
+    def gimbal_angle(self, qpos: Addressed) -> Scalar:
         """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""
         angle = 0.0
         for gimbal, share, zero in self._gimbals:
@@ -129,13 +128,14 @@ class Axis:
         return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.constant_errors(), gravity)
 
 
-def find_axis(model: mujoco.MjModel, key: int, name: str) -> Axis:
-    """Resolve the names of an axis whose elements `rig_parts.missing_parts` has found.
+def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]) -> Axis:
+    """Resolve the names of an axis, all of whose elements are there: see `parts.missing_parts`.
 
     Args:
         model: The compiled model, as its file has it.
-        key: The keyframe at which the rig stands upright.
-        name: Of the axis.
+        key: The keyframe at which the plant stands upright.
+        name: The axis' name.
+        modules: The names of its modules.
 
     Returns:
         The axis, without bias.
@@ -150,33 +150,32 @@ def find_axis(model: mujoco.MjModel, key: int, name: str) -> Axis:
         line = line_at_site(model, data, site, key)
         frame, point = int(model.site_bodyid[site]), model.site_pos[site]
         direction = data.xmat[frame].reshape(3, 3).T @ data.site_xmat[site].reshape(3, 3)[:, 1]
-    assert line is not None  # `rig_check` has looked
+    assert line is not None  # `RigChecker` has looked
     addresses, radii = [], []
     for which in ("inner", "outer"):
         sensor = _id(model, "sensor", f"{prefix}accelerometer_{which}")
         arm = model.site_pos[model.sensor_objid[sensor]] - point
         radii.append(math.hypot(*(arm - (arm @ direction) * direction)))
         addresses.append(int(model.sensor_adr[sensor]))
-    names = cubes_of(model, name)
     axis = Axis(
         name,
         line,
         frame,
         point.copy(),
         direction.copy(),
-        tuple(_cube(model, key, line, cube) for cube in names),
+        tuple(_cube(model, key, line, cube) for cube in modules),
         ReducedModel(1.0, 0.0, 1.0, 1.0, 1.0),
         RadialTilt(*radii),
         [address + along for address in addresses for along in (0, 2)],
-        [int(model.sensor_adr[_id(model, "sensor", f"{cube}/gimbal_encoder")]) for cube in names],
+        [int(model.sensor_adr[_id(model, "sensor", f"{cube}/gimbal_encoder")]) for cube in modules],
         int(model.sensor_adr[_id(model, "sensor", f"{prefix}fog")]) + 1,  # its y axis
     )
     return replace(axis, reduced=read_reduced(model, key, axis))
 
 
-def held_cubes(model: mujoco.MjModel, key: int, name: str) -> tuple[Cube, ...]:
-    """The modules of an axis that is locked, whose gimbals get no share of u."""
-    return tuple(_cube(model, key, None, cube) for cube in cubes_of(model, name))
+def held_cubes(model: mujoco.MjModel, key: int, modules: Sequence[str]) -> tuple[Cube, ...]:
+    """Resolve the names of modules of a locked axis, whose gimbals get no share of u."""
+    return tuple(_cube(model, key, None, module) for module in modules)
 
 
 def _cube(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Cube:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import mujoco
 import numpy as np
 
 from cmg_mj.errors import shown
 from cmg_mj.inputs.sanity import LARGEST
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axes_in, cubes_in
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
 TRUE_DEG = 0.05
@@ -58,13 +58,14 @@ class RigChecker:
 
     Args:
         model: The model, as its file has it, all its numbers finite.
+        axes: The names of its axes, each with those of its modules.
 
     Attributes:
         wrong: Clauses for an error message.
         hints: What is right and yet not what the reduced model takes it for, in clauses.
     """
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, axes: Mapping[str, Sequence[str]]) -> None:
         self.hints: list[str] = []
         self.wrong: list[str] = []
         self.key = _id(model, "key", EQUILIBRIUM_KEY)
@@ -73,15 +74,14 @@ class RigChecker:
         self.model, self.data = model, mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, self.data, self.key)
         mujoco.mj_forward(model, self.data)
-        names = [model.joint(i).name for i in range(model.njnt)]
-        all_cubes = []
-        for name in axes_in([*names, *(model.site(i).name for i in range(model.nsite))]):
-            cubes = [cube for cube in cubes_in(names, name) if min(self._addresses(cube)) >= 0]
-            all_cubes += cubes
-            self.wrong += self._axis(name, cubes)
+        complete = {
+            name: [module for module in modules if min(self._addresses(module)) >= 0] for name, modules in axes.items()
+        }
+        for name, modules in complete.items():
+            self.wrong += self._axis(name, modules)
         self.wrong += self._rest()
-        if "yaw" in names:
-            self._momentum(all_cubes)
+        if _id(model, "joint", "yaw") >= 0:
+            self._momentum([module for modules in complete.values() for module in modules])
 
     def _axis(self, name: str, cubes: Sequence[str]) -> Iterator[str]:
         """All of one axis."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
 from cmg_mj.plant.effective_inertia import at_keyframe
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, TILT_ELEMENT, axes_in
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, TILT_ELEMENT
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
 _QPOS_SIZES = {0: 7, 1: 4, 2: 1, 3: 1}
@@ -31,55 +31,60 @@ def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
     remove_hinge(spec, YAW)
 
 
-def lock_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, axes: Sequence[str], path: Path) -> None:
+def lock_axes(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, axes: Sequence[str], known: Collection[str], path: Path
+) -> None:
     """Take the hinges of axes out, upright as they are at the keyframe.
 
     Args:
         spec: The parsed model, which is changed.
         model: The same, compiled: a rig.
-        axes: Names of the axes.
+        axes: Names of the axes to lock.
+        known: Names of all axes.
         path: The file, for messages.
 
     Raises:
         InputError: There is no such axis, it tilts about no hinge, or no axis is left.
     """
     key = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))
-    for line in _hinges_of(model, key, axes, path):
+    for line in _hinges_of(model, key, axes, known, path):
         name = model.joint(line.joint).name
         angle = line.zero - float(model.qpos0[line.angle])
         if angle:
             if line.joint != int(model.body_jntadr[model.jnt_bodyid[line.joint]]):
                 raise InputError(
-                    f"{_said(axes, path)}: hinge {name!r} stands at {angle:g} rad at the keyframe, behind another "
+                    f"{_setting(axes, path)}: hinge {name!r} stands at {angle:g} rad at the keyframe, behind another "
                     "joint of its body; give it a body of its own"
                 )
             _turn(spec.joint(name), angle)
         remove_hinge(spec, name)
 
 
-def _hinges_of(model: mujoco.MjModel, key: int, axes: Sequence[str], path: Path) -> list[HingeLine]:
-    joints, sites = ([of(i).name for i in range(n)] for of, n in ((model.joint, model.njnt), (model.site, model.nsite)))
-    known, said = axes_in([*joints, *sites]), _said(axes, path)
+def _hinges_of(
+    model: mujoco.MjModel, key: int, axes: Sequence[str], known: Collection[str], path: Path
+) -> list[HingeLine]:
+    setting = _setting(axes, path)
     data = at_keyframe(model, key)
-    found = []
+    hinges = []
     for axis in dict.fromkeys(axes):
         if axis not in known:
             names = nearest(axis, known, "its axes") if any(known) else "its only one has no name"
-            raise InputError(f"{said} has no axis {axis!r}; {names}")
+            raise InputError(f"{setting} has no axis {axis!r}; {names}")
         name = f"{axis}/{TILT_ELEMENT}".lstrip("/")
-        line: Line | None = line_of_joint(model, joints.index(name), key) if name in joints else None
+        joint = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name))
+        line: Line | None = line_of_joint(model, joint, key) if joint >= 0 else None
         if line is None:
-            line = line_at_site(model, data, sites.index(name), key)
+            line = line_at_site(model, data, int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)), key)
         if not isinstance(line, HingeLine):
-            raise InputError(f"{said} tilts about {name!r} as a free body does; only a hinge can be locked")
-        found.append(line)
-    if len(found) == len(known):
+            raise InputError(f"{setting} tilts about {name!r} as a free body does; only a hinge can be locked")
+        hinges.append(line)
+    if len(hinges) == len(known):
         leave = f"; leave one of {', '.join(map(repr, known))}" if len(known) > 1 else ""
-        raise InputError(f"{said} would have no axis left to tilt about{leave}")
-    return found
+        raise InputError(f"{setting} would have no axis left to tilt about{leave}")
+    return hinges
 
 
-def _said(axes: Sequence[str], path: Path) -> str:
+def _setting(axes: Sequence[str], path: Path) -> str:
     return f"plant.locked_axes = {shown(list(axes))}: {path}"
 
 

@@ -6,6 +6,7 @@ import re
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 
@@ -13,7 +14,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.inputs.includes import check_files
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
-from cmg_mj.plant.parts import REQUIRED_PARTS, missing_parts
+from cmg_mj.plant.parts import REQUIRED_PARTS, axes_of, missing_parts
 
 
 def _one_line(error: Exception) -> str:
@@ -56,7 +57,21 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     return model
 
 
-def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> tuple[mujoco.MjModel, list[str]]:
+class Rig(NamedTuple):
+    """A compiled model that has all parts of a plant.
+
+    Attributes:
+        model: The model.
+        axes: The names of its axes, the locked ones too, each with those of its modules.
+        hints: Clauses on what is right and yet not what the reduced model takes it for.
+    """
+
+    model: mujoco.MjModel
+    axes: dict[str, list[str]]
+    hints: list[str]
+
+
+def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> Rig:
     """Read and compile a model, without what is only seen, and see that it is a rig.
 
     Args:
@@ -65,17 +80,17 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> tupl
         locked_axes: Axes whose hinges to take out.
 
     Returns:
-        The model, and what is right on it and yet not what the reduced model takes it for, in clauses.
+        The compiled model with its axes.
 
     Raises:
-        InputError: It is no rig. All that is missing or wrong is named.
+        InputError: The file holds no rig. All that is missing or wrong is named.
     """
     spec = parse(path)
     missing = missing_parts(spec)
     if lock and not missing:
         lock_thrust_bearing(spec, path)
     spec.compiler.discardvisual = True
-    model, hints = None, []
+    rig = None
     wrong = list(missing)
     try:
         model = compile_model(spec, path)
@@ -85,16 +100,17 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> tupl
         if "keyframe" not in str(error):  # whose sizes are wrong because something is missing
             wrong.append(str(error).removeprefix(f"{path}: "))
     else:
+        axes = axes_of(model)
         numbers = invalid_numbers(model)
-        placement = None if numbers else RigChecker(model)
+        placement = None if numbers else RigChecker(model, axes)
         wrong += numbers if placement is None else placement.wrong
-        hints = [] if placement is None else placement.hints
-    if wrong or model is None:
+        rig = Rig(model, axes, [] if placement is None else placement.hints)
+    if wrong or rig is None:
         raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([REQUIRED_PARTS] if missing else [])]))
     if locked_axes:
-        lock_axes(spec, model, locked_axes, path)
-        model = compile_model(spec, path)
-    return model, hints
+        lock_axes(spec, rig.model, locked_axes, rig.axes, path)
+        rig = rig._replace(model=compile_model(spec, path))
+    return rig
 
 
 def check_rig(path: Path, name: Path) -> None:

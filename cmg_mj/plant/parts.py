@@ -125,9 +125,11 @@ def cubes_in(names: Iterable[str], axis: str) -> list[str]:
     return [prefix for prefix in prefixes if prefix.rpartition("/")[0] == axis]
 
 
-def cubes_of(model: mujoco.MjModel, axis: str) -> list[str]:
-    """The same of a compiled model's joints."""
-    return cubes_in([model.joint(i).name for i in range(model.njnt)], axis)
+def axes_of(model: mujoco.MjModel) -> dict[str, list[str]]:
+    """Find the axes of a compiled model, each with the names of its modules."""
+    joints = [model.joint(i).name for i in range(model.njnt)]
+    sites = [model.site(i).name for i in range(model.nsite)]
+    return {axis: cubes_in(joints, axis) for axis in axes_in([*joints, *sites])}
 
 
 def _missing(kind: str, names: list[str], known: list[str]) -> str:

@@ -21,7 +21,7 @@ from cmg_mj.controllers.laws import Law, StateFeedback
 from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.controllers.multi_axis import MultiAxisController, YawCoupling
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, TomlValue, nearest
 from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.messages import complaint
 from cmg_mj.observers import Observer
@@ -32,14 +32,14 @@ from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Cube, axes_in
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Cube
 from cmg_mj.plant.step_limit import largest_step
-from cmg_mj.plant.tilt_line import HingeLine
+from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import FINEST_STEP_S, PlantSettings
 from cmg_mj.scenario.schema import ObserverSettings
-from cmg_mj.scenario.time_grid import fitting_step
+from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from cmg_mj.sensors.ideal import MultiAxisReading
@@ -69,34 +69,34 @@ class Plant:
         self,
         settings: PlantSettings,
         path: Path,
-        period_s: float | None = None,
+        grid: TimeGrid | None = None,
         of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
     ) -> None:
         self.path = path
         locked = settings.locked_axes
-        self.model, self.hints = load_rig(path, lock=settings.lock_thrust_bearing, locked_axes=locked)
+        self.model, modules, self.hints = load_rig(path, lock=settings.lock_thrust_bearing, locked_axes=locked)
         self._as_filed = self.model
         self.key = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))
-        names = [self.model.joint(i).name for i in range(self.model.njnt)]
-        self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in names else None
-        sites = [self.model.site(i).name for i in range(self.model.nsite)]
-        axes = [name for name in axes_in([*names, *sites]) if name not in locked]
-        self._axes_as_filed = tuple(find_axis(self.model, self.key, name) for name in axes)
-        self._held = tuple(cube for name in locked for cube in held_cubes(self.model, self.key, name))
-        self._apply_settings(settings, period_s, of_axes)
+        self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in self.joint_names else None
+        self._modules = modules
+        self._axes_as_filed = tuple(
+            find_axis(self.model, self.key, name, modules[name]) for name in modules if name not in locked
+        )
+        self._held = tuple(cube for name in locked for cube in held_cubes(self.model, self.key, modules[name]))
+        self._apply_settings(settings, grid, of_axes)
 
     def changed(
         self,
         settings: PlantSettings,
-        period_s: float | None = None,
+        grid: TimeGrid | None = None,
         of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
     ) -> Plant:
         """The same rig with other settings, without compiling its file again.
 
         Args:
-            settings: They name the same model file, and lock the thrust bearing and axes alike.
-            period_s: Where they leave the physics step open, what whole steps must fill [s].
-            of_axes: What axes have of their own.
+            settings: Settings with the same model file, which lock the thrust bearing and axes alike.
+            grid: The times that whole physics steps must fill.
+            of_axes: The settings of axes that have their own.
 
         Returns:
             Another plant.
@@ -105,15 +105,20 @@ class Plant:
             InputError: With these settings the physics fails.
         """
         other = copy.copy(self)
-        for made in ("drawn_model", "turning"):
-            other.__dict__.pop(made, None)
-        other._apply_settings(settings, period_s, of_axes)
+        for cached in ("drawn_model", "turning"):
+            other.__dict__.pop(cached, None)
+        other._apply_settings(settings, grid, of_axes)
         return other
 
+    def is_of_same_file(self, settings: PlantSettings) -> bool:
+        """Whether `changed` can take these settings: their model is compiled from the same file, locked alike."""
+        names = ("model", "lock_thrust_bearing", "locked_axes")
+        return all(getattr(self.settings, name) == getattr(settings, name) for name in names)
+
     def _apply_settings(
-        self, settings: PlantSettings, period_s: float | None, of_axes: Mapping[str, PlantSettings]
+        self, settings: PlantSettings, grid: TimeGrid | None, of_axes: Mapping[str, PlantSettings]
     ) -> None:
-        """Change the model as the settings say, and fit the physics step."""
+        """Change the model as the settings say, and fit the physics step to the grid."""
         self.settings, self._of_axes = settings, of_axes
         self.backlash = math.radians(settings.gimbal_backlash_arcmin / ARCMIN_A_DEGREE)
         self.model = copy.copy(self._as_filed)
@@ -150,7 +155,9 @@ class Plant:
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
                 f"{FINEST_STEP_S:g} s; soften it, or set plant.timestep_s"
             )
-        self.model.opt.timestep = fitting_step(settings, self.largest_step, period_s)
+        self.model.opt.timestep = (
+            grid.physics_step(self.largest_step) if grid else settings.timestep_s or self.largest_step
+        )
         if not survives_first_steps(self.model, self.new_data()):
             raise InputError(
                 f"{self._error_source}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "
@@ -172,7 +179,7 @@ class Plant:
                 lock_thrust_bearing(spec, self.path)
             model = compile_model(spec, self.path)
             if self.settings.locked_axes:
-                lock_axes(spec, model, self.settings.locked_axes, self.path)
+                lock_axes(spec, model, self.settings.locked_axes, self._modules, self.path)
                 model = compile_model(spec, self.path)
         for axis in self._axes_as_filed:
             place_accelerometers(model, self._of_axes.get(axis.name, self.settings), axis, self.path)
@@ -209,7 +216,7 @@ class Plant:
         """What a turn about the vertical couples."""
         return turning(self._as_filed, self.key, self.axes)
 
-    def largest_tilt(self, qpos: Any) -> Scalar:
+    def largest_tilt(self, qpos: Addressed) -> Scalar:
         """The tilt from the keyframe of the axis that is farthest from it [rad]."""
         if len(self.axes) == 1:
             return self.axis.line.lean(qpos)
@@ -267,14 +274,14 @@ class Plant:
             raise InputError(f"{self.path}: tilts about no hinge of its own at one address; use plant.axis.line")
         return line
 
-    def ideal_readings(self, sensordata: Any, qvel: Any) -> Any:
+    def ideal_readings(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> Any:
         """What perfect sensors show: of the axis (see `Axis.ideal`), or `MultiAxisReading` of several."""
         if len(self.axes) == 1:
             return self.axis.ideal(sensordata, qvel)
         upward = sensordata[self.axis.gyro + 1]
         return MultiAxisReading([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
 
-    def gimbal_angle(self, qpos: Any) -> Scalar:
+    def gimbal_angle(self, qpos: Addressed) -> Scalar:
         """True x3 of the axis: see `Axis.gimbal_angle`."""
         return self.axis.gimbal_angle(qpos)
 
@@ -360,7 +367,14 @@ class Plant:
         """What a scenario's controller and observers are made from."""
         cubes = tuple(cube.name for cube in self.cubes)
         return PlantParameters(
-            self.path, cubes, self.reduced, self.radial_tilt, self.gravity, self.largest_step, tuple(self.hints)
+            self.path,
+            cubes,
+            self.reduced,
+            self.radial_tilt,
+            self.gravity,
+            self.timestep,
+            self.largest_step,
+            tuple(self.hints),
         )
 
     def initialise(self, data: mujoco.MjData) -> None:
@@ -393,17 +407,17 @@ class Plant:
 def load_plant(
     settings: PlantSettings | None = None,
     beside: Path | None = None,
-    period_s: float | None = None,
+    grid: TimeGrid | None = None,
     of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
-    **fields: object,
+    **fields: TomlValue,
 ) -> Plant:
     """Load a rig.
 
     Args:
         settings: Its settings; or give them as keyword arguments.
         beside: A folder that a relative model path may start from.
-        period_s: Where the settings leave the physics step open, what whole steps must fill, say a control period [s].
-        of_axes: What axes of several have of their own: equilibrium bias, initial tilt, places of the accelerometers.
+        grid: The times that whole physics steps must fill; by default the step is the largest that is accurate enough.
+        of_axes: The settings of axes that have their own: equilibrium bias, initial tilt, places of the accelerometers.
         **fields: Fields of `PlantSettings`.
 
     Returns:
@@ -419,4 +433,4 @@ def load_plant(
         except ValidationError as error:
             raise InputError(f"plant.{complaint(PlantSettings, error.errors()[0], fields)}") from error
     with set_control_callback(None):  # compiling a model runs it
-        return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside), period_s, of_axes)
+        return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside), grid, of_axes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -13,15 +13,21 @@ import numpy as np
 from cmg_mj.elementwise import Scalar, atan2
 
 
+class Addressed(Protocol):
+    """Numbers of MuJoCo's, by address: of one world floats, of many arrays (n_worlds,)."""
+
+    def __getitem__(self, address: int, /) -> Scalar: ...
+
+
 @dataclass(frozen=True)
 class HingeLine:
-    """A hinge of the rig's.
+    """A hinge of the plant.
 
     Attributes:
-        joint: Its number.
-        angle: Its address in qpos.
-        dof: Its address in qvel.
-        zero: Its angle at the keyframe, where the rig stands upright [rad].
+        joint: The joint's number.
+        angle: Address of its angle in qpos.
+        dof: Address of its rate in qvel.
+        zero: Angle at the keyframe, where the plant stands upright [rad].
         sign: +1, or -1 where the hinge turns against the axis.
     """
 
@@ -31,11 +37,11 @@ class HingeLine:
     zero: float
     sign: float = 1.0
 
-    def lean(self, qpos: Any) -> Scalar:
+    def lean(self, qpos: Addressed) -> Scalar:
         """Tilt from the keyframe [rad]."""
         return self.sign * (qpos[self.angle] - self.zero)
 
-    def rate(self, qvel: Any) -> Scalar:
+    def rate(self, qvel: Addressed) -> Scalar:
         """Tilt rate [rad/s]."""
         return self.sign * qvel[self.dof]
 
@@ -83,13 +89,13 @@ class SupportLine:
     _y: Sequence[float] = ()
     _z: Sequence[float] = ()
 
-    def lean(self, qpos: Any) -> Scalar:
+    def lean(self, qpos: Addressed) -> Scalar:
         """Tilt of the line's z axis from the vertical about the line, as accelerometers see it [rad]."""
         w, x, y, z = (qpos[self.angle + 3 + i] for i in range(4))
         up = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)  # in the body's axes
         return atan2(-_dot(up, self._x), _dot(up, self._z))
 
-    def rate(self, qvel: Any) -> Scalar:
+    def rate(self, qvel: Addressed) -> Scalar:
         """Angular velocity about the line [rad/s]."""
         return _dot([qvel[self.dof + 3 + i] for i in range(3)], self._y)
 
@@ -193,5 +199,5 @@ def line_at_site(model: mujoco.MjModel, data: mujoco.MjData, site: int, key: int
     return None
 
 
-def _dot(a: Any, b: Sequence[float]) -> Scalar:
+def _dot(a: Addressed, b: Sequence[float]) -> Scalar:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -52,9 +52,13 @@ def vary(
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     cubes = [*(cube for axis in axes for cube in axis.cubes), *held]
-    gimbals = [cube.gimbal_dof for cube in cubes]
-    friction = settings.tilt_friction_n_m is not None or settings.tilt_damping_n_m_s is not None
-    tilts = [_hinge(axis, path) for axis in axes] if friction else []
+
+    def gimbals() -> list[int]:
+        return [cube.gimbal_dof for cube in cubes]
+
+    def tilts() -> list[int]:
+        return [_hinge(axis, path) for axis in axes]
+
     for field, joints, value in (
         (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),
         (model.dof_frictionloss, gimbals, settings.gimbal_friction_n_m),
@@ -63,7 +67,7 @@ def vary(
         (model.dof_damping, tilts, settings.tilt_damping_n_m_s),
     ):
         if value is not None:
-            field[joints] = value
+            field[joints()] = value
     _vary_servos(model, settings, path, cubes)
     shifts = [bias_shift(model, axis, axis.bias, path) for axis in axes if axis.bias]
     for axis, shift in zip([axis for axis in axes if axis.bias], shifts, strict=True):

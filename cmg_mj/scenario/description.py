@@ -1,37 +1,33 @@
-"""What a scenario amounts to, in words."""
+"""A scenario and its plant in words."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
 
 from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.controllers.laws.protocol import needs
+from cmg_mj.errors import TomlValue
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.stability_check import closed_loop, hints
-from cmg_mj.scenario.time_grid import physics_step
 
 
 def description(name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "") -> str:
-    """What `cmg-mj check` prints: what a scenario amounts to.
+    """Describe a scenario in the lines that `cmg-mj check` prints.
 
     Args:
-        name: What the user called it.
-        scenario: The scenario.
+        name: The scenario as the user called it.
+        scenario: The scenario of one axis.
         design: The law and the observers.
-        rig: What they were made for.
+        rig: The parameters of the plant.
         axis: The name of the axis, if it has one.
-
-    Returns:
-        Lines of text.
     """
     settings = scenario.plant
-    timestep = physics_step(scenario, rig.largest_step)
-    fields = resolved(scenario, design, rig.path, timestep)
+    timestep = rig.timestep
+    fields = resolved(scenario, {axis: design})
     steps = f"{round(scenario.duration_s / timestep)} physics steps of {timestep:g} s"
     coarse = (
         f"; figures are accurate up to {rig.largest_step:g} s" if timestep > rig.largest_step * (1.0 + 1e-9) else ""
@@ -71,40 +67,37 @@ def _about(torque: Push | Swing) -> str:
 
 
 def _law_rows(
-    scenario: Scenario, design: Design, rig: PlantParameters, fields: Mapping[str, Any]
+    scenario: Scenario, design: Design, rig: PlantParameters, fields: Mapping[str, TomlValue]
 ) -> Iterator[tuple[str, str]]:
-    """What the law is, what it is fed, and of the papers' what it makes of the reduced model."""
+    """The law, its inputs, and of the papers' law the closed loop on the reduced model."""
     controller, law = scenario.controller, design.law
-    at = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
-    fed = f"tilt rate from the {controller.feedback}, {controller.angle_source} angles"
+    limits = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
+    inputs = f"tilt rate from the {controller.feedback}, {controller.angle_source} angles"
     if isinstance(law, StateFeedback):
         loop = closed_loop(scenario, law, rig.reduced)
-        yield "law", f"K_e = {number(law.gains)} {at}"
-        yield "", fed
+        yield "law", f"K_e = {number(law.gains)} {limits}"
+        yield "", inputs
         yield "", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"
         yield "", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"
         return
-    yield "law", f"{controller.kind} {at}"
-    own = {name: value for name, value in fields.items() if name not in ControllerSettings.model_fields}
-    if own:
-        yield "", assignments(own)
-    yield "", fed if needs(law) else "takes nothing of the observer, which is judged only"
+    yield "law", f"{controller.kind} {limits}"
+    parameters = {name: value for name, value in fields.items() if name not in ControllerSettings.model_fields}
+    if parameters:
+        yield "", assignments(parameters)
+    yield "", inputs if needs(law) else "takes nothing of the observer, which is judged only"
     if controller.kind not in LAWS:
         yield "", "your own code, which was imported and tried on two samples"
 
 
 def rig_description(name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "") -> str:
-    """What `cmg-mj check` prints of a model file by itself.
+    """Describe a model file in the lines that `cmg-mj check` prints.
 
     Args:
-        name: What the user called it.
-        scenario: One with this model and all defaults.
-        design: What the defaults amount to.
-        rig: What the model amounts to.
+        name: The file as the user called it.
+        scenario: A scenario with this model and all defaults.
+        design: The law and the observers by default.
+        rig: The parameters of the plant.
         axis: The name of the axis, if it has one.
-
-    Returns:
-        Lines of text.
     """
     about = f" --set push.0.axis={axis}" if axis else ""
     reduced = rig.reduced
@@ -126,12 +119,12 @@ def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:
     return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows)])
 
 
-def assignments(values: Mapping[str, Any]) -> str:
+def assignments(values: Mapping[str, TomlValue]) -> str:
     """Parameters and their values, as `--set` takes them."""
     return "  ".join(f"{name}={number(value)}" for name, value in values.items())
 
 
-def number(value: Any) -> str:
+def number(value: TomlValue) -> str:
     """A value as TOML writes it, to six digits."""
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(number(item) for item in value)}]"

@@ -1,4 +1,4 @@
-"""What a scenario asks of the controller, made for one reduced model and tried: the law and the observers."""
+"""The law and the observers of a scenario, made for one reduced model and tried."""
 
 from __future__ import annotations
 
@@ -12,18 +12,16 @@ from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
 from cmg_mj.controllers.integrator_trim import integrator_trim
 from cmg_mj.controllers.laws import LAWS, Law
 from cmg_mj.controllers.laws.protocol import NEEDS, needs
-from cmg_mj.controllers.laws.registry import OF_LAWS, law_class
+from cmg_mj.controllers.laws.registry import OF_LAWS
 from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.controllers.processor import Processor
 from cmg_mj.errors import InputError
-from cmg_mj.observers import Observer, make_observer, observer_class
+from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.observers.registry import OF_OBSERVERS
-from cmg_mj.scenario.loading import unknown_to_law, with_source
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
-from cmg_mj.scenario.time_grid import check_times
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import TiltNoise
 
@@ -32,12 +30,12 @@ from cmg_mj.sensors.tilt import TiltNoise
 class Design:
     """The law of a scenario, and its observers.
 
-    What a user has written is made anew whenever it is asked for: it may remember more than its state holds.
+    A user's own law or observer is made anew for every run: it may remember more than its state holds.
 
     Attributes:
-        scenario: What it was made from.
-        rig: The rig it was made for.
-        law: The control law, to be looked at: what runs is `fresh_law`.
+        scenario: The scenario.
+        rig: The parameters of the plant.
+        law: The control law, to be looked at: a run has its `fresh_law`.
     """
 
     scenario: Scenario
@@ -46,20 +44,20 @@ class Design:
 
     @property
     def given(self) -> tuple[float, ReducedModel, TiltNoise]:
-        """What every observer is given: the control period [s], the reduced model, the noise by the datasheet."""
+        """The parameters that every observer gets: control period [s], reduced model, noise by the datasheet."""
         return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors)
 
     def fresh_law(self) -> Law:
-        """The law, fresh."""
+        """Make the law of a run."""
         controller = self.scenario.controller
         return self.law if controller.kind in LAWS else controller.law(*self.given[1:])
 
     def observer(self) -> Observer:
-        """The observer in the loop, fresh."""
+        """Make the observer in the loop."""
         return self.scenario.observer.make(*self.given)
 
     def open_loop_observers(self) -> dict[str, Observer]:
-        """Those that ride along, by name, fresh."""
+        """Make the open-loop observers, by name."""
         return {name: make_observer(name, *self.given) for name in self.scenario.open_loop_names()}
 
     def controller(
@@ -115,16 +113,16 @@ class Design:
         Raises:
             InputError: One raised an exception or returned something else than it must.
         """
-        tried = [("observer.kind =", self.scenario.observer.kind, self.observer())]
-        tried += [("open_loop_observers:", name, observer) for name, observer in self.open_loop_observers().items()]
+        observers = [("observer.kind =", self.scenario.observer.kind, self.observer())]
+        observers += [("open_loop_observers:", name, observer) for name, observer in self.open_loop_observers().items()]
         with np.errstate(all="ignore"):
-            for field, name, observer in tried:
+            for field, name, observer in observers:
                 try:
                     dry_run_observer(observer, worlds)
                 except InputError as error:
                     raise InputError(f"{field} {name!r}: {error}") from error
             try:
-                dry_run_law(self.fresh_law(), len(extra_signals(tried[0][2])), worlds)
+                dry_run_law(self.fresh_law(), len(extra_signals(observers[0][2])), worlds)
             except InputError as error:
                 raise InputError(f"controller.kind = {self.scenario.controller.kind!r}: {error}") from error
 
@@ -133,8 +131,8 @@ def design(scenario: Scenario, rig: PlantParameters) -> Design:
     """Check what pydantic could not, construct the law and the observers, and try them once.
 
     Args:
-        scenario: The scenario.
-        rig: Its rig.
+        scenario: The scenario of one axis.
+        rig: The parameters of the plant along that axis.
 
     Returns:
         The design.
@@ -142,41 +140,34 @@ def design(scenario: Scenario, rig: PlantParameters) -> Design:
     Raises:
         InputError: Something in the scenario does not fit.
     """
-    try:
-        check_times(scenario)
-        _check_observers(scenario)
+    with scenario.named_in_errors():
+        _check(scenario)
         controller = scenario.controller
-        _check_law(controller)
-        made = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
-        made.rehearse()
-        integrator_trim(controller.bias_trim_s, made.law, extra_signals(made.observer()))
-    except InputError as error:
-        raise InputError(with_source(scenario._source, str(error))) from error
-    return made
+        result = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
+        result.rehearse()
+        integrator_trim(controller.bias_trim_s, result.law, extra_signals(result.observer()))
+    return result
 
 
-def _check_observers(scenario: Scenario) -> None:
-    """The observers exist, and the parameters of the one in the loop are of their types: no text for a number."""
-    named = [("open_loop_observers", name) for name in scenario.open_loop_names()]
-    named += [("compare.observers", name) for name in (scenario.compare.names() if scenario.compare else ())]
-    for field, name in named:
+def _check(scenario: Scenario) -> None:
+    """Refuse observers and a law that do not exist, parameters that they do not take, and fields without a use."""
+    names = [("open_loop_observers", name) for name in scenario.open_loop_names()]
+    names += [("compare.observers", name) for name in (scenario.compare.names() if scenario.compare else ())]
+    for field, name in names:
         try:
-            observer_class(name)
+            OF_OBSERVERS.find(name)
         except InputError as error:
             raise InputError(str(error).replace("observer.kind = ", f"{field}: ", 1)) from error
     OF_OBSERVERS.check_types(scenario.observer.kind, scenario.observer.parameters)
-
-
-def _check_law(controller: ControllerSettings) -> None:
-    """The law exists, knows its parameters, which are of their types, and has a use for every field that is set."""
+    controller = scenario.controller
     kind, parameters = controller.kind, controller.parameters
-    law = law_class(kind)
+    law = OF_LAWS.find(kind)
     OF_LAWS.check_types(kind, parameters)
-    for wrong in unknown_to_law(kind, parameters):
-        raise InputError(wrong)
-    given = next((name for name in ("gains", "lqr") if getattr(controller, name) is not None), None)
-    if given and not OF_LAWS.may_take(kind, "gains"):
-        raise InputError(f"controller.{given}: {kind} takes no gains; leave it out")
+    for clause in OF_LAWS.unknown(kind, parameters, ControllerSettings.model_fields):
+        raise InputError(clause)
+    gains = next((name for name in ("gains", "lqr") if getattr(controller, name) is not None), None)
+    if gains and not OF_LAWS.may_take(kind, "gains"):
+        raise InputError(f"controller.{gains}: {kind} takes no gains; leave it out")
     try:
         unused = () if needs(law) == NEEDS else ("feedback", "angle_source")
     except InputError as error:

@@ -1,75 +1,39 @@
-"""What differs between two scenarios: in a summary, in words, and in a folder's name."""
+"""The differences between two scenarios: in words, and in a folder's name."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import PurePath
-from typing import Any
+
+from cmg_mj.errors import TomlValue
 
 LONGEST_NAME = 60
-"""Of a folder's name, what differs [characters]."""
+"""Of the differences in a folder's name [characters]."""
 SHOWN = 3
 """So many differences are shown in one line."""
-NOT_DIFFERENCES = {"title", "seed", "observer.kind", "compare", "based_on", "versions"}
-"""Fields that differ without being called a difference: they have a place of their own wherever a run is named."""
 
 
-def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[str, Any]:
-    """What differs between two scenarios.
-
-    Args:
-        base: One of them, with every default written out.
-        scenario: The other.
-
-    Returns:
-        Field, `section.field` -> its value in the other; None where it has no such field. The parameters of different
-        observers are not compared.
-    """
-    left_out = NOT_DIFFERENCES | ({"observer"} if base["observer"]["kind"] != scenario["observer"]["kind"] else set())
-    return {
-        name: value
-        for name, value in _differing(base, scenario)
-        if name not in left_out and name.partition(".")[0] not in left_out
-    }
+def describe_differences(differing: Mapping[str, TomlValue | None]) -> str:
+    """Write the first few after a comma, as `--set` takes them; nothing if nothing differs."""
+    assignments = [f"{name}={_value(value)}" for name, value in zip(_short(differing), differing.values(), strict=True)]
+    return "".join(f", {text}" for text in _first(assignments, SHOWN, " and {} more"))
 
 
-def _differing(base: Any, other: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    below = f"{name}." if name else ""
-    if isinstance(base, Mapping) and isinstance(other, Mapping):
-        for key in dict.fromkeys([*other, *base]):
-            yield from _differing(base.get(key), other.get(key), f"{below}{key}")
-    elif _are_sections(base) and _are_sections(other) and len(base) == len(other):
-        for i, (one, two) in enumerate(zip(base, other, strict=True)):
-            yield from _differing(one, two, f"{below}{i}")
-    elif base != other:
-        yield name, other
-
-
-def _are_sections(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
-
-
-def describe_differences(differing: Mapping[str, Any]) -> str:
-    """The first few, after a comma, as `--set` takes them; nothing if nothing differs."""
-    named = [f"{name}={_value(value)}" for name, value in zip(_short(differing), differing.values(), strict=True)]
-    return "".join(f", {text}" for text in _first(named, SHOWN, " and {} more"))
-
-
-def folder_suffix(differing: Mapping[str, Any]) -> str:
-    """As the end of a folder's name: letters that every system takes, and not too many."""
-    named = [
+def folder_suffix(differing: Mapping[str, TomlValue | None]) -> str:
+    """Make the end of a folder's name: letters that every system takes, and not too many."""
+    assignments = [
         re.sub(r"[^\w.=+-]+", "_", f"{name}={_value(value)}", flags=re.ASCII).strip("_")
         for name, value in zip(_short(differing), differing.values(), strict=True)
     ]
-    count = len(named)
-    while count and sum(len(text) + 1 for text in named[:count]) > LONGEST_NAME:
+    count = len(assignments)
+    while count and sum(len(text) + 1 for text in assignments[:count]) > LONGEST_NAME:
         count -= 1
-    return "".join(f"-{text}" for text in _first(named, count, "and-{}-more"))
+    return "".join(f"-{text}" for text in _first(assignments, count, "and-{}-more"))
 
 
 def safe_name(text: str) -> str:
-    """A name of a user's as a part of a folder's: without what some system does not take, and not too long."""
+    """Make a user's name a part of a folder's: without letters that some system refuses, and not too long."""
     return re.sub(r'[\x00-\x1f\x7f/\\:*?"<>|\ud800-\udfff]', "_", text)[:LONGEST_NAME]
 
 
@@ -93,7 +57,7 @@ def _short(names: Iterable[str]) -> list[str]:
     return [short(parts) for parts in full]
 
 
-def _value(value: Any) -> str:
+def _value(value: TomlValue | None) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if value is None or value == []:

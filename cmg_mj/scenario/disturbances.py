@@ -11,7 +11,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.inputs.field_types import STRICT, Duration, Instant
+from cmg_mj.inputs.field_types import STRICT, Batched, Duration, GridDuration, GridInstant, Instant
 
 AFTER_PUSH_S = 1.0
 """What an estimate is worth shows from a push's start until so long after its end [s]: at other times the rig hardly
@@ -32,9 +32,9 @@ class Push:
         axis: Name of that axis, on a rig of several.
     """
 
-    start_s: Instant
-    duration_s: Duration = 0.1
-    torque_n_m: float = 1.0
+    start_s: GridInstant
+    duration_s: GridDuration = 0.1
+    torque_n_m: Annotated[float, Batched()] = 1.0
     axis: str | None = None
 
     @property

@@ -1,33 +1,24 @@
-"""TOML -> a scenario, every field checked."""
+"""A scenario's file and what a command line changes in it -> a scenario, every field checked."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
-
-from cmg_mj.controllers.laws.registry import LAWS, OF_LAWS
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import bundled, find, folder
-from cmg_mj.inputs.messages import complaint
 from cmg_mj.inputs.overrides import override
-from cmg_mj.inputs.sanity import out_of_size, unreadable
-from cmg_mj.inputs.user_classes import as_json
-from cmg_mj.scenario.schema import COMMON_LAW_FIELDS, AxisSettings, ControllerSettings, ObserverSettings, Scenario
+from cmg_mj.scenario.schema import ControllerSettings, ObserverSettings, Scenario, parse_scenario
 
 LARGEST_FILE = 1_000_000
 """Bytes of a scenario file; the longest that a run writes has three thousand."""
 MOST_PARTS = 100
 _PART = r"""(?:"[^"\n]*+"|'[^'\n]*+'|[\w-]++)[ \t]*+\.[ \t]*+"""
 _ENDLESS_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{MOST_PARTS}}}")  # tomllib takes a minute over 50,000 parts
-MOST_CLAUSES = 20
-"""So many wrong fields are named in one line."""
 
 
 def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None = None) -> Scenario:
@@ -58,8 +49,7 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
         override(fields, setting)
     if _kind_of(fields, "controller") != law:
         _drop_gains(fields, overrides)
-    where = " ".join([name, *(["with"] if changes else []), *changes])
-    scenario = parse_scenario(fields, where)
+    scenario = parse_scenario(fields, " ".join([name, *(["with"] if changes else []), *changes]))
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in overrides):
         scenario = find_model(scenario, path.parent)
     return scenario
@@ -126,132 +116,6 @@ def base_of(scenario: Scenario) -> Scenario | None:
 
 def find_model(scenario: Scenario, beside: Path) -> Scenario:
     """The same with the path of its model, which a scenario file names relative to itself."""
-    try:
+    with scenario.named_in_errors():
         model = find("models", scenario.plant.model, ".xml", "plant.model =", beside)
-    except InputError as error:
-        raise InputError(f"{scenario._source}: {error}") from error
     return scenario.model_copy(update={"plant": dataclasses.replace(scenario.plant, model=str(model))})
-
-
-def parse_scenario(fields: Mapping[str, Any], where: str = "") -> Scenario:
-    """Check a scenario given as a mapping.
-
-    Args:
-        fields: The TOML file's content.
-        where: What to call it in an error.
-
-    Returns:
-        The scenario.
-
-    Raises:
-        InputError: A field is unknown or not allowed. All wrong fields are named, on one line.
-    """
-    wrong = list(unreadable(fields))
-    if wrong:
-        raise InputError(with_source(where, _clauses(wrong)))
-    try:
-        # By way of JSON, pydantic takes a list for a tuple and still no text or true for a number.
-        scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True)
-    except ValidationError as error:
-        complaints = [complaint(Scenario, detail, fields) for detail in error.errors()]
-        raise InputError(with_source(where, _clauses([*complaints, *_unknown_to_law(fields)]))) from error
-    wrong = [*_unknown_to_law(fields), *out_of_size(fields)]
-    if wrong:
-        raise InputError(with_source(where, _clauses(wrong)))
-    scenario._source = where
-    for axis in scenario.axes:
-        scenario_of_axis(scenario, axis)
-    return scenario
-
-
-def scenario_of_axis(scenario: Scenario, axis: str) -> Scenario:
-    """A scenario as one axis of several has it.
-
-    Args:
-        scenario: Of the whole rig.
-        axis: The axis' name.
-
-    Returns:
-        The scenario with what [axes.NAME] gives it in the place of what holds for all. Where that names another
-        observer or law, no parameter of the common one is left.
-
-    Raises:
-        InputError: A field is unknown or not allowed.
-    """
-    own = scenario.axes.get(axis)
-    if own is None:
-        return scenario.model_copy(update={"axes": {}})
-    fields = as_fields(scenario.model_copy(update={"axes": {}}))
-    where = f"{scenario._source}, [axes.{axis}]".removeprefix(", ")
-    for whole in ("rate_hz", "compensate_turning"):
-        if whole in own.controller:
-            raise InputError(with_source(where, f"controller.{whole}: is the same on all axes; set it in [controller]"))
-    for name, section in axis_fields(own).items():
-        common = fields.setdefault(name, {})
-        if section.get("kind", common.get("kind")) != common.get("kind"):
-            kept = COMMON_LAW_FIELDS if name == "controller" else ()
-            common = {field: common[field] for field in kept if field in common}
-        if name == "controller" and {"gains", "lqr"} & section.keys():
-            common = {field: value for field, value in common.items() if field not in ("gains", "lqr")}
-        fields[name] = _merged(common, section)
-    return parse_scenario(fields, where)
-
-
-def axis_fields(own: AxisSettings) -> dict[str, Any]:
-    """What an axis has of its own as the content of its section, empty sections left out."""
-    return {name: section for name, section in own.model_dump(mode="json", exclude_none=True).items() if section}
-
-
-def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """A section with another's fields in the place of its own, down to the last."""
-    both = {
-        name: _merged(common[name], own[name])
-        for name in common.keys() & own.keys()
-        if _are_sections(common[name], own[name])
-    }
-    return {**common, **own, **both}
-
-
-def _are_sections(*values: Any) -> bool:
-    return all(isinstance(value, Mapping) for value in values)
-
-
-def unknown_to_law(kind: str, given: Iterable[str]) -> list[str]:
-    """Fields of [controller] that are neither every law's nor this one's own.
-
-    Args:
-        kind: Of the law.
-        given: The fields.
-
-    Returns:
-        A clause for each.
-    """
-    known = {*ControllerSettings.model_fields, *OF_LAWS.own(kind)}
-    unknown = [name for name in given if name not in known and not OF_LAWS.may_take(kind, name)]
-    return [f"controller.{name}: no such field; {nearest(name, known)}" for name in unknown]
-
-
-def _unknown_to_law(fields: Mapping[str, Any]) -> list[str]:
-    """The same of a scenario with one of the bench's laws; no code of a user's is run to read a file."""
-    section = fields.get("controller")
-    if not isinstance(section, Mapping):
-        return []
-    kind = section.get("kind", ControllerSettings().kind)
-    return unknown_to_law(kind, section) if isinstance(kind, str) and kind in LAWS else []
-
-
-def as_fields(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as the content of a TOML file: what `parse_scenario` takes."""
-    return TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
-
-
-def _clauses(wrong: Iterable[str]) -> str:
-    """All that is wrong, or the first of very much."""
-    each = list(dict.fromkeys(wrong))
-    more = [f"and {len(each) - MOST_CLAUSES} more"] if len(each) > MOST_CLAUSES else []
-    return "; ".join(each[:MOST_CLAUSES] + more)
-
-
-def with_source(where: str, wrong: str) -> str:
-    """What is wrong, with where it is before it."""
-    return f"{where}: {wrong}" if where else wrong

@@ -1,4 +1,4 @@
-"""A rig as numbers: all that the controller, the observers and the checks of a scenario take from its model."""
+"""A plant as numbers: all that the controller, the observers and the checks of a scenario take from its model."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 
 
 class PlantParameters(NamedTuple):
-    """What a scenario's controller and observers are made from.
+    """The parameters that a scenario's controller and observers are made from.
 
     Attributes:
         path: The model's file.
-        cubes: Names of its modules.
-        reduced: Its reduced model.
-        tilt: The tilt estimate for its accelerometers.
-        gravity: [m/s^2].
+        cubes: Names of the plant's modules.
+        reduced: The reduced model.
+        tilt: The tilt estimate for the plant's accelerometers.
+        gravity: Gravitational acceleration [m/s^2].
+        timestep: The physics step [s].
         largest_step: The largest physics step that is accurate enough [s].
-        hints: What on it is not what the reduced model takes it for, in clauses.
+        hints: Clauses on what the reduced model does not know of the plant.
     """
 
     path: Path
@@ -30,6 +31,7 @@ class PlantParameters(NamedTuple):
     reduced: ReducedModel
     tilt: RadialTilt
     gravity: float
+    timestep: float
     largest_step: float
     hints: tuple[str, ...]
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
+from cmg_mj.inputs.field_types import STRICT, Batched, NonNegative, PerAxis, Positive
 
 FINEST_STEP_S = 1e-6
 """The smallest physics step [s]."""
@@ -45,25 +45,25 @@ class PlantSettings:
     """
 
     model: str = "scissored_pair.xml"
-    equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 0.5
-    initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] = 1.0
+    equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0), Batched(), PerAxis()] = 0.5
+    initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0), Batched(), PerAxis()] = 1.0
     timestep_s: Annotated[float, Field(ge=FINEST_STEP_S, le=0.1)] | None = None
     integrator: Integrator = "RK4"
     lock_thrust_bearing: bool = False
     locked_axes: tuple[str, ...] = ()
     turn_rate_rad_s: float = 0.0
-    gimbal_armature_kg_m2: NonNegative | None = None
-    gimbal_friction_n_m: NonNegative | None = None
-    gimbal_damping_n_m_s: NonNegative | None = None
-    gimbal_backlash_arcmin: Annotated[float, Field(ge=0.0, lt=5400.0)] = 0.0
-    servo_stiffness_n_m_rad: Positive | None = None
-    servo_damping_n_m_s_rad: NonNegative | None = None
-    accelerometer_inner_m: Positive | None = None
-    accelerometer_outer_m: Positive | None = None
-    tilt_friction_n_m: NonNegative | None = None
-    tilt_damping_n_m_s: NonNegative | None = None
+    gimbal_armature_kg_m2: Annotated[NonNegative | None, Batched()] = None
+    gimbal_friction_n_m: Annotated[NonNegative | None, Batched()] = None
+    gimbal_damping_n_m_s: Annotated[NonNegative | None, Batched()] = None
+    gimbal_backlash_arcmin: Annotated[float, Field(ge=0.0, lt=5400.0), Batched()] = 0.0
+    servo_stiffness_n_m_rad: Annotated[Positive | None, Batched()] = None
+    servo_damping_n_m_s_rad: Annotated[NonNegative | None, Batched()] = None
+    accelerometer_inner_m: Annotated[Positive | None, Batched(), PerAxis()] = None
+    accelerometer_outer_m: Annotated[Positive | None, Batched(), PerAxis()] = None
+    tilt_friction_n_m: Annotated[NonNegative | None, Batched()] = None
+    tilt_damping_n_m_s: Annotated[NonNegative | None, Batched()] = None
     flywheel_speed_rad_s: Positive | None = None
-    flywheel_imbalance_kg_m: float = 0.0
+    flywheel_imbalance_kg_m: Annotated[float, Batched()] = 0.0
 
     def changes(self) -> dict[str, float]:
         """What is given of friction, damping, inertia, backlash, servos, wheels and places of the accelerometers."""

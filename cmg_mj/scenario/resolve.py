@@ -1,42 +1,61 @@
-"""A scenario with every default written out: running that file again gives the same run."""
+"""A scenario with every default written out, which runs again to the same numbers; and how two of them differ."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import platform
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from importlib.metadata import version
-from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import tomli_w
-from pydantic import TypeAdapter
 
 from cmg_mj.controllers.laws.registry import BENCH_PARAMETERS as GIVEN_TO_LAWS
+from cmg_mj.errors import TomlValue
 from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.field_types import NoEffect
+from cmg_mj.inputs.marks import marked_fields
 from cmg_mj.observers import BENCH_PARAMETERS
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_settings import PlantSettings
-from cmg_mj.scenario.schema import AxisPlant, ControllerSettings, Scenario
+from cmg_mj.scenario.schema import ALL_AXES_LAW_FIELDS, AxisPlant, AxisSettings, ControllerSettings, Scenario
+
+NOT_DIFFERENCES = {"seed", "observer.kind", *marked_fields(Scenario, NoEffect)}
+"""Fields that differ without being called a difference: they have a place of their own wherever a run is named."""
 
 
-def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float) -> dict[str, Any]:
-    """The scenario with every default written out, and the versions it ran with, as TOML can hold it.
+def resolved(scenario: Scenario, designs: Mapping[str, Design]) -> dict[str, Any]:
+    """Write out every default of a scenario, and the versions it ran with, as TOML can hold them.
 
     Args:
         scenario: The scenario.
-        design: What was made of it.
-        model: The model's file.
-        timestep_s: The physics step [s].
+        designs: The law and the observers of each axis, by its name.
 
     Returns:
-        Sections and fields.
+        Sections and fields; of several axes, and where an axis has fields of its own, all that it may have in [axes].
     """
-    fields = TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
-    path = model.resolve()
+    first, *_ = designs.values()
+    fields = _resolved(scenario, first)
+    if len(designs) == 1 and not scenario.axes:
+        return fields
+    axes = {}
+    for name, design in designs.items():
+        own = _resolved(design.scenario, design)
+        axes[name] = {section: own[section] for section in AxisSettings.model_fields}
+        axes[name]["plant"] = {field: own["plant"][field] for field in own["plant"] if field in AxisPlant.model_fields}
+        for field in ALL_AXES_LAW_FIELDS:
+            axes[name]["controller"].pop(field)
+    given = scenario.as_fields()
+    return {**fields, **{name: given[name] for name in ("controller", "observer", "open_loop_observers")}, "axes": axes}
+
+
+def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
+    """The scenario with the defaults of one axis' law and observer."""
+    fields = scenario.as_fields()
+    path = design.rig.path.resolve()
     fields["plant"]["model"] = path.name if path.parent == folder("models").resolve() else str(path)
-    plant = fields["plant"] | {"timestep_s": timestep_s}
+    plant = fields["plant"] | {"timestep_s": design.rig.timestep}
     fields["plant"] = {
         field.name: plant[field.name] for field in dataclasses.fields(PlantSettings) if field.name in plant
     }
@@ -58,40 +77,13 @@ def resolved(scenario: Scenario, design: Design, model: Path, timestep_s: float)
     return _plain(fields)
 
 
-OF_AN_AXIS = ("plant", "controller", "observer", "sensors")
-"""Sections of which an axis may have something of its own."""
-
-
-def with_axes(fields: dict[str, Any], scenario: Scenario, axes: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
-    """The resolved scenario of a rig with what each axis has, written out.
-
-    Args:
-        fields: Of the rig.
-        scenario: The same as it was given.
-        axes: The resolved scenario of each axis, by its name.
-
-    Returns:
-        The rig's, with [axes] in it: all that an axis may have of its own.
-    """
-    if not axes:
-        return fields
-    found = {name: {section: own[section] for section in OF_AN_AXIS} for name, own in axes.items()}
-    for own in found.values():
-        own["plant"] = {name: value for name, value in own["plant"].items() if name in AxisPlant.model_fields}
-        whole = ("rate_hz", "compensate_turning")
-        own["controller"] = {name: value for name, value in own["controller"].items() if name not in whole}
-    given = TypeAdapter(Scenario).dump_python(scenario, mode="json", exclude_none=True)
-    as_given = {name: given[name] for name in ("controller", "observer", "open_loop_observers")}
-    return {**fields, **as_given, "axes": found}
-
-
-def _parameters(given: dict[str, Any], made: Any, by_bench: Collection[str]) -> dict[str, Any]:
-    """What was given, and the defaults of the rest as far as they can be known and TOML can hold them."""
-    if not dataclasses.is_dataclass(made):
+def _parameters(given: dict[str, Any], part: Any, by_bench: Collection[str]) -> dict[str, Any]:
+    """The parameters that were given, and the defaults of the rest as far as they are known and TOML can hold them."""
+    if not dataclasses.is_dataclass(part):
         return given
-    names = [f.name for f in dataclasses.fields(made) if f.init and f.name not in by_bench]
-    kept = {name: _plain(getattr(made, name, None)) for name in names if name not in given}
-    return {name: value for name, value in kept.items() if _is_toml(value)} | given
+    names = [f.name for f in dataclasses.fields(part) if f.init and f.name not in by_bench]
+    defaults = {name: _plain(getattr(part, name, None)) for name in names if name not in given}
+    return {name: value for name, value in defaults.items() if _is_toml(value)} | given
 
 
 @functools.cache
@@ -118,3 +110,40 @@ def _is_toml(value: Any) -> bool:
     except TypeError:
         return False
     return True
+
+
+def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[str, Any]:
+    """Compare two resolved scenarios.
+
+    Args:
+        base: The one that the other is told apart from.
+        scenario: The other.
+
+    Returns:
+        Field, `section.field` -> its value in the other; None where it has no such field. The parameters of different
+        observers are not compared.
+    """
+    ignored = NOT_DIFFERENCES | ({"observer"} if base["observer"]["kind"] != scenario["observer"]["kind"] else set())
+    return {
+        name: value
+        for name, value in _differing(base, scenario)
+        if name not in ignored and name.partition(".")[0] not in ignored
+    }
+
+
+def _differing(
+    base: TomlValue | None, other: TomlValue | None, name: str = ""
+) -> Iterator[tuple[str, TomlValue | None]]:
+    below = f"{name}." if name else ""
+    if isinstance(base, Mapping) and isinstance(other, Mapping):
+        for key in dict.fromkeys([*other, *base]):
+            yield from _differing(base.get(key), other.get(key), f"{below}{key}")
+    elif _are_sections(base) and _are_sections(other) and len(base) == len(other):
+        for i, (one, two) in enumerate(zip(base, other, strict=True)):
+            yield from _differing(one, two, f"{below}{i}")
+    elif base != other:
+        yield name, other
+
+
+def _are_sections(value: TomlValue | None) -> TypeGuard[list[TomlValue]]:
+    return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)

@@ -1,15 +1,39 @@
-"""What a scenario file may say: its sections and fields, their types, limits and defaults."""
+"""What a scenario file may say: its sections and fields, their types, limits and defaults; and how it is checked."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import functools
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, create_model, model_validator
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.controllers.controller import AngleSource, Feedback
-from cmg_mj.controllers.laws import Law, lqr_gains, make_law, scaled_gains
-from cmg_mj.inputs.field_types import STRICT, Duration, Instant, Line, NonNegative, Positive, Rate
+from cmg_mj.controllers.laws import LAWS, Law, lqr_gains, make_law, scaled_gains
+from cmg_mj.controllers.laws.registry import OF_LAWS
+from cmg_mj.errors import InputError
+from cmg_mj.inputs.field_types import (
+    STRICT,
+    Batched,
+    GridDuration,
+    Instant,
+    Line,
+    NoEffect,
+    NonNegative,
+    OfOneLaw,
+    OnAllAxes,
+    PerAxis,
+    Positive,
+    Rate,
+    WhateverTheLaw,
+)
+from cmg_mj.inputs.marks import marked_fields
+from cmg_mj.inputs.messages import complaint, fields_of
+from cmg_mj.inputs.sanity import out_of_size, unreadable
+from cmg_mj.inputs.user_classes import as_json
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.scenario.disturbances import Push, Swing
@@ -18,6 +42,8 @@ from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import TiltNoise
 
 FORBID = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+MOST_CLAUSES = 20
+"""So many wrong fields are named in one line."""
 
 
 class LqrSettings(BaseModel):
@@ -34,22 +60,24 @@ class ControllerSettings(BaseModel):
     """The control law by name or dotted path, and its parameters, which the law itself checks."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
-    kind: str = "state_feedback"
+    kind: Annotated[str, OfOneLaw()] = "state_feedback"
     """A name that `cmg-mj list laws` shows, or package.module:Class."""
-    rate_hz: Rate = 200.0
+    rate_hz: Annotated[Rate, OnAllAxes()] = 200.0
     """Control ticks a second; divides the physics rate."""
-    gains: tuple[float, float, float, float] | Literal["scaled"] | None = None
+    gains: Annotated[
+        tuple[float, float, float, float] | Literal["scaled"] | None, Batched(law_field="gains"), OfOneLaw()
+    ] = None
     """K_e on [x1, x2, x3, x_e], of a law that takes gains; Table 2's if neither gains nor lqr is given;
     `scaled`: Table 2's by the rig's time scale and authority."""
-    lqr: LqrSettings | None = None
+    lqr: Annotated[LqrSettings | None, Batched(law_field="gains"), OfOneLaw()] = None
     """Weights to solve for the gains instead."""
-    rate_limit_rad_s: Positive = 4.7
+    rate_limit_rad_s: Annotated[Positive, Batched(law_field="rate_limit")] = 4.7
     """Largest gimbal rate."""
-    feedback: Feedback = "observer"
+    feedback: Annotated[Feedback, WhateverTheLaw()] = "observer"
     """Which rate the law uses."""
     angle_source: AngleSource = "measured"
     """Whether the law uses the measured angles, as (8), or the estimated ones, as the text after (10)."""
-    compensate_turning: bool = True
+    compensate_turning: Annotated[bool, OnAllAxes(), WhateverTheLaw()] = True
     """Several axes: whether the gimbals also turn against what a turn about the vertical couples."""
     bias_trim_s: Instant = 0.0
     """For so long from the start the integrator is held where the observer's bias estimate asks for it."""
@@ -76,8 +104,14 @@ class ControllerSettings(BaseModel):
         return make_law(self.kind, 1.0 / self.rate_hz, self.rate_limit_rad_s, model, noise, **parameters)
 
 
-COMMON_LAW_FIELDS = tuple(name for name in ControllerSettings.model_fields if name not in ("kind", "gains", "lqr"))
+ONE_LAW_FIELDS = tuple(marked_fields(ControllerSettings, OfOneLaw))
+"""Fields of [controller] that another law does not take over."""
+COMMON_LAW_FIELDS = tuple(name for name in ControllerSettings.model_fields if name not in ONE_LAW_FIELDS)
 """Fields of [controller] that every law has."""
+ALL_AXES_LAW_FIELDS = tuple(marked_fields(ControllerSettings, OnAllAxes))
+"""Fields of [controller] that are the same on all axes."""
+LOOP_FIELDS = tuple(marked_fields(ControllerSettings, WhateverTheLaw))
+"""Fields of [controller] that stay when Studio changes the law."""
 
 
 class ObserverSettings(BaseModel):
@@ -126,18 +160,13 @@ class CompareSettings(BaseModel):
         return list(OBSERVERS) if self.observers == "all" else list(dict.fromkeys(self.observers))
 
 
-class AxisPlant(BaseModel):
-    """What of [plant] an axis may have of its own."""
+_PER_AXIS: dict[str, Any] = {
+    name: (fields_of(PlantSettings)[name] | None, None) for name in marked_fields(PlantSettings, PerAxis)
+}
 
-    model_config = FORBID
-    equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] | None = None
-    """e about this axis."""
-    initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0)] | None = None
-    """x1(0) about this axis."""
-    accelerometer_inner_m: Positive | None = None
-    """Distance of its inner accelerometer."""
-    accelerometer_outer_m: Positive | None = None
-    """Distance of its outer accelerometer."""
+
+class AxisPlant(create_model("AxisPlant", __config__=FORBID, **_PER_AXIS)):
+    """The fields of [plant] of which an axis may have its own value: those that `PerAxis` marks."""
 
 
 class AxisSettings(BaseModel):
@@ -146,39 +175,102 @@ class AxisSettings(BaseModel):
     model_config = FORBID
     plant: AxisPlant = Field(default_factory=AxisPlant)
     controller: dict[str, Any] = Field(default_factory=dict)
-    """Fields of [controller] but rate_hz."""
+    """Fields of [controller] but those that are the same on all axes."""
     observer: dict[str, Any] = Field(default_factory=dict)
     """Fields of [observer]."""
     sensors: dict[str, Any] = Field(default_factory=dict)
     """Sections of [sensors]."""
+
+    def as_fields(self) -> dict[str, Any]:
+        """The content of the axis' section, without empty sections."""
+        return {name: section for name, section in self.model_dump(mode="json", exclude_none=True).items() if section}
 
 
 class Scenario(BaseModel):
     """One experiment."""
 
     model_config = FORBID
-    title: Line = ""
-    duration_s: Duration = 15.0
+    title: Annotated[Line, NoEffect()] = ""
+    duration_s: GridDuration = 15.0
     seed: Annotated[int, Field(ge=0)] = 0
     plant: PlantSettings = Field(default_factory=PlantSettings)
     controller: ControllerSettings = Field(default_factory=ControllerSettings)
     observer: ObserverSettings = Field(default_factory=ObserverSettings)
     open_loop_observers: list[str] | Literal["all"] = Field(default_factory=list)
-    """Observers that ride along open loop, with their default parameters."""
+    """Observers that run open loop, with their default parameters."""
     sensors: Sensors = Field(default_factory=Sensors)
     axes: dict[str, AxisSettings] = Field(default_factory=dict)
     """What axes of several have of their own, by name."""
     push: list[Push] = Field(default_factory=list)
     swing: list[Swing] = Field(default_factory=list)
     metrics: MetricsSettings = Field(default_factory=MetricsSettings)
-    compare: CompareSettings | None = None
+    compare: Annotated[CompareSettings | None, NoEffect()] = None
     """Written by `cmg-mj compare`, so that its scenario runs to the same comparison."""
-    based_on: str = ""
+    based_on: Annotated[str, NoEffect()] = ""
     """The bundled scenario that this one is told apart from in folders' names, titles and summaries."""
-    versions: dict[str, str] = Field(default_factory=dict)
+    versions: Annotated[dict[str, str], NoEffect()] = Field(default_factory=dict)
     """Written by a run, not read."""
     _source: str = PrivateAttr("")
-    """What to call it in an error: the file, and what was changed in it."""
+
+    @property
+    def source(self) -> str:
+        """The scenario's name in an error: the file, and what was changed in it."""
+        return self._source
+
+    def with_source(self, source: str) -> Scenario:
+        """The same scenario by another name in errors."""
+        scenario = self.model_copy()
+        scenario._source = source
+        return scenario
+
+    @contextmanager
+    def named_in_errors(self) -> Iterator[None]:
+        """Put the scenario's source before the message of an `InputError`."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(located(self._source, str(error))) from error
+
+    def as_fields(self) -> dict[str, Any]:
+        """The content of a TOML file: what `parse_scenario` takes."""
+        return self.model_dump(mode="json", exclude_none=True)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Copy the scenario, as pydantic does; the copy makes the scenarios of its axes anew."""
+        scenario = super().model_copy(update=update, deep=deep)
+        vars(scenario).pop("of_axes", None)
+        return scenario
+
+    @functools.cached_property
+    def of_axes(self) -> dict[str, Scenario]:
+        """The scenario of each axis in [axes], by the axis' name: that of the plant with the axis' own fields in it.
+
+        Where an axis names another observer or law, no parameter of the common one is left.
+
+        Raises:
+            InputError: A field is unknown or not allowed.
+        """
+        return {name: self._with_fields_of(name, axis.as_fields()) for name, axis in self.axes.items()}
+
+    def of_axis(self, axis: str) -> Scenario:
+        """The scenario of one axis, whether it has fields of its own or not."""
+        return self.of_axes[axis] if axis in self.axes else self.model_copy(update={"axes": {}})
+
+    def _with_fields_of(self, axis: str, sections: Mapping[str, Mapping[str, Any]]) -> Scenario:
+        source = f"{self._source}, [axes.{axis}]".removeprefix(", ")
+        for name in ALL_AXES_LAW_FIELDS:
+            if name in sections.get("controller", {}):
+                raise InputError(located(source, f"controller.{name}: is the same on all axes; set it in [controller]"))
+        fields = self.model_copy(update={"axes": {}}).as_fields()
+        for name, section in sections.items():
+            common = fields.setdefault(name, {})
+            if section.get("kind", common.get("kind")) != common.get("kind"):
+                shared = COMMON_LAW_FIELDS if name == "controller" else ()
+                common = {field: common[field] for field in shared if field in common}
+            if name == "controller" and {"gains", "lqr"} & section.keys():
+                common = {field: value for field, value in common.items() if field not in ("gains", "lqr")}
+            fields[name] = _merged(common, section)
+        return parse_scenario(fields, source)
 
     def with_observer(self, kind: str) -> Scenario:
         """The same experiment with another observer in the loop; its own keeps the parameters given for it.
@@ -213,3 +305,64 @@ class Scenario(BaseModel):
         """The open-loop observers, spelled out, without the observer itself."""
         names = list(OBSERVERS) if self.open_loop_observers == "all" else list(self.open_loop_observers)
         return [name for name in dict.fromkeys(names) if name != self.observer.kind]
+
+
+def parse_scenario(fields: Mapping[str, Any], source: str = "") -> Scenario:
+    """Check a scenario given as a mapping.
+
+    Args:
+        fields: The TOML file's content.
+        source: The scenario's name in an error.
+
+    Returns:
+        The scenario, with those of its axes.
+
+    Raises:
+        InputError: A field is unknown or not allowed. All wrong fields are named, on one line.
+    """
+    wrong = list(unreadable(fields))
+    if wrong:
+        raise InputError(located(source, _clauses(wrong)))
+    try:
+        # By way of JSON, pydantic takes a list for a tuple and still no text or true for a number.
+        scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True).with_source(source)
+    except ValidationError as error:
+        complaints = [complaint(Scenario, detail, fields) for detail in error.errors()]
+        raise InputError(located(source, _clauses([*complaints, *_unknown_to_bench_law(fields)]))) from error
+    wrong = [*_unknown_to_bench_law(fields), *out_of_size(fields)]
+    if wrong:
+        raise InputError(located(source, _clauses(wrong)))
+    _ = scenario.of_axes  # their fields are checked, too
+    return scenario
+
+
+def _unknown_to_bench_law(fields: Mapping[str, Any]) -> list[str]:
+    """Find fields that one of the bench's laws does not have; no code of a user's is run to read a file."""
+    section = fields.get("controller")
+    if not isinstance(section, Mapping):
+        return []
+    kind = section.get("kind", ControllerSettings().kind)
+    is_bench_law = isinstance(kind, str) and kind in LAWS
+    return OF_LAWS.unknown(kind, section, ControllerSettings.model_fields) if is_bench_law else []
+
+
+def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """A section with another's fields in the place of its own, down to the last."""
+    both = {
+        name: _merged(common[name], own[name])
+        for name in common.keys() & own.keys()
+        if isinstance(common[name], Mapping) and isinstance(own[name], Mapping)
+    }
+    return {**common, **own, **both}
+
+
+def _clauses(wrong: Iterable[str]) -> str:
+    """All that is wrong, or the first of very much."""
+    clauses = list(dict.fromkeys(wrong))
+    more = [f"and {len(clauses) - MOST_CLAUSES} more"] if len(clauses) > MOST_CLAUSES else []
+    return "; ".join(clauses[:MOST_CLAUSES] + more)
+
+
+def located(source: str, wrong: str) -> str:
+    """A message with its source before it."""
+    return f"{source}: {wrong}" if source else wrong

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, digitise
-from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Positive, Rate
+from cmg_mj.inputs.field_types import STRICT, Batched, Instant, NonNegative, OnGrid, Positive, Rate
 from cmg_mj.sensors.ideal import Forces, IdealReading
 from cmg_mj.sensors.low_pass import low_pass, noise_gain
 
@@ -57,15 +57,15 @@ class Accelerometer:
     """
 
     rate_hz: Rate = 200.0
-    noise_density_ug_rthz: NonNegative = 400.0
-    bias_mg: tuple[float, float] = (0.0, 0.0)
+    noise_density_ug_rthz: Annotated[NonNegative, Batched()] = 400.0
+    bias_mg: Annotated[tuple[float, float], Batched()] = (0.0, 0.0)
     range_g: Positive = 2.0
     counts_per_g: NonNegative = 16384.0
     latency_s: Instant = 0.0
     scale_error: tuple[Share, Share] = (0.0, 0.0)
     misalignment_deg: tuple[Angle, Angle] = (0.0, 0.0)
     cross_axis: tuple[Share, Share] = (0.0, 0.0)
-    skew_s: NonNegative = 0.0
+    skew_s: Annotated[NonNegative, OnGrid("s")] = 0.0
     bias_instability_ug: NonNegative = 0.0
     bandwidth_hz: Annotated[float, Field(ge=0.0, lt=INSIDE_HZ / 2.0)] = 0.0
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Annotated
 
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, radians
-from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Positive, Rate
+from cmg_mj.inputs.field_types import STRICT, Batched, Instant, NonNegative, Positive, Rate
 from cmg_mj.sensors.ideal import IdealReading
 
 
@@ -29,7 +30,7 @@ class Fog:
     """
 
     rate_hz: Rate = 200.0
-    angle_random_walk_deg_rth: NonNegative = 0.02
+    angle_random_walk_deg_rth: Annotated[NonNegative, Batched()] = 0.02
     bias_deg_h: float = 0.0
     bandwidth_hz: NonNegative = 440.0
     range_deg_s: Positive = 490.0

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import namedtuple
 from collections.abc import Iterator, Sequence
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.observers import Measurement, Observer
-from cmg_mj.observers.protocol import extra_signals
+from cmg_mj.observers import Estimate, Measurement, Observer
+from cmg_mj.observers.protocol import State, extra_signals
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.experiment import Experiment, batch_inputs, run_batch
-from cmg_mj.simulation.pool import batch_key
+from cmg_mj.simulation.batch import BatchKey, PlantStructure, batch_inputs, batch_key, once, plant_structure, run_batch
+from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.simulation.simulate import SimulationOptions
 
 MOST_WORLDS = 1024
 """Of one batch: beyond, Python's share of a world no longer falls and memory grows."""
-
-TOLD = "the sensors' noise, which "
-"""How `batch_key` begins to say what noise an observer is told."""
 
 
 class BatchJob(NamedTuple):
@@ -50,36 +49,38 @@ class BatchedObservers:
 
     def __init__(self, parts: Sequence[tuple[Observer, int]]) -> None:
         self.extra_signals = extra_signals(parts[0][0])
+        self._estimate: Any = namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
         ends = np.cumsum([worlds for _, worlds in parts]).tolist()
         self._parts = [
             (observer, slice(end - worlds, end)) for (observer, worlds), end in zip(parts, ends, strict=True)
         ]
         self._shapes = [(worlds,) for _, worlds in parts]
 
-    def init(self, y: Measurement) -> list[Any]:
-        """Each one's state at the first sample."""
-        return [observer.init(_of(y, own)) for observer, own in self._parts]
+    def init(self, y: Measurement) -> list[State]:
+        """Return each observer's state at the first sample."""
+        return [observer.init(_measurement(y, worlds)) for observer, worlds in self._parts]
 
-    def step(self, states: list[Any], y: Measurement, u: Any) -> tuple[list[Any], Sequence[Scalar]]:
+    def step(self, state: list[State], y: Measurement, u: Scalar) -> tuple[list[State], Estimate]:
         """Advance each by one sample period; estimates are arrays (n_worlds,)."""
-        stepped = [
-            observer.step(state, _of(y, own), u[own])
-            for state, (observer, own) in zip(states, self._parts, strict=True)
+        steps = [
+            observer.step(own, _measurement(y, worlds), u[worlds])
+            for own, (observer, worlds) in zip(state, self._parts, strict=True)
         ]
-        whole = [
+        estimates = [
             [np.broadcast_to(part, shape) for part in estimate]
-            for (_, estimate), shape in zip(stepped, self._shapes, strict=True)
+            for (_, estimate), shape in zip(steps, self._shapes, strict=True)
         ]
-        return [state for state, _ in stepped], [np.concatenate(parts) for parts in zip(*whole, strict=True)]
+        whole = self._estimate(*(np.concatenate(parts) for parts in zip(*estimates, strict=True)))
+        return [own for own, _ in steps], whole
 
 
-def _of(y: Measurement, worlds: slice) -> Measurement:
-    """What some of the worlds measure."""
+def _measurement(y: Measurement, worlds: slice) -> Measurement:
+    """Take the measurement of some of the worlds."""
     y1, y2 = y
     return Measurement(y1[worlds], y2[worlds], y.acceleration[worlds])  # type: ignore[index]
 
 
-def run_side_by_side(runs: Sequence[BatchJob], **options: Any) -> list[Result]:
+def run_side_by_side(runs: Sequence[BatchJob], **options: Unpack[SimulationOptions]) -> list[Result]:
     """Run what differs in the observer, its parameters, or in numbers that worlds of one batch may differ in.
 
     Args:
@@ -92,77 +93,65 @@ def run_side_by_side(runs: Sequence[BatchJob], **options: Any) -> list[Result]:
     Raises:
         InputError: Worlds of one run differ in something that worlds of one batch have in common.
     """
-    found: dict[int, Result] = {}
+    results_of_jobs: dict[int, Result] = {}
     for batch in _batches(runs):
         results: list[Result] = []
         if len(batch) > 1:
-            results = _shared([runs[i] for i in batch], options)
+            results = _run_together([runs[i] for i in batch], options)
         if not results or any(outcome.kind == "stopped" for result in results for outcome in result.outcomes):
             # An observer that raises stops all worlds of its batch: what the others do is seen without it.
             results = [run_batch(*runs[i], **options) for i in batch]
-        found |= zip(batch, results, strict=True)
-    return [found[i] for i in range(len(runs))]
+        results_of_jobs |= zip(batch, results, strict=True)
+    return [results_of_jobs[i] for i in range(len(runs))]
 
 
-def _batches(runs: Sequence[BatchJob]) -> Iterator[list[int]]:
-    """The runs' indices, those together that may share a batch."""
-    alike: dict[Any, list[int]] = {}
-    for i, run in enumerate(runs):
-        alike.setdefault(_common(run) or i, []).append(i)
+def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
+    """The jobs' indices, those together that may share a batch."""
+    alike: dict[SharedKey | int, list[int]] = {}
+    for i, job in enumerate(jobs):
+        alike.setdefault(_shared_key(job) or i, []).append(i)
     for indices in alike.values():
         batch: list[int] = []
         for i in indices:
-            if batch and sum(len(runs[j].worlds) for j in [*batch, i]) > MOST_WORLDS:
+            if batch and sum(len(jobs[j].worlds) for j in [*batch, i]) > MOST_WORLDS:
                 yield batch
                 batch = []
             batch.append(i)
         yield batch
 
 
-def _common(run: BatchJob) -> Any:
-    """What runs of one batch have in common; None for one that has to be by itself."""
-    first = run.experiments[0]
-    if first.axes or first.scenario.open_loop_names() or len({repr(_structure(e)) for e in _once(run.experiments)}) > 1:
+class SharedKey(NamedTuple):
+    """What jobs with different observers have in common."""
+
+    key: BatchKey
+    plant: PlantStructure
+    extra_signals: tuple[str, ...]
+
+
+def _shared_key(job: BatchJob) -> SharedKey | None:
+    """What jobs of one batch have in common; None for one that has to be by itself."""
+    first = job.experiments[0]
+    if first.axes or first.scenario.open_loop_names() or len(set(map(batch_key, once(job.experiments)))) > 1:
         return None
-    physics = first.plant.model.opt
-    fields = {name: value for name, value in _structure(first).items() if not _of_observer(name)}
-    return (
-        repr(fields),
-        physics.timestep,
-        int(physics.integrator),
-        (tuple(first.plant.joint_names), first.plant.joint_kinds),
-        extra_signals(first.design.observer()),
-    )
+    key = batch_key(first).without_observer()
+    return SharedKey(key, plant_structure(first.plant), extra_signals(first.design.observer()))
 
 
-def _once(experiments: Sequence[Experiment]) -> list[Experiment]:
-    """Each of them once."""
-    return list({id(each): each for each in experiments}.values())
-
-
-def _structure(experiment: Experiment) -> dict[str, str]:
-    return batch_key(experiment.scenario, experiment.design)
-
-
-def _of_observer(name: str) -> bool:
-    return name.split(".")[0] == "observer" or name.startswith(TOLD)
-
-
-def _shared(runs: Sequence[BatchJob], options: dict[str, Any]) -> list[Result]:
-    """Results of runs in one batch."""
+def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[Result]:
+    """Results of jobs in one batch."""
     parts = []
-    # Neighbours with the same observer, told the same, are one part.
-    for _, group in groupby(runs, key=lambda run: repr(_structure(run.experiments[0]))):
-        of = list(group)
-        parts.append((of[0].experiments[0].design.observer(), sum(len(run.worlds) for run in of)))
-    experiments = [each for run in runs for each in run.experiments]
-    numbers = [int(number) for run in runs for number in run.worlds]
-    rigs, controller, pushes = batch_inputs(experiments, numbers, observer=BatchedObservers(parts))
-    whole = experiments[0].simulate(rigs, controller, pushes, **options)
-    ends = np.cumsum([len(run.worlds) for run in runs]).tolist()
+    # Neighbours with the same observer, with the same noise, are one part.
+    for _, group in groupby(jobs, key=lambda job: batch_key(job.experiments[0])):
+        alike = list(group)
+        parts.append((alike[0].experiments[0].design.observer(), sum(len(job.worlds) for job in alike)))
+    experiments = [experiment for job in jobs for experiment in job.experiments]
+    numbers = [int(number) for job in jobs for number in job.worlds]
+    plants, controller, pushes = batch_inputs(experiments, numbers, observer=BatchedObservers(parts))
+    whole = experiments[0].simulate(plants, controller, pushes, **options)
+    ends = np.cumsum([len(job.worlds) for job in jobs]).tolist()
     return [
-        _renamed(whole.select(slice(end - len(run.worlds), end)), run.experiments[0].scenario.observer.kind)
-        for run, end in zip(runs, ends, strict=True)
+        _renamed(whole.select(slice(end - len(job.worlds), end)), job.experiments[0].scenario.observer.kind)
+        for job, end in zip(jobs, ends, strict=True)
     ]
 
 

@@ -17,25 +17,23 @@ from cmg_mj.controllers.make_controller import AnyController, join_axes
 from cmg_mj.controllers.processor import Processor
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.inputs.bundled import folder
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
-from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.scenario.design import Design, design
-from cmg_mj.scenario.differences import differences
 from cmg_mj.scenario.disturbances import Push
-from cmg_mj.scenario.loading import as_fields, base_of, parse_scenario, scenario_of_axis, with_source
-from cmg_mj.scenario.resolve import resolved, with_axes
-from cmg_mj.scenario.schema import Scenario
+from cmg_mj.scenario.loading import base_of
+from cmg_mj.scenario.resolve import differences, resolved
+from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.stability_check import hints
-from cmg_mj.scenario.time_grid import check_steps, common_period
+from cmg_mj.scenario.time_grid import time_grid
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
-from cmg_mj.simulation.pool import batch_key, batched, first_difference
+from cmg_mj.simulation.batch import hashable, plant_options, require_same_structure, run_batch
+from cmg_mj.simulation.prepare import check_axes, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
-from cmg_mj.simulation.stacked import batch_values
 
 ON_THE_BOARD = "Run on the emulated board (docs/board.md), whose numbers are not quite the host's."
 ANOTHER_WORLD = "World {world}: its noise is not that of world 0."
@@ -87,7 +85,7 @@ class Experiment:
         Returns:
             The controller; of several axes a `MultiAxisController`.
         """
-        return self._of_axes([part.axis_controller(worlds, axis=i) for i, part in enumerate(self.parts)])
+        return self.of_axes([part.axis_controller(worlds, axis=i) for i, part in enumerate(self.parts)])
 
     def axis_controller(
         self,
@@ -128,7 +126,7 @@ class Experiment:
             plant, worlds=worlds, axis=axis, processor=processor, observer=observer, law=law, sensors=sensors
         )
 
-    def _of_axes(self, controllers: Sequence[Controller]) -> AnyController:
+    def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
         """Join the controllers of the axes."""
         compensate = self.scenario.controller.compensate_turning
         several = len(controllers) > 1
@@ -166,7 +164,7 @@ class Experiment:
             worlds: How many, or their numbers: world i has the same noise wherever it stands.
             plants: A plant a world, if they differ.
             vary: The same by settings: a field -> its value in each world, such as {"equilibrium_bias_deg": [0.0, 0.5],
-                "push.0.torque_n_m": [1.0, 2.0]}. Only numbers that worlds of one batch may differ in: see `pool.py`.
+                "push.0.torque_n_m": [1.0, 2.0]}. Only numbers that worlds of one batch may differ in: see `batch.py`.
             **options: Those of `simulate`.
 
         Returns:
@@ -180,12 +178,10 @@ class Experiment:
             raise InputError("run_many: give plants or vary, not both")
         if vary is not None:
             return run_batch(self.with_varied(vary), numbers, **options)
-        rigs = [self.plant] * len(numbers) if plants is None else list(plants)
-        _require_same_structure([self.plant, *rigs], len(rigs), len(numbers))
-        controllers = [
-            own.axis_controller(numbers, **_batched_rig_parameters(rigs, i)) for i, own in enumerate(self.parts)
-        ]
-        return self.simulate(rigs, self._of_axes(controllers), **options)
+        plants = [self.plant] * len(numbers) if plants is None else list(plants)
+        require_same_structure(plants, len(numbers), self.plant)
+        controllers = [part.axis_controller(numbers, **plant_options(plants, i)) for i, part in enumerate(self.parts)]
+        return self.simulate(plants, self.of_axes(controllers), **options)
 
     @property
     def parts(self) -> tuple[Experiment, ...]:
@@ -209,18 +205,14 @@ class Experiment:
             raise InputError('vary: must be lists of values by field, such as {"equilibrium_bias_deg": [0.0, 0.5]}')
         if len({len(values) for values in lists}) > 1:
             raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world")
-        ours = {field.name for field in dataclasses.fields(self.scenario.plant)}
+        of_plant = {field.name for field in dataclasses.fields(self.scenario.plant)}
         for name in vary:
-            if "." not in name and name not in ours and name not in Scenario.model_fields:
-                raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, ours)}")
-        names = [f"plant.{name}" if name in ours else name for name in vary]
-        made: dict[str, Experiment] = {}  # by what a value looks like: a wrong one may not be hashable
-        experiments = []
-        for row in zip(*lists, strict=True):
-            if repr(row) not in made:
-                made[repr(row)] = self.with_settings(dict(zip(names, row, strict=True)))
-            experiments.append(made[repr(row)])
-        return experiments
+            if "." not in name and name not in of_plant and name not in Scenario.model_fields:
+                raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, of_plant)}")
+        names = [f"plant.{name}" if name in of_plant else name for name in vary]
+        rows = {hashable(row): row for row in zip(*lists, strict=True)}
+        experiments = {key: self.with_settings(dict(zip(names, row, strict=True))) for key, row in rows.items()}
+        return [experiments[hashable(row)] for row in zip(*lists, strict=True)]
 
     def with_settings(self, values: Mapping[str, Any]) -> Experiment:
         """The same with other values of some fields.
@@ -234,12 +226,12 @@ class Experiment:
         Raises:
             InputError: There is no such field, or a value is not allowed.
         """
-        fields = as_fields(self.scenario)
+        fields = self.scenario.as_fields()
         for name, value in values.items():
             assign(fields, name, value, f"vary: {name!r}")
         settings = ", ".join(f"{name}={value}" for name, value in values.items())
-        scenario = parse_scenario(fields, f"{self.scenario._source} with {settings}".strip())
-        return prepare(scenario, load_scenario_plant(scenario, self.plant))
+        scenario = parse_scenario(fields, f"{self.scenario.source} with {settings}".strip())
+        return prepare(scenario, like=self.plant)
 
     def simulate(
         self,
@@ -304,8 +296,7 @@ class Experiment:
 
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
-        fields = resolved(self.scenario, self.design, self.plant.path, self.plant.timestep)
-        return with_axes(fields, self.scenario, {own.plant.axis.name: own.resolved() for own in self.axes})
+        return resolved(self.scenario, {part.plant.axis.name: part.design for part in self.parts})
 
     @functools.cached_property
     def differences(self) -> dict[str, Any]:
@@ -342,122 +333,13 @@ class Experiment:
             temporary.write_text(self.as_toml(driver, world), encoding="utf-8")
 
 
-def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:
-    """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
-
-    Args:
-        experiments: One a world.
-        worlds: Their numbers: world i has the same noise in every experiment.
-        **options: Those of `simulate`.
-
-    Returns:
-        The result of all worlds, each as if it had run alone, bit for bit.
-
-    Raises:
-        InputError: They differ in something that worlds of one batch have in common.
-    """
-    first = experiments[0] if experiments else None
-    if first is None or len(experiments) != len(worlds):
-        raise InputError(
-            f"run_many: {len(worlds)} worlds and {len(experiments)} plants; give at least one, and as many of each"
-        )
-    _require_same_structure([each.plant for each in experiments], len(experiments), len(worlds))
-    common = _structure(first)
-    for other in {id(each): each for each in experiments}.values():
-        field = first_difference(common, _structure(other))
-        if field:
-            raise InputError(f"run_many: {field} differs, which worlds of one batch must have in common")
-    rigs, controller, pushes = batch_inputs(experiments, worlds)
-    return first.simulate(rigs, controller, pushes, **options)
-
-
-def batch_inputs(
-    experiments: Sequence[Experiment], worlds: Sequence[int], **others: Any
-) -> tuple[list[Plant], AnyController, Sequence[Push]]:
-    """What a batch of different experiments is run with: a rig a world, a controller and the pushes of all worlds.
-
-    Args:
-        experiments: One a world.
-        worlds: Their numbers.
-        **others: What the controller has instead of the first experiment's: see `Experiment.controller`.
-
-    Returns:
-        For `Experiment.simulate`.
-    """
-    rigs = [each.plant for each in experiments]
-    first = experiments[0]
-    controllers, pushes = [], ()
-    for i, own in enumerate(first.parts):
-        parts = [each.parts[i] for each in experiments]
-        law, sensors, pushes = batched(
-            [(each.design.fresh_law(), each.scenario.sensors, tuple(each.scenario.push)) for each in parts]
-        )
-        given = {"law": law, "sensors": sensors} | _batched_rig_parameters(rigs, i) | others
-        controllers.append(own.axis_controller(worlds, **given))
-    return rigs, first._of_axes(controllers), pushes
-
-
-def _structure(experiment: Experiment) -> dict[str, str]:
-    """What worlds that run together have in common, of every axis."""
-    if not experiment.axes:
-        return batch_key(experiment.scenario, experiment.design)
-    parts = [(own.plant.axis.name, _structure(own)) for own in experiment.axes]
-    return {f"axes.{name}.{field}": value for name, found in parts for field, value in found.items()}
-
-
-def _batched_rig_parameters(rigs: Sequence[Plant], axis: int) -> dict[str, Any]:
-    """What a controller of many worlds has of an axis of their rigs."""
-    tilts = batch_values([rig.axes[axis].radial_tilt for rig in rigs])
-    return {"tilt": tilts, "backlash": batch_values([rig.backlash for rig in rigs]), "axis": axis}
-
-
-def _require_same_structure(rigs: Sequence[Plant], plants: int, worlds: int) -> None:
-    """What the plants of one batch must have in common."""
-    if not plants or plants != worlds:
-        raise InputError(f"run_many: {worlds} worlds and {plants} plants; give at least one, and as many of each")
-    different = set(rigs)
-    integrators = {int(rig.model.opt.integrator) for rig in different}
-    alike = {(rig.model.opt.timestep, *rig.joint_names, rig.joint_kinds) for rig in different}
-    if len(alike) > 1 or len(integrators) > 1:
-        raise InputError(
-            "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"
-        )
-
-
-def load_scenario_plant(scenario: Scenario, like: Plant | None = None) -> Plant:
-    """Load a scenario's rig.
-
-    Args:
-        scenario: The scenario.
-        like: A rig that may be of the same file, which then is not compiled again.
-
-    Raises:
-        InputError: `load_plant` refuses it; the scenario is named.
-    """
-    try:
-        period = common_period(scenario) if scenario.plant.timestep_s is None else None
-        settings = scenario.plant
-        of_axes = {name: scenario_of_axis(scenario, name).plant for name in scenario.axes}
-        same = ("model", "lock_thrust_bearing", "locked_axes")
-        if like is not None and all(getattr(like.settings, name) == getattr(settings, name) for name in same):
-            plant = like.changed(settings, period, of_axes)
-            check_steps(scenario, plant.timestep)
-            return plant
-        plant = load_plant(settings, period_s=period, of_axes=of_axes)
-        check_steps(scenario, plant.timestep)
-        if plant.path.resolve().parent != folder("models").resolve():
-            _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
-        return plant
-    except InputError as error:
-        raise InputError(with_source(scenario._source, str(error))) from error
-
-
-def prepare(scenario: Scenario, plant: Plant | None = None) -> Experiment:
+def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None = None) -> Experiment:
     """Load the plant, construct everything and try the observers once, so that what does not fit is found before a run.
 
     Args:
         scenario: The scenario.
-        plant: Its rig, if it has been loaded already.
+        plant: Its plant, if that has been loaded already.
+        like: A plant that may be of the same model file, which then is not compiled again.
 
     Returns:
         The experiment.
@@ -465,36 +347,12 @@ def prepare(scenario: Scenario, plant: Plant | None = None) -> Experiment:
     Raises:
         InputError: Something in the scenario does not fit.
     """
-    plant = load_scenario_plant(scenario) if plant is None else plant
-    try:
+    with scenario.named_in_errors():
+        grid = time_grid(scenario)
+        plant = plant or plant_on_grid(scenario, grid, like)
         check_axes(scenario, plant)
-    except InputError as error:
-        raise InputError(with_source(scenario._source, str(error))) from error
     if len(plant.axes) == 1 and not scenario.axes:
         return Experiment(scenario, plant, design(scenario, plant.parameters))
-    rigs = [(scenario_of_axis(scenario, name), plant.single_axis(name)) for name in plant.axis_names]
-    axes = tuple(Experiment(own, rig, design(own, rig.parameters)) for own, rig in rigs)
+    parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
+    axes = tuple(Experiment(own, rig, design(own, rig.parameters)) for own, rig in parts)
     return Experiment(scenario, plant, axes[0].design, axes)
-
-
-def check_axes(scenario: Scenario, plant: Plant) -> None:
-    """Whatever names an axis names one of the rig's; on a rig of several every push does.
-
-    Raises:
-        InputError: It does not.
-    """
-    known = [*plant.axis_names, *plant.settings.locked_axes]
-    for name in scenario.axes:
-        if known == [""]:
-            raise InputError(f"axes.{name}: the rig has one axis, without a name; what it has stands in [plant], ...")
-        if name not in known:
-            raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
-    torques = [(f"push.{i}.axis", push.axis) for i, push in enumerate(scenario.push)]
-    torques += [(f"swing.{i}.axis", swing.axis) for i, swing in enumerate(scenario.swing)]
-    for field, axis in torques:
-        if axis is None and len(known) > 1:
-            raise InputError(f"{field}: the rig has several axes: which of {', '.join(known)}?")
-        if axis is not None and known == [""]:
-            raise InputError(f"{field} = {axis!r}: the rig has one axis, without a name; leave it out")
-        if axis is not None and axis not in known:
-            raise InputError(f"{field} = {axis!r}: the rig has no such axis; {nearest(axis, known)}")

@@ -23,12 +23,12 @@ from cmg_mj.results.summary_keys import combine_axes
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.sensors.timing import whole_steps
+from cmg_mj.simulation.batch_values import split_values
 from cmg_mj.simulation.callback import CallbackLoop, control_callback
 from cmg_mj.simulation.control_loop import ControlLoop, Ending
 from cmg_mj.simulation.physics import ManyWorlds, OneWorld, Physics
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
 from cmg_mj.simulation.schedule import sampling_instants, with_swing_torques
-from cmg_mj.simulation.stacked import split_values
 
 DIVERGED_TILT = 2.0 * math.pi
 """No plant that stood at one instant lies a whole turn farther at the next one: it has diverged [rad]."""

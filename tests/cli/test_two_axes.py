@@ -10,7 +10,7 @@ import pytest
 from cmg_mj import InputError, load_plant
 from cmg_mj.results.summary_keys import AXES, KEYS
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.loading import load_scenario, scenario_of_axis
+from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.save import save_run
 from tests.command import cmg_mj
@@ -32,7 +32,7 @@ def test_an_axis_has_what_it_is_given_and_the_rest_of_what_holds_for_all() -> No
             "axes.roll.sensors.accelerometer.latency_s=0.005",
         ],
     )
-    roll, pitch = (scenario_of_axis(scenario, name) for name in ("roll", "pitch"))
+    roll, pitch = (scenario.of_axis(name) for name in ("roll", "pitch"))
     assert roll.observer.parameters == {"k1": 25}
     assert (pitch.observer.kind, pitch.observer.parameters) == ("linear", {})
     assert (roll.controller.gains, pitch.controller.gains) == ("scaled", (1.0, 2.0, 3.0, 4.0))
@@ -83,15 +83,15 @@ def test_the_observer_that_is_named_is_that_of_all_axes() -> None:
     for kind in ("homogeneous", "linear", "kalman"):
         assert prepare(mixed.with_observer(kind)).observer_title == kind
     tuned = load_scenario("two_axes", ["axes.roll.observer.k1=25"])
-    assert scenario_of_axis(tuned.with_observer("homogeneous"), "roll").observer.parameters == {"k1": 25}
+    assert tuned.with_observer("homogeneous").of_axis("roll").observer.parameters == {"k1": 25}
 
 
 def test_an_observer_on_the_command_line_is_that_of_all_axes(tmp_path: Path) -> None:
     file = tmp_path / "mixed.toml"
     file.write_text('[plant]\nmodel = "two_axes"\n[axes.roll.observer]\nkind = "linear"\n', encoding="utf-8")
-    assert scenario_of_axis(load_scenario(str(file), observer="kalman"), "roll").observer.kind == "kalman"
-    assert scenario_of_axis(load_scenario(str(file), observer="linear"), "pitch").observer.kind == "linear"
-    assert scenario_of_axis(load_scenario(str(file)), "roll").observer.kind == "linear"
+    assert load_scenario(str(file), observer="kalman").of_axis("roll").observer.kind == "kalman"
+    assert load_scenario(str(file), observer="linear").of_axis("pitch").observer.kind == "linear"
+    assert load_scenario(str(file)).of_axis("roll").observer.kind == "linear"
 
 
 def test_another_law_does_without_the_files_gains() -> None:
@@ -102,7 +102,7 @@ def test_another_law_does_without_the_files_gains() -> None:
     limited = load_scenario(
         "two_axes", ["axes.roll.controller.rate_limit_rad_s=3", "axes.roll.controller.gains=[1, 2, 3, 4]"]
     )
-    roll = scenario_of_axis(limited.with_law("lqg"), "roll").controller
+    roll = limited.with_law("lqg").of_axis("roll").controller
     assert (roll.kind, roll.gains, roll.rate_limit_rad_s) == ("lqg", None, 3.0)
 
 

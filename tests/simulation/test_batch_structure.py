@@ -12,9 +12,9 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
-from cmg_mj.simulation.pool import ARRAYS
-from cmg_mj.simulation.stacked import batch_values, value_of_world
+from cmg_mj.simulation.batch import BATCHED_FIELDS, run_batch
+from cmg_mj.simulation.batch_values import batch_values, value_of_world
+from cmg_mj.simulation.experiment import Experiment, prepare
 
 N = 6
 
@@ -53,7 +53,7 @@ def values(seed: int = 3) -> dict[str, Any]:
 
 def test_these_are_all_fields_that_may_differ() -> None:
     varied = {name.replace(".0.", ".") for name in values()} - {"plant.timestep_s"}
-    assert varied | {"controller.lqr"} == ARRAYS
+    assert varied | {"controller.lqr"} == BATCHED_FIELDS.keys()
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import mujoco
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import find_axis
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, axes_in, missing_parts
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, axes_in, axes_of, missing_parts
 from cmg_mj.plant.tilt_line import HingeLine
 
 
@@ -56,8 +56,8 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, pa
     if not name:
         known = f" {', '.join(filter(None, names))}" if any(names) else ""
         raise InputError(f"{path}: has an axis{known} already: give the new one a name, such as --name pitch")
-    key = model.key(EQUILIBRIUM_KEY).id
-    axes = [find_axis(model, key, axis) for axis in names]
+    key, names_of = model.key(EQUILIBRIUM_KEY).id, axes_of(model)
+    axes = [find_axis(model, key, axis, names_of[axis]) for axis in names]
     modules = [module for axis in axes for module in axis.cubes]
     lines = [model.joint(axis.line.joint).name for axis in axes if isinstance(axis.line, HingeLine)]
     return ExistingAxes(

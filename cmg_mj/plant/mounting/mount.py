@@ -33,7 +33,7 @@ from cmg_mj.plant.mounting.robot import (
 )
 from cmg_mj.plant.mounting.stance import axes_along, check_unturned, find_place, posed, stand_upright, under_and_height
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, axes_of
 
 
 def mount(
@@ -132,7 +132,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     add_sensors(spec, body, request.prefix, turn.T @ (under - origin), turn.T @ axes_along(direction), height)
     model = _with_keyframes(spec, names, qpos, [(name, poses | gimbals) for name, poses in keyframes], existing, path)
     key = model.key(EQUILIBRIUM_KEY).id
-    if not simulated_pole(model, key, find_axis(model, key, request.name).line):
+    if not simulated_pole(model, key, find_axis(model, key, request.name, axes_of(model)[request.name]).line):
         raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: it stands by itself")
     return MountedRobot(spec, path, tuple(held), tuple(notes))
 

@@ -13,7 +13,8 @@ from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import NESTED, Summary, finite
 from cmg_mj.scenario.schema import CompareSettings, Scenario
-from cmg_mj.simulation.experiment import Experiment, load_scenario_plant, prepare
+from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.simulation.prepare import load_scenario_plant
 
 
 @dataclasses.dataclass(frozen=True)

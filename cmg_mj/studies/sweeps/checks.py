@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.simulation.pool import UNUSED
+from cmg_mj.simulation.batch import UNUSED
 from cmg_mj.studies.sweeps.axes import VariedField
 
 NOT_VARIED = {

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from cmg_mj.errors import InputError, raised
 from cmg_mj.results.per_world_table import ID_COLUMNS
 from cmg_mj.results.summary_keys import Summary
-from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
-from cmg_mj.simulation.pool import batch_key
+from cmg_mj.simulation.batch import BatchKey, PlantStructure, batch_key, plant_structure, run_batch
+from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.sweeps.points import Point, Points
 from cmg_mj.studies.sweeps.study import Chunk, SweepStudy
 
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 REFUSED = "refused"
 """Outcome of a trial whose values do not fit each other: it never begins."""
+
+BatchId = tuple[BatchKey, PlantStructure]
+"""What worlds of one batch have in common."""
 
 
 def compute(
@@ -46,9 +49,9 @@ def compute(
     points = study.points if points is None else points
     base = prepare(study.scenario.with_observer(chunk.observer).model_copy(update={"open_loop_observers": []}))
     results: dict[tuple[int, int], Summary] = {}
-    batches: dict[str, list[tuple[int, int]]] = {}
+    batches: dict[BatchId, list[tuple[int, int]]] = {}
     experiments: dict[int, Experiment] = {}
-    batch_of: dict[int, str] = {}
+    batch_of: dict[int, BatchId] = {}
     refused: dict[int, str] = {}
     for trial in chunk.trials:
         number = trial[0]
@@ -149,10 +152,9 @@ def _monotonic_progress(tick: Callable[[float], None]) -> Callable[[float], None
     return report
 
 
-def _batch_of(experiment: Experiment) -> str:
+def _batch_of(experiment: Experiment) -> BatchId:
     """Make a key: worlds with the same one can run in one batch."""
-    physics = experiment.plant.model.opt
-    return repr((batch_key(experiment.scenario, experiment.design), physics.timestep, int(physics.integrator)))
+    return batch_key(experiment), plant_structure(experiment.plant)
 
 
 def _identity(study: SweepStudy, chunk: Chunk, world: int) -> Summary:

@@ -14,7 +14,6 @@ import tomli_w
 from cmg_mj.errors import InputError, shown
 from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.includes import check_files
-from cmg_mj.scenario.loading import as_fields
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.sweeps.axes import FieldValue
 from cmg_mj.studies.sweeps.study import SweepStudy
@@ -144,5 +143,5 @@ def resolved(study: SweepStudy) -> StudyFields:
     if weights is not None or any(f"{field}.".startswith("controller.lqr.") for field in varied):
         fields["controller"].pop("gains", None)
     if "controller.kind" in varied:  # each law has parameters of its own
-        fields["controller"] = as_fields(study.scenario)["controller"]
+        fields["controller"] = study.scenario.as_fields()["controller"]
     return study.as_fields(fields)

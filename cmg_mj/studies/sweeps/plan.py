@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 from typing import TypedDict
 
-from cmg_mj.simulation.pool import can_vary_in_batch
+from cmg_mj.simulation.batch import can_vary_in_batch
 from cmg_mj.studies.sweeps.chunk import compute
 from cmg_mj.studies.sweeps.study import CHUNK, MOST_TRIALS, Chunk, SweepStudy
 

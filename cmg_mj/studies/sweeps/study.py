@@ -13,10 +13,10 @@ import numpy as np
 
 from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.overrides import assign
-from cmg_mj.scenario.loading import as_fields, parse_scenario
-from cmg_mj.scenario.schema import ObserverSettings, Scenario
-from cmg_mj.simulation.experiment import load_scenario_plant, prepare
-from cmg_mj.simulation.pool import can_vary_in_batch
+from cmg_mj.scenario.schema import ObserverSettings, Scenario, parse_scenario
+from cmg_mj.simulation.batch import can_vary_in_batch
+from cmg_mj.simulation.experiment import prepare
+from cmg_mj.simulation.prepare import load_scenario_plant
 from cmg_mj.studies.sweeps.axes import FieldValue, VariedField
 from cmg_mj.studies.sweeps.checks import check_axes, check_observers, check_order, check_points, check_worlds
 from cmg_mj.studies.sweeps.points import Points, sampled
@@ -201,7 +201,7 @@ def check_values(study: SweepStudy) -> None:
     base = study.scenario.model_copy(update={"open_loop_observers": []})
     for observer in study.observers:
         prepare(base.with_observer(observer), plant)
-    fields = as_fields(base)
+    fields = base.as_fields()
     for axis in study.axes:
         parameters = {field.partition(".")[2] for field in axis.fields if field.startswith("observer.")}
         values = axis.values or (axis.low, axis.high)

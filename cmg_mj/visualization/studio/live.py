@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections import deque
 from collections.abc import Sequence
@@ -215,7 +216,8 @@ class StudioSession:
         except InputError as error:
             self.note = str(error)
             return
-        new.scenario._source = self.base.scenario._source  # which would grow with every change
+        source = self.base.scenario.source  # which would grow with every change
+        new = dataclasses.replace(new, scenario=new.scenario.with_source(source))
         self.note = "; ".join(new.hints)
         self._apply_settings(new)
         if self.stopped:

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, TypeAlias, TypedDict
 
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.scenario.loading import axis_fields
-from cmg_mj.scenario.schema import Scenario
+from cmg_mj.scenario.schema import ALL_AXES_LAW_FIELDS, COMMON_LAW_FIELDS, LOOP_FIELDS, Scenario
 from cmg_mj.simulation.experiment import Experiment
 
 FieldValue: TypeAlias = "float | str | Sequence[FieldValue] | Mapping[str, FieldValue] | None"
@@ -31,9 +30,7 @@ Settings = TypedDict(
     },
 )
 """Values of the settings in the panel."""
-NO_LAWS = ("feedback", "compensate_turning")
-"""Fields of [controller] that stay whatever the law."""
-STUDIO_LAW_FIELDS = ("rate_limit_rad_s", "angle_source", "bias_trim_s")
+STUDIO_LAW_FIELDS = tuple(name for name in COMMON_LAW_FIELDS if name not in (*ALL_AXES_LAW_FIELDS, *LOOP_FIELDS))
 """Fields of [controller] that every law takes from the scenario."""
 
 WEIGHTS = {"state_cost": [1.0, 1.0, 1.0, 1.0], "input_cost": 1.0}
@@ -57,7 +54,7 @@ def choosable_observers(base: Experiment) -> tuple[str, ...]:
 
 def law_settings(scenario: Scenario) -> Fields:
     """Return the section [controller] without the fields that stay whatever the law."""
-    return scenario.controller.model_dump(mode="json", exclude_none=True, exclude=set(NO_LAWS))
+    return scenario.controller.model_dump(mode="json", exclude_none=True, exclude=set(LOOP_FIELDS))
 
 
 def choosable_laws(base: Experiment) -> dict[str, Fields]:
@@ -90,8 +87,8 @@ def current_law(base: Experiment, now: Experiment) -> str:
 def _axis_laws(scenario: Scenario) -> dict[str, Fields]:
     """Return the fields of the law that axes set themselves."""
     return {
-        f"axes.{axis}.{LAW}": {name: value for name, value in section.items() if name not in NO_LAWS}
-        for axis, section in ((axis, axis_fields(settings).get(LAW, {})) for axis, settings in scenario.axes.items())
+        f"axes.{axis}.{LAW}": {name: value for name, value in section.items() if name not in LOOP_FIELDS}
+        for axis, section in ((axis, settings.as_fields().get(LAW, {})) for axis, settings in scenario.axes.items())
     }
 
 
@@ -112,11 +109,11 @@ def changed_fields(base: Experiment, now: Experiment, values: FieldValues) -> Fi
         observer = base.scenario.observer
         fields["observer"] = {"kind": kind, **(observer.parameters if kind == observer.kind else {})}
     if LAW in fields:
-        stays = now.scenario.controller.model_dump(mode="json", include=set(NO_LAWS))
+        stays = now.scenario.controller.model_dump(mode="json", include=set(LOOP_FIELDS))
         fields[LAW] = {**_section(fields, LAW), **stays}
         for axis in now.scenario.axes:
             fields.pop(f"axes.{axis}.{LAW}", None)
-    before = {axis: axis_fields(settings) for axis, settings in now.scenario.axes.items()}
+    before = {axis: settings.as_fields() for axis, settings in now.scenario.axes.items()}
     axes = {axis: _axis_section(base, axis, section, values) for axis, section in before.items()}
     return {"axes": axes, **fields} if axes != before else fields
 
@@ -128,10 +125,10 @@ def _axis_section(base: Experiment, axis: str, before: FieldValues, values: Fiel
         rest = _without(rest, name.split("."))
     if OBSERVER in values:
         (observer,) = (part.scenario.observer for part in base.parts if part.plant.axis.name == axis)
-        section = axis_fields(base.scenario.axes[axis]).get("observer", {})
+        section = base.scenario.axes[axis].as_fields().get("observer", {})
         rest["observer"] = section if observer.kind == values[OBSERVER] else {}
     if LAW in values:
-        stays = {name: value for name, value in _section(before, LAW).items() if name in NO_LAWS}
+        stays = {name: value for name, value in _section(before, LAW).items() if name in LOOP_FIELDS}
         rest[LAW] = {**_section(values, f"axes.{axis}.{LAW}"), **stays}
     return {name: section for name, section in rest.items() if section}
 

@@ -12,6 +12,7 @@ import pytest
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.mounting import mount
+from cmg_mj.plant.parts import axes_of
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.plant.tilt_line import SupportLine
 from cmg_mj.simulation.experiment import prepare
@@ -120,7 +121,7 @@ def test_the_line_on_the_floor_is_a_hinge_in_its_place() -> None:
     made = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options)
     model = made.spec.compile()
     key = model.key("equilibrium").id
-    free = find_axis(model, key, "")
+    free = find_axis(model, key, "", axes_of(model)[""])
     assert isinstance(free.line, SupportLine)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)
@@ -131,7 +132,7 @@ def test_the_line_on_the_floor_is_a_hinge_in_its_place() -> None:
     frame.add_joint(name="roll", type=mujoco.mjtJoint.mjJNT_HINGE, pos=free.point, axis=free.direction)
     spec.key("equilibrium").qpos, spec.key("equilibrium").qvel = [0.0, *qpos[7:]], [0.0, *qvel[6:]]
     hinged = spec.compile()
-    fixed = find_axis(hinged, hinged.key("equilibrium").id, "")
+    fixed = find_axis(hinged, hinged.key("equilibrium").id, "", axes_of(hinged)[""])
     for name in ("J1", "J2", "J_d", "omega_d", "gravity_torque"):
         expected = getattr(fixed.reduced, name)
         assert getattr(free.reduced, name) == pytest.approx(expected, rel=1e-5, abs=1e-6 * fixed.reduced.J1), name

@@ -141,7 +141,7 @@ def test_what_is_chosen_is_chosen_on_all_axes_and_history_brings_it_back() -> No
         )
         assert [part.scenario.observer.parameters for part in live.now.parts] == [{"k1": 50.0}, {"k1": 40.0}]
         assert live.now.scenario.controller.gains == "scaled"
-        assert live.now.scenario.axes["pitch"].plant.equilibrium_bias_deg == -0.3
+        assert live.now.scenario.axes["pitch"].plant.model_dump()["equilibrium_bias_deg"] == -0.3
         assert not live.stopped
 
 

@@ -1,0 +1,239 @@
+"""Worlds in one batch: what they have in common, and what they differ in as arrays (n_worlds,)."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Unpack
+
+from cmg_mj.controllers.laws import Law, law_class
+from cmg_mj.controllers.laws.registry import OF_LAWS
+from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.elementwise import Scalar
+from cmg_mj.errors import InputError
+from cmg_mj.inputs.field_types import Batched, NoEffect
+from cmg_mj.inputs.marks import marked_fields
+from cmg_mj.observers import Observer
+from cmg_mj.observers.registry import takes_noise
+from cmg_mj.plant.plant import Plant
+from cmg_mj.results.result import Result
+from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.simulation.batch_values import batch_values
+from cmg_mj.simulation.simulate import SimulationOptions
+
+if TYPE_CHECKING:
+    from cmg_mj.simulation.experiment import Experiment
+
+BATCHED_FIELDS = marked_fields(Scenario, Batched)
+"""Fields that worlds of one batch may differ in. Every other decides what is computed, or when."""
+UNUSED = frozenset(marked_fields(Scenario, NoEffect))
+"""Fields on which no number of a run depends."""
+
+
+class KeyPart(NamedTuple):
+    """One of the things that worlds of one batch have in common.
+
+    Attributes:
+        kind: A field of the scenario, the reduced model, or the noise that an observer or the law gets.
+        name: The field, or the observer.
+        axis: The axis, of several.
+    """
+
+    kind: Literal["field", "reduced model", "noise of observer", "noise of law"]
+    name: str = ""
+    axis: str = ""
+
+    @property
+    def is_of_observer(self) -> bool:
+        """Whether it makes no difference to the physics, the sensors and the law."""
+        return self.kind == "noise of observer" or (self.kind == "field" and self.name.partition(".")[0] == "observer")
+
+    def __str__(self) -> str:
+        words = {
+            "field": self.name,
+            "reduced model": "the reduced model",
+            "noise of observer": f"the sensors' noise, which {self.name} is told,",
+            "noise of law": "the noise that the law is told",
+        }[self.kind]
+        return f"axes.{self.axis}.{words}" if self.axis else words
+
+
+@dataclass(frozen=True)
+class BatchKey:
+    """All that worlds of one batch have in common: worlds with equal keys can run together."""
+
+    parts: tuple[tuple[KeyPart, Hashable], ...]
+
+    def first_difference(self, other: BatchKey) -> KeyPart | None:
+        """The first part in which two keys differ."""
+        a, b = dict(self.parts), dict(other.parts)
+        return next((part for part in (*a, *b) if a.get(part) != b.get(part)), None)
+
+    def without_observer(self) -> BatchKey:
+        """The key of worlds that may also differ in their observer."""
+        return BatchKey(tuple((part, value) for part, value in self.parts if not part.is_of_observer))
+
+
+class PlantStructure(NamedTuple):
+    """What the plants of one batch have in common."""
+
+    timestep: float
+    integrator: int
+    joints: tuple[str, ...]
+    joint_kinds: tuple[str, ...]
+
+
+class PlantOptions(TypedDict):
+    """What a controller of many worlds has of an axis of their plants."""
+
+    tilt: RadialTilt
+    backlash: Scalar
+    axis: int
+
+
+def batch_key(experiment: Experiment) -> BatchKey:
+    """Find what worlds of an experiment have in common with all that may run with them, of every axis."""
+    if not experiment.axes:
+        return BatchKey(tuple(_key_parts(experiment, "")))
+    return BatchKey(tuple(part for own in experiment.axes for part in _key_parts(own, own.plant.axis.name)))
+
+
+def _key_parts(experiment: Experiment, axis: str) -> Iterator[tuple[KeyPart, Hashable]]:
+    scenario, law = experiment.scenario, experiment.scenario.controller.kind
+    for field, value in _leaves(scenario.as_fields()):
+        if field.partition(".")[0] not in UNUSED and not can_vary_in_batch(field, law):
+            yield KeyPart("field", field, axis), hashable(value)
+    _, model, noise = experiment.design.given
+    yield KeyPart("reduced model", axis=axis), model
+    for observer in (scenario.observer.kind, *scenario.open_loop_names()):
+        if takes_noise(observer):
+            yield KeyPart("noise of observer", observer, axis), noise
+    if "noise" in OF_LAWS.takes(law):
+        yield KeyPart("noise of law", axis=axis), noise
+
+
+def _leaves(fields: Any, at: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(fields, list) and fields and isinstance(fields[0], Mapping):
+        fields = {str(i): part for i, part in enumerate(fields)}
+    if not isinstance(fields, Mapping):
+        yield at, fields
+        return
+    for name, value in fields.items():
+        yield from _leaves(value, f"{at}.{name}" if at else name)
+
+
+def hashable(value: Any) -> Hashable:
+    """A value of a field as a key, by which 1, 1.0 and true are different."""
+    if isinstance(value, Mapping):
+        return tuple((name, hashable(item)) for name, item in value.items())
+    if isinstance(value, (list, tuple)):
+        return tuple(map(hashable, value))
+    return type(value), value if isinstance(value, Hashable) else repr(value)
+
+
+def can_vary_in_batch(field: str, law: str) -> bool:
+    """Whether worlds of one batch may differ in a field, under a law of this kind."""
+    parts = [part for part in field.split(".") if not part.isdecimal()]
+    names = [".".join(parts[: i + 1]) for i in range(len(parts))]
+    mark = next((BATCHED_FIELDS[name] for name in names if name in BATCHED_FIELDS), None)
+    return mark is not None and (mark.law_field is None or mark.law_field in getattr(law_class(law), "arrays", ()))
+
+
+def plant_structure(plant: Plant) -> PlantStructure:
+    """Find what a plant has in common with all that may run with it."""
+    options = plant.model.opt
+    return PlantStructure(options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds)
+
+
+def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:
+    """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
+
+    Args:
+        experiments: One a world.
+        worlds: The worlds' numbers: world i has the same noise in every experiment.
+        **options: Options of `simulate`.
+
+    Returns:
+        The result of all worlds, each as if it had run alone, bit for bit.
+
+    Raises:
+        InputError: They differ in something that worlds of one batch have in common.
+    """
+    require_same_structure([experiment.plant for experiment in experiments], len(worlds))
+    first, *others = once(experiments)
+    key = batch_key(first)
+    for other in others:
+        part = key.first_difference(batch_key(other))
+        if part:
+            raise InputError(f"run_many: {part} differs, which worlds of one batch must have in common")
+    plants, controller, pushes = batch_inputs(experiments, worlds)
+    return first.simulate(plants, controller, pushes, **options)
+
+
+def batch_inputs(
+    experiments: Sequence[Experiment], worlds: Sequence[int], observer: Observer | None = None
+) -> tuple[list[Plant], AnyController, Sequence[Push]]:
+    """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, the pushes of all worlds.
+
+    Args:
+        experiments: One a world.
+        worlds: The worlds' numbers.
+        observer: The observer of all worlds instead of the first experiment's.
+    """
+    plants = [experiment.plant for experiment in experiments]
+    first = experiments[0]
+    controllers, pushes = [], ()
+    for i, own in enumerate(first.parts):
+        parts = [experiment.parts[i] for experiment in experiments]
+        law, sensors, pushes = _batched(
+            [(part.design.fresh_law(), part.scenario.sensors, tuple(part.scenario.push)) for part in parts]
+        )
+        options = plant_options(plants, i)
+        controllers.append(own.axis_controller(worlds, observer=observer, law=law, sensors=sensors, **options))
+    return plants, first.of_axes(controllers), pushes
+
+
+def plant_options(plants: Sequence[Plant], axis: int) -> PlantOptions:
+    """Find what a controller of many worlds has of an axis of their plants."""
+    tilt = batch_values([plant.axes[axis].radial_tilt for plant in plants])
+    return {"tilt": tilt, "backlash": batch_values([plant.backlash for plant in plants]), "axis": axis}
+
+
+def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant: Plant | None = None) -> None:
+    """Refuse plants that cannot run in one batch, or of which there is not one a world."""
+    if not plants or len(plants) != worlds:
+        raise InputError(f"run_many: {worlds} worlds and {len(plants)} plants; give at least one, and as many of each")
+    different = {*plants, *([scenario_plant] if scenario_plant else [])}
+    if len({plant_structure(plant) for plant in different}) > 1:
+        raise InputError(
+            "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"
+        )
+
+
+def once(experiments: Sequence[Experiment]) -> list[Experiment]:
+    """Each of some experiments once."""
+    return list({id(experiment): experiment for experiment in experiments}.values())
+
+
+def _batched(
+    worlds: Sequence[tuple[Law, Sensors, tuple[Push, ...]]],
+) -> tuple[Law, Sensors, tuple[Push, ...]]:
+    """Law, sensors and pushes of many worlds as one, with arrays (n_worlds,) where they differ."""
+    laws, sensors, pushes = zip(*worlds, strict=True)
+    return _batched_law(laws), batch_values(sensors), tuple(batch_values(push) for push in zip(*pushes, strict=True))
+
+
+def _batched_law(laws: Sequence[Law]) -> Law:
+    """One law that stands for a law a world, which differ in what may be arrays alone."""
+    law = laws[0]
+    arrays = {name: batch_values([getattr(own, name) for own in laws]) for name in getattr(law, "arrays", ())}
+    if all(values is getattr(law, name) for name, values in arrays.items()):
+        return law
+    batched = copy.copy(law)
+    for name, values in arrays.items():
+        object.__setattr__(batched, name, values)
+    return batched

@@ -1,0 +1,57 @@
+"""The plant of a scenario: on the grid of its times, with the axes that the scenario names."""
+
+from __future__ import annotations
+
+from cmg_mj.errors import InputError, nearest
+from cmg_mj.inputs.bundled import folder
+from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.scenario.time_grid import TimeGrid, time_grid
+
+
+def load_scenario_plant(scenario: Scenario, like: Plant | None = None) -> Plant:
+    """Load a scenario's plant.
+
+    Args:
+        scenario: The scenario.
+        like: A plant that may be of the same model file, which then is not compiled again.
+
+    Raises:
+        InputError: The scenario's times fit no physics step, or `load_plant` refuses the plant; the scenario is named.
+    """
+    with scenario.named_in_errors():
+        return plant_on_grid(scenario, time_grid(scenario), like)
+
+
+def plant_on_grid(scenario: Scenario, grid: TimeGrid, like: Plant | None = None) -> Plant:
+    """Load a scenario's plant, whose physics steps fill the times of a grid: see `load_scenario_plant`."""
+    settings, of_axes = scenario.plant, {name: part.plant for name, part in scenario.of_axes.items()}
+    if like is not None and like.is_of_same_file(settings):
+        return like.changed(settings, grid, of_axes)
+    plant = load_plant(settings, grid=grid, of_axes=of_axes)
+    if plant.path.resolve().parent != folder("models").resolve():
+        _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
+    return plant
+
+
+def check_axes(scenario: Scenario, plant: Plant) -> None:
+    """Refuse the name of an axis that the plant does not have, and on a plant of several axes a push without one.
+
+    Raises:
+        InputError: There is such a name, or such a push.
+    """
+    known = [*plant.axis_names, *plant.settings.locked_axes]
+    for name in scenario.axes:
+        if known == [""]:
+            raise InputError(f"axes.{name}: the rig has one axis, without a name; what it has stands in [plant], ...")
+        if name not in known:
+            raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
+    torques = [(f"push.{i}.axis", push.axis) for i, push in enumerate(scenario.push)]
+    torques += [(f"swing.{i}.axis", swing.axis) for i, swing in enumerate(scenario.swing)]
+    for field, axis in torques:
+        if axis is None and len(known) > 1:
+            raise InputError(f"{field}: the rig has several axes: which of {', '.join(known)}?")
+        if axis is not None and known == [""]:
+            raise InputError(f"{field} = {axis!r}: the rig has one axis, without a name; leave it out")
+        if axis is not None and axis not in known:
+            raise InputError(f"{field} = {axis!r}: the rig has no such axis; {nearest(axis, known)}")
