@@ -143,6 +143,7 @@ def test_no_circle_of_modules() -> None:
     assert not {module: used - done for module, used in graph.items() if module not in done}
 
 
+@pytest.mark.slow
 def test_nothing_above_the_line_imports_mujoco() -> None:
     """One package after the other: the first that brings MuJoCo, or what is as heavy, is named."""
     code = "import importlib, sys\n"
@@ -202,6 +203,7 @@ def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     assert in_a_fresh_interpreter(code) == ["done"]
 
 
+@pytest.mark.slow
 def test_public_names_are_what_they_say() -> None:
     """In a fresh process, after everything has been imported: a submodule must not hide a name."""
     code = "import cmg_mj, inspect; cmg_mj.prepare(cmg_mj.load_scenario('push_recovery')).run;"

@@ -7,9 +7,12 @@ Slow tests and those of the papers run when `-m` names their tier, or when the c
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
+from _pytest.mark.structures import ParameterSet
 
 TIERS = ("daily", "slow", "papers")
 PAPERS = Path(__file__).parent / "papers"
@@ -84,3 +87,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     """Say that there are other tiers."""
     if not named_tiers(config.option.markexpr) & {"slow", "papers"}:
         terminalreporter.write_line(HINT)
+
+
+T = TypeVar("T")
+
+
+def slow_but(cases: Iterable[T], *daily: T) -> list[T | ParameterSet]:
+    """Return cases for `parametrize`, of which all are slow but these."""
+    return [case if case in daily else pytest.param(case, marks=pytest.mark.slow) for case in cases]

@@ -50,9 +50,13 @@ def relative_errors(ours: np.ndarray, reference: np.ndarray) -> float:
 @cache
 def closed_loop() -> Trajectory:
     """The observer in the loop, with sensor noise and a push."""
-    trajectory = prepare(load_scenario("push_recovery", ["duration_s=4"]).with_observer("ltv")).run().trajectory
+    trajectory = (
+        prepare(load_scenario("push_recovery", ["duration_s=2.5", "push.0.start_s=1"]).with_observer("ltv"))
+        .run()
+        .trajectory
+    )
     assert trajectory is not None
-    assert len(trajectory) == 800
+    assert len(trajectory) == 500
     return trajectory
 
 

@@ -82,7 +82,7 @@ def test_mass_matrix_is_the_papers_but_for_its_missing_yaw_term(plant: Plant, rn
 
 def test_accelerations_are_those_of_euler_lagrange(plant: Plant, rng: np.random.Generator) -> None:
     """(1) with applied torques. Errors are relative to each coordinate's own rms acceleration."""
-    angles, rates, torques = random_motion(rng)
+    angles, rates, torques = (values[: N_STATES // 2] for values in random_motion(rng))
     ours = np.array([data.qacc.copy() for data in states(passive(plant), angles, rates, torques)])
     theirs = paper.scissored_pair(bearing_inertia(plant)).accelerations(angles, rates, torques)
     scale = np.sqrt(np.mean(theirs**2, axis=0))

@@ -42,6 +42,7 @@ class Batches:
         monkeypatch.setattr(Experiment, "simulate", counted)
 
 
+@pytest.mark.slow
 def test_every_observer_beside_the_others_is_as_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [run_of(experiment(name), 3) for name in OBSERVERS]
     alone = [run_batch(*run) for run in runs]
@@ -53,6 +54,7 @@ def test_every_observer_beside_the_others_is_as_by_itself(monkeypatch: pytest.Mo
     assert len(batches.sizes) == len(kinds)  # what is estimated beyond x is the same in a batch
 
 
+@pytest.mark.slow
 def test_parameters_noise_and_rigs_may_differ_too(monkeypatch: pytest.MonkeyPatch) -> None:
     noise = "sensors.accelerometer.noise_density_ug_rthz=800"
     runs = [
@@ -69,6 +71,7 @@ def test_parameters_noise_and_rigs_may_differ_too(monkeypatch: pytest.MonkeyPatc
     assert batches.sizes == [9]
 
 
+@pytest.mark.slow
 def test_what_a_batch_has_in_common_keeps_runs_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [
         run_of(experiment("linear", *more), 2)
@@ -102,6 +105,7 @@ class Raises:
         return state + 1, (y[0], 0.0 * y[0], y[1])
 
 
+@pytest.mark.slow
 def test_an_observer_that_raises_stops_its_own_run_alone() -> None:
     runs = [run_of(experiment(name), 2) for name in ("linear", f"{__name__}:Raises", "ltv")]
     found = run_side_by_side(runs)

@@ -143,6 +143,7 @@ def test_a_file_that_is_no_robot() -> None:
     assert not Path("balanced.xml").exists()
 
 
+@pytest.mark.slow
 def test_nobodys_file_is_overwritten() -> None:
     Path("robot.xml").write_text(TORSO.read_text(encoding="utf-8"), encoding="utf-8")
     given = ("mount", "robot.xml", "--body", "torso", "--axis", "x", "--scale", "1.3")

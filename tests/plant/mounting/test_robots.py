@@ -47,6 +47,7 @@ def pushed(
     return prepare(changed).run_many(WORLDS, keep_trajectory=False).stood
 
 
+@pytest.mark.slow
 def test_it_stands_thirty_seconds(mounted: tuple[Experiment, Prospects, str]) -> None:
     """Ten seeds, default sensors, `homogeneous`, from the smaller of a degree and a quarter of the ceiling."""
     experiment, can, _ = mounted
@@ -54,6 +55,7 @@ def test_it_stands_thirty_seconds(mounted: tuple[Experiment, Prospects, str]) ->
     assert pushed(experiment, 0.0, 30.0, tilt).all()
 
 
+@pytest.mark.slow
 def test_it_stands_thirty_seconds_with_a_push(mounted: tuple[Experiment, Prospects, str]) -> None:
     """The same with 0.6 E, once the gimbals have come back from the start: E is borne by gimbals that are upright."""
     experiment, can, _ = mounted
@@ -61,6 +63,7 @@ def test_it_stands_thirty_seconds_with_a_push(mounted: tuple[Experiment, Prospec
     assert pushed(experiment, 0.6 * can.push_margin.median_impulse / PUSH_S, 30.0, tilt, PUSHED_AT_S).all()
 
 
+@pytest.mark.slow
 def test_it_bears_what_the_reduced_model_says(mounted: tuple[Experiment, Prospects, str]) -> None:
     """E is within 35 % of the simulation's: most stand 0.65 E and fall with E/0.65; all fall with 1.8 E."""
     experiment, can, _ = mounted
@@ -97,6 +100,7 @@ def test_plain_mujoco_loads_it_and_it_rests(mounted: tuple[Experiment, Prospects
     assert isinstance(experiment.plant.axis.line, SupportLine if ROBOTS[name].on_contacts else HingeLine)
 
 
+@pytest.mark.slow
 def test_where_the_pair_is_too_small_it_says_which_is_not(tmp_path: Path) -> None:
     """The scale that the tests use for the torso is the one that mount names for the papers' cube."""
     robot = ROBOTS["torso"]

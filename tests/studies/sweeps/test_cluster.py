@@ -62,6 +62,7 @@ def trials(folder: Path) -> list[dict]:
     return pq.read_table(folder / "trials.parquet").to_pylist()
 
 
+@pytest.mark.slow
 @distributed
 def test_two_workers_find_what_one_process_finds(tmp_path: Path) -> None:
     observers = ("--observers", "linear,gyro_free,homogeneous", "--worlds", "3")
@@ -74,6 +75,7 @@ def test_two_workers_find_what_one_process_finds(tmp_path: Path) -> None:
         assert (tmp_path / "two" / "chunks" / chunk.name).read_bytes() == chunk.read_bytes()
 
 
+@pytest.mark.slow
 @distributed
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_a_killed_worker_costs_what_it_was_computing(tmp_path: Path) -> None:
@@ -88,6 +90,7 @@ def test_a_killed_worker_costs_what_it_was_computing(tmp_path: Path) -> None:
     assert (tmp_path / "two" / "trials.parquet").read_bytes() == (tmp_path / "one" / "trials.parquet").read_bytes()
 
 
+@pytest.mark.slow
 @distributed
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_a_chunk_that_kills_three_workers_is_rows_with_a_reason_and_its_neighbours_are_not(tmp_path: Path) -> None:
@@ -104,6 +107,7 @@ def test_a_chunk_that_kills_three_workers_is_rows_with_a_reason_and_its_neighbou
             assert on_cluster == alone
 
 
+@pytest.mark.slow
 @distributed
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups here")
 @pytest.mark.usefixtures("ctrl_c")
@@ -160,6 +164,7 @@ def cluster(folder: Path, worker: Path) -> Iterator[tuple[str, subprocess.Popen]
             process.wait()
 
 
+@pytest.mark.slow
 @distributed
 def test_an_observer_that_a_worker_cannot_import_is_one_line(tmp_path: Path) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
@@ -176,6 +181,7 @@ def test_an_observer_that_a_worker_cannot_import_is_one_line(tmp_path: Path) -> 
         assert "cannot be reached" in sweep(here, "gone", "--cluster", address).complaint
 
 
+@pytest.mark.slow
 @distributed
 @pytest.mark.parametrize(
     ("address", "complaint"),

@@ -138,6 +138,7 @@ def test_the_best_of_those_riding_along_are_on(ridden: tuple[Experiment, Run], t
         assert not first.grey | second.hidden
 
 
+@pytest.mark.slow
 def test_the_best_runs_are_on(compared: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
     experiment, runs = compared
     found = views(write(tmp_path / "it.rrd", experiment, runs))
