@@ -25,4 +25,6 @@ def test_figures_of_one_world(observer: str, world: int) -> None:
     for name, value in closed_loop_figures(result).items():
         low, high = BOUNDS["closed_loop"][observer][name]
         middle, half = 0.5 * (low + high), 0.5 * (high - low) * math.sqrt(GROUP)
+        if name == "settle_time_s":  # the median of 20, which one noisy sample does not move
+            half = max(half, 1.0)
         assert middle - half <= value <= middle + half, f"{observer}: {name} = {value:.4g}, {middle:.4g} -+ {half:.4g}"
