@@ -192,6 +192,7 @@ def test_only_one_place_knows_a_heavy_library(library: str) -> None:
     assert {name for name in users if not f"{name}.".startswith(f"{place}.")} == set()
 
 
+@pytest.mark.slow
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     """All modules but these leave them out: nothing imports matplotlib before a plot is drawn."""
     inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.dask_", *AT_ONCE)

@@ -53,6 +53,7 @@ def test_a_disk_that_is_full_in_the_middle(tmp_path: Path, whole: bytes, monkeyp
     assert (tmp_path / "trials.parquet").read_bytes() == whole
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_at_the_end(tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.studies.sweeps.report.merged", full)
     monkeypatch.setattr("cmg_mj.studies.sweeps.report.draw", full)
