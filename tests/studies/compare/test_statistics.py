@@ -149,7 +149,7 @@ def test_a_figure_that_is_missing_in_a_world() -> None:
 @cache
 def compared() -> tuple[ComparedObserver, ...]:
     """Two observers, of which one falls in all worlds within the time."""
-    scenario = load_scenario("push_recovery", ["duration_s=3.3", "push.0.start_s=0.3", "seed=3"])
+    scenario = load_scenario("push_recovery", ["duration_s=4.0", "push.0.start_s=0.5", "seed=3"])
     return tuple(compare(prepare_comparison(scenario, ["ltv", "luenberger"]), 3))
 
 
