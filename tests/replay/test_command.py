@@ -65,7 +65,6 @@ def test_what_it_writes() -> None:
     assert "estimate/linear/x2_rad_s" in signals.columns
 
 
-@pytest.mark.slow
 def test_its_recording() -> None:
     from rerun.chunk import RrdReader
 

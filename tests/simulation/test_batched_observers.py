@@ -105,7 +105,6 @@ class Raises:
         return state + 1, (y[0], 0.0 * y[0], y[1])
 
 
-@pytest.mark.slow
 def test_an_observer_that_raises_stops_its_own_run_alone() -> None:
     runs = [run_of(experiment(name), 2) for name in ("linear", f"{__name__}:Raises", "ltv")]
     found = run_side_by_side(runs)

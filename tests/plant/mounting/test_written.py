@@ -104,7 +104,6 @@ def test_the_document_has_the_commands_of_its_robots() -> None:
     assert "\n".join(robot.command for robot in ROBOTS.values()) in text
 
 
-@pytest.mark.slow
 def test_a_command_of_the_document() -> None:
     words = shlex.split(ROBOTS["bicycle"].command)
     assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml").status == 0

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -24,7 +25,7 @@ from cmg_mj.studies.sweeps.study import SweepStudy
 from tests.command import COMMAND, ROOT, Said, cmg_mj, cmg_mj_process, environment
 
 distributed = pytest.mark.skipif(
-    subprocess.run([sys.executable, "-c", "import distributed"], capture_output=True).returncode != 0,
+    find_spec("distributed") is None,
     reason='distributed is not installed: python -m pip install "cmg_mj[cluster]"',
 )
 BIAS = "plant.equilibrium_bias_deg"
@@ -179,6 +180,14 @@ def test_an_observer_that_a_worker_cannot_import_is_one_line(tmp_path: Path) -> 
         scheduler.kill()
         scheduler.wait()
         assert "cannot be reached" in sweep(here, "gone", "--cluster", address).complaint
+
+
+@distributed
+@pytest.mark.parametrize("address", ["nowhere", "local:0", "local:x"])
+def test_a_word_that_is_no_cluster_is_refused(tmp_path: Path, address: str) -> None:
+    said = cmg_mj(*SWEEP, "--out", tmp_path / "out", "--cluster", address)
+    assert said.complaint.startswith(f"--cluster {address}: write ")
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow
