@@ -68,8 +68,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Measure only if it is asked for."""
-    if config.getoption("--cpu-limit") is not None:
-        config.pluginmanager.register(CpuLimit(config.getoption("--cpu-limit")))
+    limit = config.getoption("--cpu-limit")
+    if limit is not None:
+        config.pluginmanager.register(CpuLimit(limit))
 
 
 class CpuLimit:

@@ -9,10 +9,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import pytest
 from _pytest.mark.structures import ParameterSet
+
+if TYPE_CHECKING:
+    from xdist.remote import Producer
+    from xdist.scheduler import Scheduling
 
 TIERS = ("daily", "slow", "papers")
 PAPERS = Path(__file__).parent / "papers"
@@ -21,7 +25,7 @@ HINT = "daily tier; the others: -m slow, -m papers; everything: -m 'daily or slo
 
 def named_tiers(expression: str) -> set[str]:
     """Tiers whose names stand in an expression of `-m`."""
-    return set(TIERS) & set(re.findall(r"\w+", expression))
+    return {name for name in re.findall(r"\w+", expression) if name in TIERS}
 
 
 def tier(item: pytest.Item) -> str:
@@ -74,7 +78,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Scheduling | None:
     """Share slow tests out one by one, and not by files (`--dist loadfile`): a file of theirs can take minutes."""
     if not named_tiers(config.option.markexpr) & {"slow", "papers"} or config.getoption("dist") != "loadfile":
         return None
