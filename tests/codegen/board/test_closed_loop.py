@@ -81,7 +81,7 @@ def test_a_processor_that_is_the_controller_changes_nothing() -> None:
         np.testing.assert_array_equal(ours.trajectory[name], elsewhere.trajectory[name], err_msg=name)
 
 
-@pytest.mark.parametrize("observer", slow_but(OBSERVERS, "linear", "ltv"))
+@pytest.mark.parametrize("observer", slow_but(OBSERVERS, "linear"))
 def test_lockstep_on_the_same_inputs(observer: str) -> None:
     """What the board is shown is rounded to single precision, and so are its numbers; nothing is in double."""
     experiment = prepare(load_scenario("push_recovery", PUSHED if observer in ARE_PUSHED else SHORT, observer))
@@ -126,7 +126,14 @@ def test_super_twisting_is_chaotic_by_itself() -> None:
 
 @pytest.mark.parametrize(
     ("observer", "settings"),
-    [("gyro_free", ()), ("adaptive", ("controller.bias_trim_s=0.2", "controller.angle_source=estimated"))],
+    [
+        ("gyro_free", ()),
+        pytest.param(
+            "adaptive",
+            ("controller.bias_trim_s=0.2", "controller.angle_source=estimated"),
+            marks=pytest.mark.slow,
+        ),
+    ],
 )
 def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
     """Tick by tick, without the sensors' counts: a reading just between two of them may fall to either side."""
