@@ -16,6 +16,8 @@ from tests.command import cmg_mj
 
 SHORT = ("duration_s=2", "push.0.start_s=1", "push.1.start_s=1")
 
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
 
 def two_axes(*settings: str) -> Experiment:
     return prepare(load_scenario("two_axes", [*SHORT, *settings]))
