@@ -13,8 +13,11 @@ A control tick has one physics step at either rate.
 """
 NOISE = 1.25
 
-failed = False
-for row in json.load(sys.stdin)["figures"]:
+figures = json.load(sys.stdin)["figures"]
+failed = {row["control_rate_hz"] for row in figures} != LIMITS.keys()
+if failed:
+    print(f"not measured at {', '.join(f'{rate:g} Hz' for rate in LIMITS)}, but: {figures}")
+for row in figures:
     most, least = LIMITS[row["control_rate_hz"]]
     over, share = row["closed_loop_over_bare"], row["closed_loop_share_of_batch"]
     beyond = max(over / most, least / share)

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytest_plugins = ["pytester", "tests.tiers", "tests.cpu_limit", "tests.footprint"]
+
 # BLAS reads these once, when NumPy loads it. pytest imports this file before it starts its workers, which inherit them,
 # as does every process that a test starts. As many threads as cores in each of them fight one another: a test of one
 # second alone has taken 99.

@@ -1,13 +1,14 @@
 """Which test catches which wrong parameter, and which wrong report? Writes docs/mutations.md.
 
 Each parameter of the law, the observers and the reduced model is multiplied by 0.8 and by 1.2 in a copy of the sources,
-and the tests are run until the first failure. Each line that tests/papers/mutants.py changes in the papers' reports
-must be caught by the test named there.
+and the tests are run until the first failure: those of the daily tier, and if none of them fails the slow ones. Each
+line that tests/papers/mutants.py changes in the papers' reports must be caught by the test named there.
 
     python tests/mutations.py              # about twenty minutes on two cores
     python tests/mutations.py adaptive     # only the parameters with this in their names, printed and not written
     python tests/mutations.py papers       # only the reports, printed and not written
     python tests/mutations.py papers gap   # of these only the ones with this in what is wrong
+    python tests/mutations.py --check      # only whether each pattern is in the sources once; runs no test
 """
 
 from __future__ import annotations
@@ -114,49 +115,60 @@ HARDLY_MATTER = ("gyro_free: rate_start", "gyro_free: bias_walk", "gyro_free: je
 """Those of which a fifth changes so little that a test which saw it would be one of rounding; PARAMETERS_SAY has it."""
 
 
-def mutate(copy: Path, parameter: str, factor: float) -> None:
-    """Multiply one parameter in a copy of the sources.
+def mutated(parameter: str, factor: float, root: Path = ROOT) -> tuple[str, str]:
+    """Return the file of a parameter, and its text with the parameter multiplied.
 
     Raises:
         LookupError: The pattern of a parameter does not occur exactly once.
     """
     name = parameter.removeprefix("reduced: ")
     if name in REDUCED:
-        path = copy / "cmg_mj/observers/reduced_model.py"
-        text = path.read_text()
-        line = f"    {name}: float\n"
+        file = OBSERVERS + "reduced_model.py"
+        text = (root / file).read_text(encoding="utf-8")
+        last = "    gravity_torque: float\n"
         # After construction, so that every reader sees the wrong value.
         guard = "\n    def __post_init__(self) -> None:\n"
         guard += f'        object.__setattr__(self, "{name}", {factor} * self.{name})\n'
-        last = "    gravity_torque: float\n"
-        if text.count(line) != 1:
+        if text.count(f"    {name}: float\n") != 1 or text.count(last) != 1:
             raise LookupError(parameter)
-        path.write_text(text.replace(last, last + guard, 1))
-        return
+        return file, text.replace(last, last + guard)
     mutation = next(m for m in MUTATIONS if m.parameter == parameter)
-    path = copy / mutation.file
-    text = path.read_text()
-    found = list(re.finditer(mutation.pattern, text))
-    if len(found) != 1:
-        raise LookupError(f"{parameter}: found {len(found)} times")
-    start, end = found[0].span(found[0].lastindex or 0)
-    path.write_text(text[:start] + repr(float(text[start:end]) * factor) + text[end:])
+    text = (root / mutation.file).read_text(encoding="utf-8")
+    matches = list(re.finditer(mutation.pattern, text))
+    if len(matches) != 1:
+        raise LookupError(f"{parameter}: found {len(matches)} times")
+    start, end = matches[0].span(matches[0].lastindex or 0)
+    return mutation.file, text[:start] + repr(float(text[start:end]) * factor) + text[end:]
+
+
+def parameters() -> list[str]:
+    """Names of all parameters."""
+    return [m.parameter for m in MUTATIONS] + [f"reduced: {name}" for name in REDUCED]
 
 
 def caught_by(parameter: str, factor: float) -> str:
-    """The first test that fails with a parameter multiplied, or a dash."""
-    return first_failure(lambda copy: mutate(copy, parameter, factor), TESTS)
+    """Return the first test that fails with a parameter multiplied, or a dash; slow ones are named as such."""
+
+    def change(copy: Path) -> None:
+        file, text = mutated(parameter, factor, copy)
+        (copy / file).write_text(text, encoding="utf-8")
+
+    daily = first_failure(change, TESTS, "daily")
+    if daily != "-":
+        return daily
+    slow = first_failure(change, TESTS, "slow")
+    return slow if slow == "-" else f"slow: {slow}"
 
 
-def first_failure(change: Callable[[Path], None], tests: Sequence[str]) -> str:
-    """The first of some tests that fails in a changed copy of the sources, or a dash."""
+def first_failure(change: Callable[[Path], None], tests: Sequence[str], tiers: str) -> str:
+    """Return the first of some tests, of the tiers of an `-m`, that fails in a changed copy, or a dash."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)
         for part in ("cmg_mj", "models", "scenarios", "tests", "docs"):
             shutil.copytree(ROOT / part, copy / part, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
         shutil.copy(ROOT / "pyproject.toml", copy)
         change(copy)
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-o", "addopts=", *tests]
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-o", "addopts=", "-m", tiers, *tests]
         environment = os.environ | {"PYTHONPATH": str(copy)}
         output = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True).stdout
     failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", output, flags=re.MULTILINE)
@@ -172,11 +184,12 @@ def report_caught_by(mutant: Mutant) -> str:
         path = copy / mutants.PAPERS / mutant.file
         path.write_text(mutant.apply(path.read_text(encoding="utf-8")), encoding="utf-8")
 
-    return first_failure(change, [mutants.TESTS + mutant.test])
+    return first_failure(change, [mutants.TESTS + mutant.test], "papers")
 
 
 PARAMETERS_SAY = (
     "Each parameter multiplied in a copy of the sources, and the first test that then fails; a dash is a survivor.\n"
+    "`slow:` stands before those that no test of the daily tier catches.\n"
     "Each is caught by its effect, not by comparing a default with a literal, but for `kalman`: a test says what its\n"
     "defaults are, since a fifth more or less of any but `torque_white` moves its mean errors in push_recovery, over\n"
     "the run and in the push window, by less than 0.2 %. By less than 0.3 % it is for `rate_start`, `bias_walk` and\n"
@@ -190,10 +203,9 @@ REPORTS_SAY = (
 
 def parameter_table(pool: ThreadPoolExecutor, wanted: str) -> tuple[str, list[str]]:
     """The table of parameters, and those that no test caught and that matter."""
-    parameters = [m.parameter for m in MUTATIONS] + [f"reduced: {name}" for name in REDUCED]
-    parameters = [name for name in parameters if wanted in name]
-    found = {(p, f): pool.submit(caught_by, p, f) for p in parameters for f in FACTORS}
-    rows = [f"| `{p}` | " + " | ".join(found[p, f].result() for f in FACTORS) + " |" for p in parameters]
+    chosen = [name for name in parameters() if wanted in name]
+    found = {(p, f): pool.submit(caught_by, p, f) for p in chosen for f in FACTORS}
+    rows = [f"| `{p}` | " + " | ".join(found[p, f].result() for f in FACTORS) + " |" for p in chosen]
     dashes = [(p, f) for (p, f), future in found.items() if future.result() == "-"]
     survived = [f"{p} times {f}" for p, f in dashes if p not in HARDLY_MATTER]
     return "\n".join(["| parameter | times 0.8 | times 1.2 |", "|---|---|---|", *rows]), survived
@@ -210,6 +222,10 @@ def report_table(pool: ThreadPoolExecutor, wanted: str) -> tuple[str, list[str]]
 
 def main() -> None:
     """Run all mutations and write the tables."""
+    if sys.argv[1:] == ["--check"]:
+        for name in parameters():
+            mutated(name, FACTORS[0])
+        return
     wanted = sys.argv[1] if len(sys.argv) > 1 else ""
     parts, survivors = ["# Which test catches what", "Written by `python tests/mutations.py`."], []
     with ThreadPoolExecutor(2) as pool:
@@ -222,7 +238,7 @@ def main() -> None:
         if wanted in ("", "papers"):
             part = sys.argv[2] if len(sys.argv) > 2 else ""
             whole = sorted({mutants.TESTS + mutant.test for mutant in MUTANTS if part in mutant.wrong})
-            if (failed := first_failure(lambda copy: None, whole)) != "-":
+            if (failed := first_failure(lambda copy: None, whole, "papers")) != "-":
                 sys.exit(f"{failed} fails without any mutation: mend that first")
             table, survived = report_table(pool, part)
             parts += ["## Wrong reports", REPORTS_SAY, table]

@@ -143,6 +143,7 @@ def test_no_circle_of_modules() -> None:
     assert not {module: used - done for module, used in graph.items() if module not in done}
 
 
+@pytest.mark.slow
 def test_nothing_above_the_line_imports_mujoco() -> None:
     """One package after the other: the first that brings MuJoCo, or what is as heavy, is named."""
     code = "import importlib, sys\n"
@@ -191,6 +192,7 @@ def test_only_one_place_knows_a_heavy_library(library: str) -> None:
     assert {name for name in users if not f"{name}.".startswith(f"{place}.")} == set()
 
 
+@pytest.mark.slow
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     """All modules but these leave them out: nothing imports matplotlib before a plot is drawn."""
     inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.dask_", *AT_ONCE)
@@ -202,6 +204,7 @@ def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     assert in_a_fresh_interpreter(code) == ["done"]
 
 
+@pytest.mark.slow
 def test_public_names_are_what_they_say() -> None:
     """In a fresh process, after everything has been imported: a submodule must not hide a name."""
     code = "import cmg_mj, inspect; cmg_mj.prepare(cmg_mj.load_scenario('push_recovery')).run;"

@@ -30,6 +30,11 @@ def small(source: Path, target: Path) -> None:
         ).save(target, optimize=True)
 
 
+def escaped_indices(text: str) -> str:
+    """Escape the bracket of `L[0][0]`, which the site takes for a link."""
+    return re.sub(r"(?<=\w)\[(\d+)\]\[(\d+)\]", r"\\[\1][\2]", text)
+
+
 def main(run: Path) -> None:
     """Write both."""
     title, *paragraphs = (run / "report.md").read_text(encoding="utf-8").split("\n\n")
@@ -39,7 +44,8 @@ def main(run: Path) -> None:
         old.unlink()
     for name in re.findall(r"!\[[^\]]*\]\(([^)]+\.png)\)", text):
         small(run / name, PICTURES / name)
-    FILE.write_text(re.sub(r"(!\[[^\]]*\]\()([^)]+\.png\))", r"\1reproduced/\2", text), encoding="utf-8")
+    text = re.sub(r"(!\[[^\]]*\]\()([^)]+\.png\))", r"\1reproduced/\2", text)
+    FILE.write_text(escaped_indices(text), encoding="utf-8")
 
 
 main(Path(sys.argv[1]))

@@ -23,6 +23,7 @@ from tests.acceptance.cases import (
 )
 
 SEED = 7
+pytestmark = pytest.mark.slow
 BOUNDS = json.loads((Path(__file__).parent / "bounds.json").read_text())
 
 

@@ -30,6 +30,7 @@ def test_these_see_y1_alone() -> None:
     assert OF_Y1 == ["linear", "finite_difference", "super_twisting", "linear_high_gain"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", [ERROR, PUSH_ERROR])
 def test_no_observer_of_y1_alone_is_below_its_floor(key: str) -> None:
     """On one and the same motion, in no world: the floor is found afterwards, in each world by itself."""
@@ -39,6 +40,7 @@ def test_no_observer_of_y1_alone_is_below_its_floor(key: str) -> None:
         assert all(world[name][key] > world["floor_y1"][key] for world in worlds), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "within"), [(ERROR, 1.1), (PUSH_ERROR, 1.3)])
 def test_gyro_free_is_at_its_floor(key: str, within: float) -> None:
     """Above it but for chance, and by little. A push's edges are no straight line, as the floor has it."""
@@ -48,6 +50,7 @@ def test_gyro_free_is_at_its_floor(key: str, within: float) -> None:
     assert upper_end(of, floor) < within
 
 
+@pytest.mark.slow
 def test_gyro_free_is_several_times_nearer_than_the_best_of_y1_y2_and_u() -> None:
     for key, most in ((ERROR, 0.35), (PUSH_ERROR, 0.18)):
         others = [name for name in OBSERVERS if name not in ("gyro_free", "kalman", "luenberger")]

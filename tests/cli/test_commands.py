@@ -176,6 +176,7 @@ def test_a_person_reads_a_table_and_where_the_files_are(quick: str) -> None:
     assert (Path(folder) / "recording.rrd").exists()
 
 
+@pytest.mark.slow
 def test_a_plot_and_a_title_that_looks_like_markup() -> None:
     title = r"[/red] [bold]5[/bold] {x} %s $\no$"
     Path("my.toml").write_text(f"title = '{title}'\nduration_s = 0.3\nopen_loop_observers = ['ltv', 'linear']")
@@ -185,6 +186,7 @@ def test_a_plot_and_a_title_that_looks_like_markup() -> None:
     assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_the_default_folder_tells_runs_apart(quick: str) -> None:
     Path("mine.py").write_text(
         "from cmg_mj.observers.finite_difference import FiniteDifference\nclass Mine(FiniteDifference): pass\n"
@@ -232,6 +234,7 @@ def test_compare_prints_a_list_of_summaries(quick: str) -> None:
     assert json.loads(Path("runs/quick-compare-0/summary.json").read_text()) == compared
 
 
+@pytest.mark.slow
 def test_compare_prints_a_table(quick: str) -> None:
     """All observers fit into 100 columns; the widest numbers are not cut."""
     said = cmg_mj("compare", quick, "--worlds", 2)
@@ -299,6 +302,7 @@ def test_bench(monkeypatch: pytest.MonkeyPatch) -> None:
     assert cmg_mj("bench").complaint == "bench: name what to time: loop, board, sweep"
 
 
+@pytest.mark.slow
 def test_bench_of_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.studies.sweeps.cost.DURATION_S", 3.0)
     monkeypatch.setattr("cmg_mj.studies.sweeps.cost.RIGS", {"plant.equilibrium_bias_deg": "-0.5:0.5"})
@@ -334,6 +338,7 @@ def on_a_terminal(*arguments: str) -> tuple[subprocess.CompletedProcess[str], st
     return subprocess.CompletedProcess(running.args, running.returncode, out), shown.decode()
 
 
+@pytest.mark.slow
 def test_progress_is_shown_on_a_terminal_and_nowhere_else() -> None:
     Path("long.toml").write_text(tomli_w.dumps({"title": "[b]Long[/b]", "duration_s": 4.0}))
     done, shown = on_a_terminal("run", "long.toml", "--json")
@@ -346,6 +351,7 @@ def test_progress_is_shown_on_a_terminal_and_nowhere_else() -> None:
     assert silent.out == done.stdout
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_had_enough_is_no_error(quick: str) -> None:
     """Everything is written before the summary is printed."""
     read, write = os.pipe()
@@ -359,6 +365,7 @@ def test_a_reader_that_has_had_enough_is_no_error(quick: str) -> None:
     assert_whole("it")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 def test_standard_output_that_cannot_be_written() -> None:
     with open("/dev/full", "w") as full:
@@ -367,6 +374,7 @@ def test_standard_output_that_cannot_be_written() -> None:
     assert done.stderr == "cmg-mj: standard output: No space left on device\n"
 
 
+@pytest.mark.slow
 def test_wrong_input_in_a_process_of_its_own() -> None:
     """As a user meets it: one line, nothing else, status 2, nothing written."""
     said = cmg_mj_process("run", "push_recovery", "--set", "plant.timestep=1", cwd=Path())

@@ -17,6 +17,8 @@ from tests.command import cmg_mj
 
 SHORT = ("duration_s=2", "push.0.start_s=1", "push.1.start_s=1")
 
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
 
 def two_axes(*settings: str) -> Experiment:
     return prepare(load_scenario("two_axes", [*SHORT, *settings]))
@@ -41,6 +43,7 @@ def test_an_axis_has_what_it_is_given_and_the_rest_of_what_holds_for_all() -> No
     assert roll.plant.turn_rate_rad_s == pitch.plant.turn_rate_rad_s == 1.0
 
 
+@pytest.mark.slow
 def test_what_a_run_writes_reruns_and_has_every_axis(tmp_path: Path) -> None:
     experiment = two_axes("axes.roll.observer.kind=adaptive", "axes.pitch.controller.lqr.state_cost=[1, 1, 1, 1]")
     result = experiment.run()

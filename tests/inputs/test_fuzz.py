@@ -25,9 +25,10 @@ from cmg_mj.inputs.bundled import folder
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import prepare
 from tests.command import Said, cmg_mj, cmg_mj_process
+from tests.tiers import slow_but
 
 SCENARIOS, MODELS, IN_PROCESSES = 400, 200, 6
-GROUP = 50  # cases a test, so that the workers share them
+GROUP = 25  # cases a test, so that the workers share them
 HANG_S = 20.0
 TICKS = 3
 """What gets so far has started."""
@@ -278,19 +279,20 @@ def write_model(texts: tuple[bytes, bytes]) -> None:
     Path("my.toml").write_text("duration_s = 0.5\nplant.model = 'my.xml'")
 
 
-@pytest.mark.parametrize("first", range(0, SCENARIOS, GROUP))
+@pytest.mark.parametrize("first", slow_but(range(0, SCENARIOS, GROUP), 0, GROUP))
 def test_scenarios(first: int) -> None:
     valid = tried(scenario, range(first, first + GROUP), write_scenario)
     assert 0 < valid < GROUP  # or the fuzz shows nothing
 
 
-@pytest.mark.parametrize("first", range(0, MODELS, GROUP))
+@pytest.mark.parametrize("first", slow_but(range(0, MODELS, GROUP), 0))
 def test_models(first: int) -> None:
     os.mkfifo("pipe")
     valid = tried(model, range(1000 + first, 1000 + first + GROUP), write_model)
     assert 0 < valid < GROUP
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(IN_PROCESSES))
 def test_by_the_real_command(seed: int, tmp_path: Path) -> None:
     """`check` and then `run`, each in a process of its own."""

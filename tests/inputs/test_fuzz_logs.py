@@ -15,6 +15,7 @@ from cmg_mj.replay.log_replay import replay_log
 from cmg_mj.replay.logs import ReadOptions, read_log
 from tests.inputs.test_fuzz import GROUP, TEXTS, broken, no_hang
 from tests.replay.logs.motion import sine, tilt, write_csv
+from tests.tiers import slow_but
 
 LOGS = 300
 CELLS = [*TEXTS, "nan", "inf", "-inf", "1e308", "-1e308", "0", "1,5", "0x10", "1_000", "１２", "2026-11-22", None, None]
@@ -66,7 +67,7 @@ def write(rng: np.random.Generator) -> Path:
     return path
 
 
-@pytest.mark.parametrize("first", range(0, LOGS, GROUP))
+@pytest.mark.parametrize("first", slow_but(range(0, LOGS, GROUP), 0))
 def test_logs(first: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for room in ("table", "sampling"):
         monkeypatch.setattr(f"cmg_mj.replay.logs.{room}.MOST_ROWS", 20_000)

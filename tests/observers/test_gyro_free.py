@@ -141,6 +141,7 @@ def figures(offset_mg: float, kind: str = "gyro_free", **parameters: float) -> f
     return mean
 
 
+@pytest.mark.slow
 def test_the_trap_of_the_offset() -> None:
     """Without an offset, leaving the bias out looks best; with 5 mg on one accelerometer only time-varying gains do."""
     without: Any = {"bias_start": 1e-6, "bias_walk": 0.0}

@@ -28,6 +28,7 @@ from tests.observers.reference import (
     rough_signals,
     run,
 )
+from tests.tiers import slow_but
 
 Q = np.diag([1.0, 5e6, 1.0])  # Table 2
 C = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -44,22 +45,27 @@ def relative_errors(ours: np.ndarray, reference: np.ndarray) -> float:
     return float(np.abs(ours[..., kept] / reference[..., kept] - 1.0).max())
 
 
+DURATIONS_S = slow_but([2.5, 4.0], 2.5)
+"""Of the closed loop that the observer is compared along."""
+
+
 # --- along a closed-loop run ---------------------------------------------------------------------------
 
 
 @cache
-def closed_loop() -> Trajectory:
-    """The observer in the loop, with sensor noise and a push."""
-    trajectory = prepare(load_scenario("push_recovery", ["duration_s=4"]).with_observer("ltv")).run().trajectory
+def closed_loop(duration_s: float) -> Trajectory:
+    """The observer in the loop, with sensor noise and a push at 2 s."""
+    scenario = load_scenario("push_recovery", [f"duration_s={duration_s}"])
+    trajectory = prepare(scenario.with_observer("ltv")).run().trajectory
     assert trajectory is not None
-    assert len(trajectory) == 800
+    assert len(trajectory) == round(200 * duration_s)
     return trajectory
 
 
 @cache
-def along_the_run() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def along_the_run(duration_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """H and the estimate at every tick but the first, ours and the reference's."""
-    y1, y2, u = (closed_loop()[name] for name in ("y1_rad", "y2_rad", "u_rad_s"))
+    y1, y2, u = (closed_loop(duration_s)[name] for name in ("y1_rad", "y2_rad", "u_rad_s"))
     start = np.concatenate([[y1[0], 0.0, y2[0]], np.eye(3).ravel()])
     reference = integrate(ltv_slope(), start, y1, y2, u)
     estimates, states = run(observer("ltv"), y1, y2, u)
@@ -67,8 +73,9 @@ def along_the_run() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return ours, reference[:, 3:].reshape(-1, 3, 3), estimates, reference[:, :3]
 
 
-def test_riccati_matrix_is_the_reference_integrations() -> None:
-    ours, reference, _, _ = along_the_run()
+@pytest.mark.parametrize("duration_s", DURATIONS_S)
+def test_riccati_matrix_is_the_reference_integrations(duration_s: float) -> None:
+    ours, reference, _, _ = along_the_run(duration_s)
     error = relative_errors(ours, reference)
     condition = np.linalg.cond(ours)
     print(f"largest relative error of H's entries {error:.1e}; condition number up to {condition.max():.3g}")
@@ -76,22 +83,27 @@ def test_riccati_matrix_is_the_reference_integrations() -> None:
     assert np.abs(reference[:, [0, 1, 2, 2], [2, 2, 0, 1]]).max() < 1e-9  # the third state decouples
 
 
-def test_riccati_matrix_is_positive_definite_along_the_run() -> None:
-    ours, _, _, _ = along_the_run()
+@pytest.mark.parametrize("duration_s", DURATIONS_S)
+def test_riccati_matrix_is_positive_definite_along_the_run(duration_s: float) -> None:
+    ours, _, _, _ = along_the_run(duration_s)
     assert np.linalg.eigvalsh(ours).min() > 0.5
 
 
-def test_estimate_is_the_reference_integrations() -> None:
-    _, _, estimates, reference = along_the_run()
+@pytest.mark.parametrize("duration_s", DURATIONS_S)
+def test_estimate_is_the_reference_integrations(duration_s: float) -> None:
+    _, _, estimates, reference = along_the_run(duration_s)
     error = np.abs(estimates - reference).max(axis=0)
     print(f"largest error of the estimate {error} (rate's rms {np.std(reference[:, 1]):.3f} rad/s)")
     np.testing.assert_array_less(error, [2e-6, 5e-5, 1e-12])
 
 
-def test_estimate_recorded_in_the_loop_is_the_observers_alone() -> None:
+@pytest.mark.parametrize("duration_s", DURATIONS_S)
+def test_estimate_recorded_in_the_loop_is_the_observers_alone(duration_s: float) -> None:
     """Measurements and commands of the record suffice: there is no other memory."""
-    recorded = np.stack([closed_loop()[f"estimate/ltv/{name}"] for name in ("x1_rad", "x2_rad_s", "x3_rad")], axis=1)
-    _, _, estimates, _ = along_the_run()
+    recorded = np.stack(
+        [closed_loop(duration_s)[f"estimate/ltv/{name}"] for name in ("x1_rad", "x2_rad_s", "x3_rad")], axis=1
+    )
+    _, _, estimates, _ = along_the_run(duration_s)
     np.testing.assert_allclose(recorded[1:], estimates, rtol=0.0, atol=1e-9)
 
 

@@ -1,20 +1,13 @@
-"""Everything in this folder is about the papers' claims: `pytest -m "not papers"` leaves it out."""
+"""Everything in this folder is about the papers' claims: `python -m pytest -m papers`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.sentences import too_long
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    for item in items:
-        if Path(__file__).parent in item.path.parents:
-            item.add_marker(pytest.mark.papers)
 
 
 @pytest.fixture(autouse=True, scope="session")

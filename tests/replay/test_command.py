@@ -34,6 +34,7 @@ def files(folder: Path | str) -> list[str]:
     return sorted(name for name in os.listdir(folder) if name != ".cmg-mj")
 
 
+@pytest.mark.slow
 def test_the_real_log() -> None:
     """Its gyro comes 12 ms behind and is 1.5 % too small, says its .txt; a difference is half a sample late,
     of which the 0.1 ms that --delay leaves go."""
@@ -50,6 +51,7 @@ def test_the_real_log() -> None:
     assert set(log["left_out"]) >= {"ltv", "homogeneous", "gyro_free"}
 
 
+@pytest.mark.slow
 def test_what_it_writes() -> None:
     said = replay("sine.csv", "--columns", PLAIN, "--out", "it")
     assert said.status == 0
@@ -72,12 +74,14 @@ def test_its_recording() -> None:
     assert len(MAIN) == 3
 
 
+@pytest.mark.slow
 def test_the_same_replay_goes_to_the_same_folder() -> None:
     for wanted in ("runs/replay-sine", "runs/replay-sine", "runs/replay-sine-2"):
         settle = ("--settle-s", "0.5") if wanted.endswith("2") else ()
         assert f"Written to {wanted}." in replay("sine.csv", "--columns", PLAIN, *settle).err
 
 
+@pytest.mark.slow
 def test_several_logs() -> None:
     half = {name: values[:2000] for name, values in sine().items()}
     os.mkdir("other")
@@ -101,6 +105,7 @@ def test_several_logs() -> None:
     assert "Means over 2 logs" in replay("sine.csv", "other/sine.csv", "--columns", PLAIN).out
 
 
+@pytest.mark.slow
 def test_markdown_and_table_say_the_same() -> None:
     arguments = ("sine.csv", "--columns", PLAIN, "--observers", "linear,finite_difference")
     table, markdown = replay(*arguments).out, replay(*arguments, "--markdown").out
@@ -146,6 +151,7 @@ def test_wrong_arguments(arguments: tuple, says: str) -> None:
     assert not Path("runs").exists()
 
 
+@pytest.mark.slow
 def test_a_window_of_ones_own() -> None:
     said = replay("sine.csv", "--columns", PLAIN, "--window", "2:4", "--json", "--observers", "linear")
     figures = json.loads(said.out)["logs"][0]["observers"]["linear"]
@@ -187,6 +193,7 @@ def test_a_real_log_has_its_licence_beside_it() -> None:
     assert LOG.stat().st_size < 300_000
 
 
+@pytest.mark.slow
 def test_of_the_reference_it_says_what_matters() -> None:
     good = replay("sine.csv", "--columns", PLAIN, "--observers", "linear").out
     assert "Beside the tilt" not in good
@@ -199,6 +206,7 @@ def test_of_the_reference_it_says_what_matters() -> None:
     assert "is it the rate of this tilt?\n" in replay("other.csv", "--columns", PLAIN, "--observers", "linear").out
 
 
+@pytest.mark.slow
 def test_one_empty_line_at_a_time() -> None:
     alone = replay("sine.csv", "--columns", PLAIN, "--observers", "linear").out
     write_csv("other.csv", {name: values[:2000] for name, values in sine().items()})
@@ -223,6 +231,7 @@ def test_its_help_has_its_examples_on_lines_of_their_own() -> None:
     assert "\n    cmg-mj replay runs/push_recovery-homogeneous-0\n" in said
 
 
+@pytest.mark.slow
 def test_what_was_tuned_can_be_replayed() -> None:
     arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
     said = " ".join(cmg_mj("tune-log", *arguments, "--out", "it").err.split())

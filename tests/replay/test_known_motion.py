@@ -79,6 +79,7 @@ def test_roughness_of_white_noise_is_its_size(tmp_path: Path) -> None:
     assert found["finite_difference"]["roughness_rad_s"] == pytest.approx(0.01, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late", [0.012, -0.0031, 0.0])
 def test_a_late_reference_is_noticed_and_taken_back(tmp_path: Path, late: float) -> None:
     t = DT * np.arange(N)

@@ -81,6 +81,7 @@ def test_degrees_taken_as_radians(size: float, units: dict[str, str], asks: str,
     assert "to take it out: --scale rate=" in said
 
 
+@pytest.mark.slow
 def test_tuning_says_the_same(elsewhere: None) -> None:
     path = written(Path(), gyro_rad_s=np.interp(DT * np.arange(N) - 0.02, DT * np.arange(N), sine()["gyro_rad_s"]))
     columns = ("--columns", ",".join(f"{role}={name}" for role, name in COLUMNS.items()))
@@ -92,6 +93,7 @@ def test_tuning_says_the_same(elsewhere: None) -> None:
     assert " ".join(said.split()) in " ".join(tuned.split())
 
 
+@pytest.mark.slow
 def test_of_short_stretches_there_is_no_interval(elsewhere: None) -> None:
     import json
 

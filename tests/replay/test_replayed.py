@@ -85,6 +85,7 @@ def test_a_runs_recording_as_any_parquet(run: Path) -> None:
     np.testing.assert_allclose(replayed.estimates["linear"]["x2_rad_s"], kept, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_who_takes_part(tmp_path: Path) -> None:
     """What an observer needs and what is there decide, for every combination."""
     plain = log(tmp_path)

@@ -173,6 +173,7 @@ def test_what_a_run_before_has_written_goes(either_way: str) -> None:
     assert everything("it") == [HIDDEN, f"{HIDDEN}/files.json", "b", "d"]
 
 
+@pytest.mark.slow
 def test_a_plot_goes_with_its_run() -> None:
     cmg_mj("run", quick(), "--plot", "--out", "it")
     assert "plot.png" in names("it")

@@ -102,6 +102,7 @@ def test_half_the_flywheel_is_hinted_at_and_solved_for(half: str) -> None:
     assert "hint" in cmg_mj("check", "half.xml").out
 
 
+@pytest.mark.slow
 def test_compare_says_it_once(half: str) -> None:
     options = ["--observers", "linear,ltv", "--worlds", 2, "--set", half, "--set", "duration_s=2.2", "--json"]
     assert cmg_mj("compare", "push_recovery", *options).err.count("hint") == 1

@@ -56,6 +56,7 @@ def test_these_are_all_fields_that_may_differ() -> None:
     assert varied | {"controller.lqr"} == BATCHED_FIELDS.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("observer", "more"),
     [

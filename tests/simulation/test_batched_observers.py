@@ -43,6 +43,7 @@ class Batches:
         monkeypatch.setattr(Experiment, "simulate", counted)
 
 
+@pytest.mark.slow
 def test_every_observer_beside_the_others_is_as_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [run_of(experiment(name), 3) for name in OBSERVERS]
     alone = [run_batch(*run) for run in runs]
@@ -54,6 +55,7 @@ def test_every_observer_beside_the_others_is_as_by_itself(monkeypatch: pytest.Mo
     assert len(batches.sizes) == len(kinds)  # what is estimated beyond x is the same in a batch
 
 
+@pytest.mark.slow
 def test_parameters_noise_and_rigs_may_differ_too(monkeypatch: pytest.MonkeyPatch) -> None:
     noise = "sensors.accelerometer.noise_density_ug_rthz=800"
     runs = [
@@ -70,6 +72,7 @@ def test_parameters_noise_and_rigs_may_differ_too(monkeypatch: pytest.MonkeyPatc
     assert batches.sizes == [9]
 
 
+@pytest.mark.slow
 def test_what_a_batch_has_in_common_keeps_runs_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [
         run_of(experiment("linear", *more), 2)

@@ -156,6 +156,7 @@ def test_gymnasiums_checker_has_nothing_to_say(options: dict[str, Any]) -> None:
     made.close()
 
 
+@pytest.mark.slow
 def test_pictures() -> None:
     """In a process of its own, which MUJOCO_GL tells what to draw with; where nothing can, that is all that is said."""
     program = f"""
@@ -215,6 +216,7 @@ def test_a_wrong_action(action: np.ndarray) -> None:
         env.step(action)
 
 
+@pytest.mark.slow
 def test_without_gymnasium_it_says_how_to_get_it() -> None:
     program = "import sys; sys.modules['gymnasium'] = None\nimport cmg_mj.simulation.gymnasium_env"
     done = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True)

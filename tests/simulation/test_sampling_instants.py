@@ -55,6 +55,7 @@ def test_latency_is_a_time_and_not_a_number_of_steps(step_ms: float, latency_s: 
     np.testing.assert_allclose(run["fog_rad_s"][ticks:], run["x2_rad_s"][:-ticks], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["linear", "homogeneous", "adaptive"])
 def test_figures_do_not_depend_on_the_step(kind: str) -> None:
     """Means over 64 worlds at 1 ms and at the step that is chosen: 5 ms.

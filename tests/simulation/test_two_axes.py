@@ -10,6 +10,7 @@ from cmg_mj.results.summary_keys import section
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.recoverable_states import ceiling
+from tests.tiers import slow_but
 
 WORLDS = 20
 RATES = (0.0, 1.0, 3.0)
@@ -27,6 +28,7 @@ def errors(result: Result, axis: str) -> np.ndarray:
     return np.array(figures, dtype=float)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", RATES)
 def test_each_axis_is_estimated_as_with_the_other_locked(rate: float) -> None:
     turning = f"plant.turn_rate_rad_s={rate}"
@@ -38,6 +40,7 @@ def test_each_axis_is_estimated_as_with_the_other_locked(rate: float) -> None:
         assert errors(both, axis).mean() == pytest.approx(errors(alone, axis).mean(), rel=0.10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["two_axes", "two_axes_free_base"])
 def test_most_of_the_ceiling_tilt_on_both_axes_at_once_is_recovered_and_more_never(model: str) -> None:
     largest = min(
@@ -49,6 +52,7 @@ def test_most_of_the_ceiling_tilt_on_both_axes_at_once_is_recovered_and_more_nev
         assert result.stood.all() if stands else not result.stood.any()
 
 
+@pytest.mark.slow
 def test_a_turn_is_borne_by_gimbals_that_turn_against_it_alone() -> None:
     assert two_axes("plant.turn_rate_rad_s=3").run().outcomes[0].kind == "done"
     without = two_axes("plant.turn_rate_rad_s=2", "controller.compensate_turning=false")
@@ -64,11 +68,13 @@ def test_turned_the_wrong_way_the_gimbals_make_the_rig_fall_at_one_radian_a_seco
     assert experiment.run().outcomes[0].fell
 
 
+@pytest.mark.slow
 def test_on_a_base_that_stands_on_the_floor_too() -> None:
     result = two_axes("plant.model=two_axes_free_base").run_many(5, keep_trajectory=False)
     assert result.stood.all()
 
 
+@pytest.mark.slow
 def test_a_gaits_torque_is_found_by_its_frequency() -> None:
     swings = ",".join(
         f"{{frequency_hz=2.0, amplitude_n_m=1.0, phase_deg={phase}, axis='{axis}'}}"
@@ -83,6 +89,7 @@ def test_a_gaits_torque_is_found_by_its_frequency() -> None:
         assert (errors(informed, axis) < 0.8 * errors(without, axis)).all()
 
 
+@pytest.mark.slow
 def test_the_physics_step_does_not_matter() -> None:
     figures = [
         two_axes(f"plant.timestep_s={step}").run_many(8, keep_trajectory=False) for step in (0.005, 0.0025, 0.00125)
@@ -92,8 +99,10 @@ def test_the_physics_step_does_not_matter() -> None:
         assert result.mean("velocity_rms_error_rad_s") == pytest.approx(finest, rel=0.01)
 
 
-def test_one_world_of_many_and_the_callback_are_the_same_to_the_bit() -> None:
-    experiment = two_axes("duration_s=7", "axes.roll.observer.kind=adaptive")
+@pytest.mark.parametrize("duration_s", slow_but([1.0, 7.0], 1.0))
+def test_one_world_of_many_and_the_callback_are_the_same_to_the_bit(duration_s: float) -> None:
+    push = [] if duration_s == 7.0 else ["push=[]"]
+    experiment = two_axes(f"duration_s={duration_s}", *push, "axes.roll.observer.kind=adaptive")
     many = experiment.run_many([0, 3]).trajectory
     assert many is not None
     for place, world in enumerate((0, 3)):

@@ -34,6 +34,7 @@ from cmg_mj.visualization.recording.streaming import StreamedRun
 from cmg_mj.visualization.recording.viewer import Viewer, start_viewer, url_of
 from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, cmg_mj_process, environment
 from tests.run_folders import assert_whole
+from tests.tiers import slow_but
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -97,27 +98,34 @@ def assert_alike(streamed: Path, saved: Path) -> None:
 @pytest.mark.parametrize(
     ("scenario", "settings"),
     [
-        ("push_recovery", SHORT),
-        ("push_recovery", (*SHORT, 'open_loop_observers=["adaptive", "linear"]', "plant.equilibrium_bias_deg=0.5")),
-        ("push_recovery", (*SHORT, "push.0.torque_n_m=40.0")),  # falls
-        (
+        pytest.param("push_recovery", SHORT, id="push", marks=pytest.mark.slow),
+        pytest.param(
+            "push_recovery",
+            (*SHORT, 'open_loop_observers=["adaptive", "linear"]', "plant.equilibrium_bias_deg=0.5"),
+            id="open_loop_observers",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param("push_recovery", (*SHORT, "push.0.torque_n_m=40.0"), id="fall"),
+        pytest.param(
             "push_recovery",
             (*SHORT, "push.0.start_s=0.401", "push.0.duration_s=0.001", "plant.initial_tilt_deg=0.0"),
+            id="between ticks",
+            marks=pytest.mark.slow,
         ),
-        ("push_recovery", ("duration_s=0.005", "push=[]")),
-        ("two_axes", TWO_AXES),
-        ("two_axes", (*TWO_AXES, "push.1.torque_n_m=20.0", "plant.model=two_axes_free_base")),  # falls
-        ("two_axes", (*SHORT, 'plant.locked_axes=["pitch"]', "push.1.start_s=1.0")),
-    ],
-    ids=[
-        "push",
-        "open_loop_observers",
-        "fall",
-        "between ticks",
-        "one tick",
-        "two axes",
-        "fall about pitch",
-        "one is locked",
+        pytest.param("push_recovery", ("duration_s=0.005", "push=[]"), id="one tick"),
+        pytest.param("two_axes", TWO_AXES, id="two axes", marks=pytest.mark.slow),
+        pytest.param(
+            "two_axes",
+            (*TWO_AXES, "push.1.torque_n_m=20.0", "plant.model=two_axes_free_base"),
+            id="fall about pitch",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "two_axes",
+            (*SHORT, 'plant.locked_axes=["pitch"]', "push.1.start_s=1.0"),
+            id="one is locked",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: tuple[str, ...]) -> None:
@@ -133,7 +141,7 @@ def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: 
     assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
 
 
-@pytest.mark.parametrize("ticks", [1, 2, 3, 64])
+@pytest.mark.parametrize("ticks", slow_but([1, 2, 3, 64], 64))
 @pytest.mark.parametrize("push", [(0.05, 0.05), (0.051, 0.001), (0.052, 0.07)], ids=str)
 def test_wherever_it_is_cut_into_pieces(ticks: int, push: tuple[float, float]) -> None:
     """With pushes that begin and end at ticks and between them; a second one comes before the rig has settled."""
@@ -143,6 +151,7 @@ def test_wherever_it_is_cut_into_pieces(ticks: int, push: tuple[float, float]) -
     assert_alike_in_pieces(prepare(scenario.model_copy(update={"push": pushes})), ticks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ticks", [1, 3])
 def test_wherever_several_axes_are_cut(ticks: int) -> None:
     """A push about one axis is none about the other, whose arrow and phases go their own way."""
@@ -183,6 +192,7 @@ def column(path: Path) -> dict[str, list[float]]:
     return {name: values.tolist() for name, values in Trajectory.load(path).columns.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_the_figures_are_those_of_a_run_that_nobody_looks_at(receiver: Viewer, driver: str) -> None:
     """Bit for bit, and nothing more is said. The callback is one for the whole process, the view's thread included."""
@@ -195,6 +205,7 @@ def test_the_figures_are_those_of_a_run_that_nobody_looks_at(receiver: Viewer, d
     assert Path("received.rrd").stat().st_size > 100_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
 def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, how: signal.Signals) -> None:
     """Killed, or standing still, half a second after the run began: it takes no longer than it must."""
@@ -215,6 +226,7 @@ def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, how:
     assert took < 30.0
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_was_recorded(receiver: Viewer, ctrl_c: None) -> None:
     command = [*COMMAND, "run", "push_recovery", "--out=it", "--connect", str(receiver.port)]
     with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:

@@ -165,6 +165,7 @@ def test_numbers_json_does_not_know() -> None:
 # --- comparisons ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_comparison_of_one_world_equals_single_runs() -> None:
     file = write("duration_s = 0.5\n[[push]]\nstart_s = 0.2\n[observer]\nkind = 'homogeneous'\nk1 = 30.0")
     mine = f"{__name__}:Mine"
@@ -225,6 +226,7 @@ def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
     assert [experiment.scenario.controller.bias_trim_s for experiment in experiments] == [0.0, 1.0, 1.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scenario", "observers", "same"),
     [
@@ -252,6 +254,7 @@ def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, obser
     assert written["compare"] == {"observers": same, "worlds": 2}
 
 
+@pytest.mark.slow
 def test_options_come_before_what_the_scenario_says_to_compare() -> None:
     file = write("duration_s = 0.2\n[compare]\nobservers = ['ltv', 'linear', 'ltv']\nworlds = 3")
     plain = json.loads(cmg_mj("compare", file, "--json").out)
@@ -268,6 +271,7 @@ def test_run_says_that_it_does_not_compare() -> None:
     assert json.loads(said.out)["observer"] == "homogeneous"
 
 
+@pytest.mark.slow
 def test_a_comparison_is_drawn_if_it_is_asked_for() -> None:
     file = write("duration_s = 1.0\n[plant]\nequilibrium_bias_deg = 6.0")
     said = cmg_mj("compare", file, "--observers", "linear,luenberger", "--worlds", 3, "--plot", "--out", "it")
@@ -278,6 +282,7 @@ def test_a_comparison_is_drawn_if_it_is_asked_for() -> None:
 # --- letters -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("elsewhere")
 @pytest.mark.parametrize("command", ["run", "compare"])
 def test_a_title_of_any_letters_under_an_ascii_locale(command: str) -> None:
@@ -294,6 +299,7 @@ def test_a_title_of_any_letters_under_an_ascii_locale(command: str) -> None:
     assert tomllib.loads(Path("it/scenario.toml").read_text(encoding="utf-8"))["title"] == "Stoß – 1°"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["run", "compare", "tune"])
 @pytest.mark.parametrize("locale", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}], ids=["", "C"])
 def test_a_folder_and_a_file_named_in_bytes_that_are_no_letters(command: str, locale: dict[str, str]) -> None:

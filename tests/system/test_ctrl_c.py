@@ -59,6 +59,7 @@ class Slow(Interrupts):
 LONG = "duration_s = 600.0\n[controller]\nfeedback = 'truth'\n[observer]\nkind = 'pressing:Interrupts'"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
     """The class is found in the current folder."""
@@ -70,6 +71,7 @@ def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
     assert json.loads(said.out)["outcome"] == "interrupted"
 
 
+@pytest.mark.slow
 def test_ends_a_measurement_of_speed() -> None:
     """The run that hears it ends as a result; no other is started."""
     write(OBSERVER, "pressing.py")
@@ -77,6 +79,7 @@ def test_ends_a_measurement_of_speed() -> None:
     assert (said.status, said.out, said.err) == (130, "", "cmg-mj: interrupted\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_what_ends_a_process_from_outside_counts_as_ctrl_c(name: str) -> None:
     write(OBSERVER, "pressing.py")
@@ -86,6 +89,7 @@ def test_what_ends_a_process_from_outside_counts_as_ctrl_c(name: str) -> None:
     assert len(assert_whole("it")) == 600
 
 
+@pytest.mark.slow
 def test_twice_ends_a_run_at_once() -> None:
     write(OBSERVER, "pressing.py")
     said = cmg_mj_process("run", write(LONG), "--out", "it", "--set", "observer.times=2", cwd=Path())
@@ -94,6 +98,7 @@ def test_twice_ends_a_run_at_once() -> None:
     assert len(assert_whole("it")) == 599
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [["run"], ["compare", "--observers", "pressing:Slow", "--worlds", 2]])
 def test_is_heard_after_the_tick_however_slow_an_observer_is(command: list) -> None:
     """An observer of 0.1 s a sample: not one more sample is taken."""
@@ -134,6 +139,7 @@ def run_python(program: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_while_files_are_written_lets_them_be_finished() -> None:
     write("duration_s = 0.2")
     done = run_python(WRITING.format(times=1))
@@ -142,6 +148,7 @@ def test_while_files_are_written_lets_them_be_finished() -> None:
     assert_whole("it")
 
 
+@pytest.mark.slow
 def test_twice_while_files_are_written_leaves_no_broken_one() -> None:
     write("duration_s = 0.2")
     done = run_python(WRITING.format(times=2))
@@ -151,6 +158,7 @@ def test_twice_while_files_are_written_leaves_no_broken_one() -> None:
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 40
 
 
+@pytest.mark.slow
 def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
     write(OBSERVER, "pressing.py")
     file = write("duration_s = 3.0\n[controller]\nfeedback = 'truth'")
@@ -170,6 +178,7 @@ def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
     assert observers == ["linear", *REFERENCES]
 
 
+@pytest.mark.slow
 def test_before_the_first_observer_is_done_leaves_nothing() -> None:
     write(OBSERVER, "pressing.py")
     said = cmg_mj_process(
@@ -180,6 +189,7 @@ def test_before_the_first_observer_is_done_leaves_nothing() -> None:
     assert not Path("it").exists()
 
 
+@pytest.mark.slow
 def test_from_outside() -> None:
     """From another process, while the run waits for it in the middle of a tick: nothing depends on who is faster."""
     write(OBSERVER, "pressing.py")
@@ -207,6 +217,7 @@ def test_from_outside() -> None:
     assert verified.returncode == 0, verified
 
 
+@pytest.mark.slow
 def test_leaves_the_complete_result_of_a_run_before() -> None:
     write(OBSERVER, "pressing.py")
     assert cmg_mj_process("run", write("duration_s = 0.1"), "--out", "it", cwd=Path()).status == 0
@@ -219,12 +230,14 @@ def test_leaves_the_complete_result_of_a_run_before() -> None:
     assert len(assert_whole("it/incomplete")) == 600
 
 
+@pytest.mark.slow
 def test_a_study_that_cannot_begin_leaves_no_folder() -> None:
     said = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "a/b", cwd=Path())
     assert said.status == 2
     assert not Path("a").exists()
 
 
+@pytest.mark.slow
 def test_a_folder_that_was_there_stays() -> None:
     Path("mine").mkdir()
     said = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "mine", cwd=Path())

@@ -15,6 +15,7 @@ STUDIES = Path(__file__).resolve().parents[2] / "docs/studies"
 STEPS = STUDIES / "steps.py"
 
 
+@pytest.mark.slow
 def test_the_table_of_steps() -> None:
     arguments = "--worlds 2 --observers linear --integrators RK4 --steps-ms 2.5,5 --set duration_s=0.5 --set push=[]"
     done = subprocess.run([sys.executable, STEPS, *arguments.split()], capture_output=True, text=True, check=True)
@@ -23,6 +24,7 @@ def test_the_table_of_steps() -> None:
     assert "0.00 %" in rows[0]
 
 
+@pytest.mark.slow
 def test_the_tables_of_the_accelerometers_errors() -> None:
     arguments = "alone --only outer --worlds 2 --observers linear --jobs 1 --set duration_s=0.2 --set push=[]"
     command = [sys.executable, STUDIES / "sensor_errors.py", *arguments.split()]
@@ -33,6 +35,7 @@ def test_the_tables_of_the_accelerometers_errors() -> None:
     assert "- to the MEMS gyro: in " in done.stdout
 
 
+@pytest.mark.slow
 def test_the_tables_of_gyro_free() -> None:
     study = STEPS.with_name("gyro_free.py")
     arguments = "--worlds 2 --noise 400 --e 0.5 --parts model,taps"
@@ -41,6 +44,7 @@ def test_the_tables_of_gyro_free() -> None:
     assert done.stdout.count("as in the tables") == 3
 
 
+@pytest.mark.slow
 def test_the_tables_of_the_laws() -> None:
     arguments = "--worlds 2 --e 0.5 --figures-only"
     command = [sys.executable, STUDIES / "laws.py", *arguments.split()]
@@ -49,6 +53,7 @@ def test_the_tables_of_the_laws() -> None:
     assert done.stdout.count("| (8), `kalman`") == 2
 
 
+@pytest.mark.slow
 def test_the_tables_of_two_axes() -> None:
     command = [sys.executable, STUDIES / "two_axes.py", "--worlds", "1"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -58,6 +63,7 @@ def test_the_tables_of_two_axes() -> None:
     assert len(re.findall(r"\| (?:held|free)  \| 1/1 ", done.stdout)) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("study", sorted(path.name for path in STUDIES.glob("*.toml")))
 def test_a_study_file_can_be_run(study: str) -> None:
     said = cmg_mj("sweep", STUDIES / study, "--dry-run")

@@ -45,6 +45,7 @@ def test_there_is_an_example_for_each() -> None:
     assert [path.stem for path in EXAMPLES] == sorted(SAYS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_runs(path: Path, tmp_path: Path) -> None:
     done = subprocess.run(

@@ -12,6 +12,7 @@ from tests.command import HANGS_AFTER_S, environment
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "kills"),
     [("whole", 30), ("moved", 25), ("random", 20)],

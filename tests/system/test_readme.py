@@ -57,6 +57,7 @@ def test_is_one_page() -> None:
     assert len(README.splitlines()) < 200
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(len(SNIPPETS)))
 def test_a_snippet_runs(number: int, tmp_path: Path) -> None:
     code = SNIPPETS[number]
@@ -72,6 +73,7 @@ def test_a_snippet_runs(number: int, tmp_path: Path) -> None:
     assert bool(done.stdout) == ("print(" in code)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", dict.fromkeys(COMMANDS + INLINE))
 @pytest.mark.usefixtures("elsewhere")
 def test_a_command_runs(line: str) -> None:

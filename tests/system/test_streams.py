@@ -29,15 +29,17 @@ def shell(script: str, cwd: Path) -> subprocess.CompletedProcess:
 @pytest.mark.parametrize(
     ("script", "status", "err"),
     [
-        ("$CMG_MJ list | true; exit ${PIPESTATUS[0]}", 0, ""),
+        pytest.param("$CMG_MJ list | true; exit ${PIPESTATUS[0]}", 0, "", marks=pytest.mark.slow),
         ("$CMG_MJ --help | true; exit ${PIPESTATUS[0]}", 0, ""),
-        ("$CMG_MJ check push_recovery | true; exit ${PIPESTATUS[0]}", 0, ""),
-        ("$CMG_MJ check nosuch 2>&1 | true; exit ${PIPESTATUS[0]}", 2, ""),
-        ("$CMG_MJ list >&-", 0, ""),
-        ("$CMG_MJ list >&- 2>&-", 0, ""),
-        ("$CMG_MJ check nosuch >&- 2>&-", 2, ""),
-        ("$CMG_MJ list >/dev/full", 2, "cmg-mj: standard output: No space left on device\n"),
-        ("$CMG_MJ check nosuch 2>/dev/full", 2, ""),
+        pytest.param("$CMG_MJ check push_recovery | true; exit ${PIPESTATUS[0]}", 0, "", marks=pytest.mark.slow),
+        pytest.param("$CMG_MJ check nosuch 2>&1 | true; exit ${PIPESTATUS[0]}", 2, "", marks=pytest.mark.slow),
+        pytest.param("$CMG_MJ list >&-", 0, "", marks=pytest.mark.slow),
+        pytest.param("$CMG_MJ list >&- 2>&-", 0, "", marks=pytest.mark.slow),
+        pytest.param("$CMG_MJ check nosuch >&- 2>&-", 2, "", marks=pytest.mark.slow),
+        pytest.param(
+            "$CMG_MJ list >/dev/full", 2, "cmg-mj: standard output: No space left on device\n", marks=pytest.mark.slow
+        ),
+        pytest.param("$CMG_MJ check nosuch 2>/dev/full", 2, "", marks=pytest.mark.slow),
     ],
 )
 def test_streams(script: str, status: int, err: str, tmp_path: Path) -> None:
@@ -45,6 +47,7 @@ def test_streams(script: str, status: int, err: str, tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (status, err)
 
 
+@pytest.mark.slow
 def test_a_run_whose_output_is_closed_is_written_whole(tmp_path: Path) -> None:
     """A file that got the number of standard output would have the summary in it."""
     (tmp_path / "quick.toml").write_text("duration_s = 0.1")
@@ -53,6 +56,7 @@ def test_a_run_whose_output_is_closed_is_written_whole(tmp_path: Path) -> None:
     assert (tmp_path / "it" / "trajectory.parquet").read_bytes().endswith(b"PAR1")
 
 
+@pytest.mark.slow
 def test_a_current_folder_that_is_gone(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     gone.mkdir()

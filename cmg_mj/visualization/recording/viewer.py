@@ -115,14 +115,17 @@ def start_viewer(options: Sequence[str] = ()) -> Viewer:
     """
     for port in (PORT, 0, 0):
         viewer = _start(_free_port(port), options)
-        if _starts_listening(viewer) and _stays(viewer):
-            return viewer
-        if viewer.process.poll() is None:
-            os.killpg(viewer.process.pid, signal.SIGKILL)
-        if viewer.process.wait() != 0:  # 0: another viewer has been quicker to take the port
+        with viewer.errors:  # the viewer has an end of its own
+            if _starts_listening(viewer) and _stays(viewer):
+                return viewer
+            if viewer.process.poll() is None:
+                os.killpg(viewer.process.pid, signal.SIGKILL)
+            status = viewer.process.wait()
+            complaint = viewer.complaint()
+        if status != 0:  # 0: another viewer has been quicker to take the port
             break
     raise InputError(
-        f"--live: no viewer could be started: {viewer.complaint()}. Where there is no screen: "
+        f"--live: no viewer could be started: {complaint}. Where there is no screen: "
         "start rerun where there is one and name its address with --connect, or leave --live out"
     )
 

@@ -25,6 +25,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from tests.codegen.board.toy import SHORT, short, toy
 from tests.command import cmg_mj
+from tests.tiers import slow_but
 
 pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
 
@@ -80,7 +81,7 @@ def test_a_processor_that_is_the_controller_changes_nothing() -> None:
         np.testing.assert_array_equal(ours.trajectory[name], elsewhere.trajectory[name], err_msg=name)
 
 
-@pytest.mark.parametrize("observer", list(OBSERVERS))
+@pytest.mark.parametrize("observer", slow_but(OBSERVERS, "linear"))
 def test_lockstep_on_the_same_inputs(observer: str) -> None:
     """What the board is shown is rounded to single precision, and so are its numbers; nothing is in double."""
     experiment = prepare(load_scenario("push_recovery", PUSHED if observer in ARE_PUSHED else SHORT, observer))
@@ -125,7 +126,14 @@ def test_super_twisting_is_chaotic_by_itself() -> None:
 
 @pytest.mark.parametrize(
     ("observer", "settings"),
-    [("gyro_free", ()), ("adaptive", ("controller.bias_trim_s=0.2", "controller.angle_source=estimated"))],
+    [
+        ("gyro_free", ()),
+        pytest.param(
+            "adaptive",
+            ("controller.bias_trim_s=0.2", "controller.angle_source=estimated"),
+            marks=pytest.mark.slow,
+        ),
+    ],
 )
 def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
     """Tick by tick, without the sensors' counts: a reading just between two of them may fall to either side."""
@@ -140,6 +148,7 @@ def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
     assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
 
 
+@pytest.mark.slow
 def test_open_loop_observers_run_on_the_host() -> None:
     experiment = short("linear", "open_loop_observers=['ltv']")
     host, board = experiment.run(), experiment.run(driver="board")
@@ -161,6 +170,7 @@ def test_what_is_would_be_seen(tmp_path: Path, update: str) -> None:
     assert in_double_precision(toy(tmp_path, update=update + " return;"))
 
 
+@pytest.mark.slow
 def test_the_commands(tmp_path: Path) -> None:
     out = tmp_path / "on_board"
     said = cmg_mj(*f"run push_recovery --driver board --observer gyro_free --json --out {out}".split(), *sets(SHORT))
@@ -170,6 +180,7 @@ def test_the_commands(tmp_path: Path) -> None:
     assert cmg_mj("bench", "loop", "--markdown").complaint.startswith("No such option")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("elsewhere")
 def test_a_run_on_the_board_says_so_and_reruns_to_the_same_numbers() -> None:
     first = cmg_mj("run", "push_recovery", "--driver", "board", *sets(SHORT))
@@ -212,6 +223,7 @@ class Presses:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("elsewhere", "ctrl_c")
 def test_ctrl_c_ends_the_board_too() -> None:
     Path("pressing.py").write_text(OPEN_LOOP_OBSERVER)

@@ -17,6 +17,7 @@ from tests.codegen.board.toy import short, toy
 pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
 
 
+@pytest.mark.slow
 def test_what_they_cost() -> None:
     linear, homogeneous = (cost_of(run, run.axis_controller()) for run in map(short, ("linear", "homogeneous")))
     assert linear["step_instructions"] < 0.1 * homogeneous["step_instructions"]
@@ -33,6 +34,7 @@ def test_what_they_cost() -> None:
     assert cost_table(figures).row_count == 1
 
 
+@pytest.mark.slow
 def test_most_of_11_is_powers(tmp_path: Path) -> None:
     """Why (11) costs more than (10): four powers an update, which are more than half of it."""
     with exported(short("homogeneous").axis_controller()) as files:

@@ -48,6 +48,7 @@ def test_its_observer_is_not_the_controllers(tmp_path: Path) -> None:
         assert board.update(SHOWN, (0.0, 0.0)).u == 100.0
 
 
+@pytest.mark.slow
 def test_it_counts_instructions_and_stack(tmp_path: Path) -> None:
     """Exactly, and always the same: a step with 250 more instructions takes 250 more."""
     costs = []
@@ -82,6 +83,7 @@ def test_no_process_is_left_behind(tmp_path: Path) -> None:
     assert not is_running(process)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it ends when nobody talks to it")
 def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
     toy(tmp_path)
@@ -103,7 +105,7 @@ def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("update", "said"),
     [
-        ("for (;;) {}", "the board has not answered for 3 s"),
+        pytest.param("for (;;) {}", "the board has not answered for 3 s", marks=pytest.mark.slow),
         ("__builtin_trap();", "the board is gone: its processor met a fault"),
         ("*(volatile int *)0xf0000000 = 1;", "the board is gone: its processor met a fault"),
         (

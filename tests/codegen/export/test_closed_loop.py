@@ -20,6 +20,7 @@ SWITCHING = "super_twisting"
 """Makes so much of a difference that single precision cannot follow it: see the test with those words."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [*OBSERVERS, *OWN])
 def test_double_precision_is_bit_for_bit(kind: str, tmp_path: Path) -> None:
     loop, compiled = recorded(kind), Compiled(kind, "double", tmp_path)
@@ -27,6 +28,14 @@ def test_double_precision_is_bit_for_bit(kind: str, tmp_path: Path) -> None:
     assert compiled.said.splitlines()[-1] == "as in cmg_mj"
 
 
+@pytest.mark.parametrize("kind", ["linear", "adaptive"])
+def test_two_seconds_are_bit_for_bit(kind: str, tmp_path: Path) -> None:
+    settings = ("duration_s=2.0", "push.0.start_s=0.5")
+    loop, compiled = recorded(kind, *settings), Compiled(kind, "double", tmp_path, *settings)
+    np.testing.assert_array_equal(compiled.run(loop.samples), loop.results)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [
@@ -43,6 +52,7 @@ def test_settings_of_the_scenario_are_in_the_c(settings: tuple[str, ...], tmp_pa
     np.testing.assert_array_equal(Compiled("adaptive", "double", tmp_path, *settings).run(loop.samples), loop.results)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [*OBSERVERS, *OWN])
 def test_single_precision_is_close_and_nothing_else(kind: str, tmp_path: Path) -> None:
     """RMS of the rate's difference: below 1e-5 rad/s, or 1e-4 of the observer's own error."""
@@ -64,6 +74,7 @@ def test_single_precision_is_close_and_nothing_else(kind: str, tmp_path: Path) -
         assert all(name.endswith("f") for name in called), called
 
 
+@pytest.mark.slow
 def test_what_single_precision_cannot_follow(tmp_path: Path) -> None:
     """The one that switches: each of its steps is as exact, and Python itself does the same to samples rounded once."""
     loop = recorded(SWITCHING)

@@ -40,6 +40,7 @@ def test_what_the_readme_of_an_export_says() -> None:
     subprocess.run(["./example"], check=True, capture_output=True)
 
 
+@pytest.mark.slow
 def test_json_and_the_folder_it_takes_by_itself() -> None:
     said = cmg_mj("export", "linear", "--precision", "single", "--json", "--set", "observer.tau=0.03")
     figures = json.loads(said.out)
@@ -103,6 +104,7 @@ def test_a_rig_with_one_gimbal() -> None:
     assert "#define LINEAR_ENCODERS 1" in Path("board/linear.h").read_text()
 
 
+@pytest.mark.slow
 def test_files_of_the_users_stay_and_an_earlier_export_is_replaced() -> None:
     cmg_mj("export", "linear", "--out", "board")
     Path("board/notes.txt").write_text("mine")

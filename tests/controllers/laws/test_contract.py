@@ -142,6 +142,7 @@ def test_a_law_that_is_told_the_noise_keeps_worlds_of_other_noise_apart() -> Non
         experiment.run_many(2, vary={"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]})
 
 
+@pytest.mark.slow
 def test_a_sweep_over_the_law() -> None:
     """Each law in batches of its own, each row as if run alone; where one raises, its own trials alone are lost."""
     scenario = load_scenario("push_recovery", SHORT)
@@ -178,6 +179,7 @@ def test_observers_are_tuned_in_a_loop_that_takes_nothing_of_them() -> None:
     assert tuning_scenario(load_scenario("push_recovery")).controller.feedback == "fog"
 
 
+@pytest.mark.slow
 def test_a_run_says_which_law_and_reruns(elsewhere: None) -> None:
     said = cmg_mj(
         "run", "push_recovery", "--set", "controller.kind=lqg", "--set", "controller.torque_walk=0.1", "--plot"
@@ -192,6 +194,7 @@ def test_a_run_says_which_law_and_reruns(elsewhere: None) -> None:
         np.testing.assert_array_equal(one[column], other[column])
 
 
+@pytest.mark.slow
 def test_a_law_without_an_integrator_is_recorded_and_plotted(elsewhere: None) -> None:
     said = cmg_mj("run", "push_recovery", "--set", f"controller.kind={__name__}:NoMemory", "--plot", "--out", "it")
     assert said.status == 0

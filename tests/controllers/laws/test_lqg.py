@@ -151,6 +151,7 @@ def errors(worlds: int = 3000, seconds: float = 16.0) -> tuple[Lqg, np.ndarray]:
     return of, np.concatenate(found)
 
 
+@pytest.mark.slow
 def test_the_error_is_what_the_filter_says() -> None:
     """Its covariance over seeds, entry by entry, in units of the standard deviations."""
     of, found = errors()
@@ -197,6 +198,7 @@ def test_a_sensor_without_noise_is_taken() -> None:
     np.testing.assert_allclose(np.diag(of.innovation_gain[[0, 2]]), 1.0, atol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("e", [-1.5, 0.5, 1.5])
 def test_the_gimbals_come_back_whatever_the_bias(e: float) -> None:
     """Integral action, on the rig: the mean gimbal angle of the last seconds."""
@@ -209,6 +211,7 @@ def test_the_gimbals_come_back_whatever_the_bias(e: float) -> None:
     assert math.degrees(np.abs(result.trajectory["y2_rad"]).max()) > 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("without", ["torque", "integrator"])
 def test_either_integral_action_alone_falls_at_a_large_bias(without: str) -> None:
     """Why it is there twice."""

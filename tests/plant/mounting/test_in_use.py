@@ -85,6 +85,7 @@ def test_a_sweep(scenario: str) -> None:
     assert stood == {1.0: True, 200.0: False}
 
 
+@pytest.mark.slow
 def test_commands(scenario: str, tmp_path: Path) -> None:
     """A run with its recording, a check, a comparison."""
     settings = [part for value in PUSHED for part in ("--set", value)]

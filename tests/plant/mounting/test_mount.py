@@ -81,6 +81,7 @@ def test_a_spec_is_taken_and_not_changed() -> None:
     assert made.spec.body("cube1/half") is not None
 
 
+@pytest.mark.slow
 def test_every_joint_is_held_where_it_stands() -> None:
     """A ball, too, and in any pose of its reference: a run with pushes moves them by less than 0.1 deg."""
     made = mount(mujoco.MjSpec.from_string(BALL), "pole")
@@ -156,6 +157,7 @@ def test_meshes_are_found_from_another_folder(tmp_path: Path) -> None:
     assert str(tmp_path) not in path.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_second_axis(tmp_path: Path) -> None:
     """A universal joint, mounted twice: the hinge that was held is let go, the first pair is kept, both stand."""
     once = mount(
@@ -195,6 +197,7 @@ def test_keyframes_of_its_own_are_kept() -> None:
     assert model.equality("gripper_held").data[0] == pytest.approx(0.05)
 
 
+@pytest.mark.slow
 def test_the_command_prints_what_the_pair_can_do() -> None:
     given = ("mount", EXAMPLES / "torso.xml", "--body", "torso", "--axis", "x")
     said = cmg_mj(*given, "-o", "a.xml", "--json")

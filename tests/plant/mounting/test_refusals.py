@@ -155,5 +155,12 @@ def test_nobodys_file_is_overwritten() -> None:
     Path("mine.toml").write_text("mine", encoding="utf-8")
     assert "mine.toml exists; give another name" in cmg_mj(*given, "-o", "mine.xml").complaint
     assert (Path("mine.toml").read_text(encoding="utf-8"), Path("mine.xml").exists()) == ("mine", False)
-    assert cmg_mj(*given, "-o", "mine.xml", "--overwrite").status == 0
     assert cmg_mj(*given, "-o", "there/is/none.xml").complaint
+
+
+@pytest.mark.slow
+def test_a_file_is_overwritten_if_it_is_asked_for() -> None:
+    given = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3", "-o", "mine.xml")
+    Path("mine.toml").write_text("mine", encoding="utf-8")
+    assert cmg_mj(*given, "--overwrite").status == 0
+    assert Path("mine.toml").read_text(encoding="utf-8") != "mine"

@@ -17,21 +17,29 @@ from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S
 from cmg_mj.studies.push_limits.mount_files import PUSHED_AT_S, write_scenario
 from cmg_mj.studies.push_limits.prospects import Prospects, prospects, smallest_sufficient_scale
+from cmg_mj.studies.push_limits.recoverable_states import RecoverableLimit, ceiling
 from tests.plant.mounting.robots import ROBOTS
 
 WORLDS = 10
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
-def mounted(
+def resting(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Experiment, Prospects, str]:
+) -> tuple[Experiment, RecoverableLimit, str]:
+    """A robot with its pair, what its reduced model says, its name."""
     robot = ROBOTS[request.param]
-    folder = tmp_path_factory.mktemp("robot")
-    found = mount(robot.path, **robot.options)
-    model = found.save(folder / "balanced.xml")
-    can = prospects(write_scenario(model, robot.path, "homogeneous"))
-    return write_scenario(model, robot.path, "homogeneous", can), can, request.param
+    model = mount(robot.path, **robot.options).save(tmp_path_factory.mktemp("robot") / "balanced.xml")
+    experiment = write_scenario(model, robot.path, "homogeneous")
+    return experiment, ceiling(experiment.plant.axis.reduced, experiment.law.rate_limit), request.param
+
+
+@pytest.fixture(scope="module")
+def mounted(resting: tuple[Experiment, RecoverableLimit, str]) -> tuple[Experiment, Prospects, str]:
+    """The same with all that `mount` says of it."""
+    experiment, _, name = resting
+    can = prospects(experiment)
+    return write_scenario(experiment.plant.path, ROBOTS[name].path, "homogeneous", can), can, name
 
 
 def pushed(
@@ -47,6 +55,7 @@ def pushed(
     return prepare(changed).run_many(WORLDS, keep_trajectory=False).stood
 
 
+@pytest.mark.slow
 def test_it_stands_thirty_seconds(mounted: tuple[Experiment, Prospects, str]) -> None:
     """Ten seeds, default sensors, `homogeneous`, from the smaller of a degree and a quarter of the ceiling."""
     experiment, can, _ = mounted
@@ -54,6 +63,7 @@ def test_it_stands_thirty_seconds(mounted: tuple[Experiment, Prospects, str]) ->
     assert pushed(experiment, 0.0, 30.0, tilt).all()
 
 
+@pytest.mark.slow
 def test_it_stands_thirty_seconds_with_a_push(mounted: tuple[Experiment, Prospects, str]) -> None:
     """The same with 0.6 E, once the gimbals have come back from the start: E is borne by gimbals that are upright."""
     experiment, can, _ = mounted
@@ -61,9 +71,11 @@ def test_it_stands_thirty_seconds_with_a_push(mounted: tuple[Experiment, Prospec
     assert pushed(experiment, 0.6 * can.push_margin.median_impulse / PUSH_S, 30.0, tilt, PUSHED_AT_S).all()
 
 
+@pytest.mark.slow
 def test_it_bears_what_the_reduced_model_says(mounted: tuple[Experiment, Prospects, str]) -> None:
     """E is within 35 % of the simulation's: most stand 0.65 E and fall with E/0.65; all fall with 1.8 E."""
     experiment, can, _ = mounted
+    assert not can.hints
     torque = can.push_margin.median_impulse / PUSH_S
     assert 0.0 < can.push_margin.median_impulse < can.limit_push_impulse
     assert pushed(experiment, 0.65 * torque, 8.0).sum() > WORLDS / 2
@@ -71,32 +83,32 @@ def test_it_bears_what_the_reduced_model_says(mounted: tuple[Experiment, Prospec
     assert not pushed(experiment, 1.8 * torque, 8.0).any()
 
 
-def test_it_starts_to_fall_as_its_reduced_model_does(mounted: tuple[Experiment, Prospects, str]) -> None:
+def test_it_starts_to_fall_as_its_reduced_model_does(resting: tuple[Experiment, RecoverableLimit, str]) -> None:
     """Nothing controlled, the simulated robot leans as cosh(lambda t): inertia, gravity and the line are right.
 
     Without the damping that a file gives its joints, which the reduced model does not have: its 1 N m s/rad makes the
     pole of Gymnasium's inverted_pendulum 6 % smaller; no other's changes by more than 0.1 %.
     """
-    experiment, can, _ = mounted
+    experiment, limit, _ = resting
     plant = experiment.plant
     undamped = copy.copy(plant.model)
     undamped.dof_damping[:] = 0.0
-    assert simulated_pole(undamped, plant.key, plant.axis.line) == pytest.approx(can.limit.pole, rel=0.03)
-    assert not can.hints
+    assert simulated_pole(undamped, plant.key, plant.axis.line) == pytest.approx(limit.pole, rel=0.03)
 
 
-def test_plain_mujoco_loads_it_and_it_rests(mounted: tuple[Experiment, Prospects, str]) -> None:
+def test_plain_mujoco_loads_it_and_it_rests(resting: tuple[Experiment, RecoverableLimit, str]) -> None:
     """At the keyframe nothing accelerates but for what the flywheels' motors do."""
-    experiment, can, name = mounted
+    experiment, limit, name = resting
     model = mujoco.MjModel.from_xml_path(str(experiment.plant.path))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
     mujoco.mj_forward(model, data)
     tilting = experiment.plant.axis.line.motion(model, data) @ data.qacc
-    assert abs(tilting) < math.radians(0.05) * can.limit.pole**2
+    assert abs(tilting) < math.radians(0.05) * limit.pole**2
     assert isinstance(experiment.plant.axis.line, SupportLine if ROBOTS[name].on_contacts else HingeLine)
 
 
+@pytest.mark.slow
 def test_where_the_pair_is_too_small_it_says_which_is_not(tmp_path: Path) -> None:
     """The scale that the tests use for the torso is the one that mount names for the papers' cube."""
     robot = ROBOTS["torso"]

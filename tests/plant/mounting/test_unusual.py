@@ -65,9 +65,9 @@ def rig(**options: Any) -> Plant:
 
 
 @pytest.fixture(scope="module")
-def plain() -> Plant:
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Plant:
     """The head fixed to the trunk."""
-    return load_plant(model=str(mounted().save("plain.xml")))
+    return load_plant(model=str(mounted().save(tmp_path_factory.mktemp("plain") / "plain.xml")))
 
 
 def same(found: Plant, expected: Plant) -> None:

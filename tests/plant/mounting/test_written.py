@@ -79,6 +79,7 @@ def test_a_file_that_the_robot_includes_is_never_overwritten() -> None:
         mount("robot.xml", "torso", axis="x", scale=1.3).save("part.xml")
 
 
+@pytest.mark.slow
 def test_what_is_written_speaks_of_itself_alone() -> None:
     assert json.loads(cmg_mj(*GIVEN, "-o", "a.xml", "--json").out)["model"] == "a.xml"
     assert there() == ["a.toml", "a.xml"]

@@ -26,7 +26,7 @@ POST = """
   </worldbody>
 </mujoco>"""
 SET = (
-    "duration_s=1.5",
+    "duration_s=0.7",
     "plant.turn_rate_rad_s=0",
     "plant.equilibrium_bias_deg=0",
     "plant.initial_tilt_deg=0",
@@ -74,10 +74,10 @@ def test_in_studio_too(model: Path) -> None:
     experiment = pushed(model, roll=5.0, pitch=3.0)
     studio = Session(lambda _: experiment)
     with studio.handle:
-        studio.run(1.5)
+        studio.run(0.7)
         rows = studio.rows
     trajectory = experiment.run().trajectory
     assert trajectory is not None
-    assert len(rows) == 300
+    assert len(rows) == 140
     rows[:, [PUSH, PUSH + 7]] = rows[:, [PUSH, PUSH + 7]].round(12)  # put together again from the joint's three torques
     same(rows, as_rows(trajectory))

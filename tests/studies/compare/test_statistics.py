@@ -125,6 +125,7 @@ def test_a_reference_has_no_loop_of_its_own() -> None:
     assert (zero["seed"], zero["worlds"]) == (7, 2)
 
 
+@pytest.mark.slow
 def test_one_world_has_no_intervals() -> None:
     row = by_name([entry("ltv", [0.1]), entry("linear", [0.3])])["linear"]
     assert row["intervals"][ERROR] is None

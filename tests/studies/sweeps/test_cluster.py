@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -24,7 +25,7 @@ from cmg_mj.studies.sweeps.study import SweepStudy
 from tests.command import COMMAND, ROOT, Said, cmg_mj, cmg_mj_process, environment
 
 distributed = pytest.mark.skipif(
-    subprocess.run([sys.executable, "-c", "import distributed"], capture_output=True).returncode != 0,
+    find_spec("distributed") is None,
     reason='distributed is not installed: python -m pip install "cmg_mj[cluster]"',
 )
 BIAS = "plant.equilibrium_bias_deg"
@@ -62,6 +63,7 @@ def trials(folder: Path) -> list[dict]:
     return pq.read_table(folder / "trials.parquet").to_pylist()
 
 
+@pytest.mark.slow
 @distributed
 def test_two_workers_find_what_one_process_finds(tmp_path: Path) -> None:
     observers = ("--observers", "linear,gyro_free,homogeneous", "--worlds", "3")
@@ -74,6 +76,7 @@ def test_two_workers_find_what_one_process_finds(tmp_path: Path) -> None:
         assert (tmp_path / "two" / "chunks" / chunk.name).read_bytes() == chunk.read_bytes()
 
 
+@pytest.mark.slow
 @distributed
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_a_killed_worker_costs_what_it_was_computing(tmp_path: Path) -> None:
@@ -88,6 +91,7 @@ def test_a_killed_worker_costs_what_it_was_computing(tmp_path: Path) -> None:
     assert (tmp_path / "two" / "trials.parquet").read_bytes() == (tmp_path / "one" / "trials.parquet").read_bytes()
 
 
+@pytest.mark.slow
 @distributed
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_a_chunk_that_kills_three_workers_is_rows_with_a_reason_and_its_neighbours_are_not(tmp_path: Path) -> None:
@@ -104,6 +108,7 @@ def test_a_chunk_that_kills_three_workers_is_rows_with_a_reason_and_its_neighbou
             assert on_cluster == alone
 
 
+@pytest.mark.slow
 @distributed
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups here")
 @pytest.mark.usefixtures("ctrl_c")
@@ -160,6 +165,7 @@ def cluster(folder: Path, worker: Path) -> Iterator[tuple[str, subprocess.Popen]
             process.wait()
 
 
+@pytest.mark.slow
 @distributed
 def test_an_observer_that_a_worker_cannot_import_is_one_line(tmp_path: Path) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
@@ -176,6 +182,15 @@ def test_an_observer_that_a_worker_cannot_import_is_one_line(tmp_path: Path) -> 
         assert "cannot be reached" in sweep(here, "gone", "--cluster", address).complaint
 
 
+@distributed
+@pytest.mark.parametrize("address", ["nowhere", "local:0", "local:x"])
+def test_a_word_that_is_no_cluster_is_refused(tmp_path: Path, address: str) -> None:
+    said = cmg_mj(*SWEEP, "--out", tmp_path / "out", "--cluster", address)
+    assert said.complaint.startswith(f"--cluster {address}: write ")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
 @distributed
 @pytest.mark.parametrize(
     ("address", "complaint"),

@@ -37,6 +37,7 @@ def times(folder: Path) -> dict[str, int]:
     return {path.name: path.stat().st_mtime_ns for path in folder.iterdir() if not path.name.startswith(".")}
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_in_the_middle(tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count()
     monkeypatch.setattr(files.os, "fsync", lambda number: next(calls) == 2 and full())  # the study, a chunk, a chunk
@@ -52,6 +53,7 @@ def test_a_disk_that_is_full_in_the_middle(tmp_path: Path, whole: bytes, monkeyp
     assert (tmp_path / "trials.parquet").read_bytes() == whole
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_at_the_end(tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.studies.sweeps.report.merged", full)
     monkeypatch.setattr("cmg_mj.studies.sweeps.report.draw", full)
@@ -91,6 +93,7 @@ def test_two_sweeps_in_one_folder(tmp_path: Path, whole: bytes) -> None:
     assert (tmp_path / "trials.parquet").read_bytes() == whole
 
 
+@pytest.mark.slow
 def test_a_chunk_that_cannot_be_read_is_named(tmp_path: Path, whole: bytes) -> None:
     assert cmg_mj(*SWEEP, tmp_path).status == 0
     chunk = tmp_path / "chunks" / "000002.parquet"

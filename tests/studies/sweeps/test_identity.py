@@ -48,6 +48,7 @@ def test_chunks_whose_study_is_lost_serve_no_other(out: Path) -> None:
     assert contents(out) | {"study.toml": b""} == before | {"study.toml": b""}
 
 
+@pytest.mark.slow
 def test_a_chunk_of_another_folder(out: Path, tmp_path: Path) -> None:
     other = [word.replace("linear,gyro_free", "linear,ltv") for word in SWEEP]
     assert cmg_mj(*other, tmp_path / "other").status == 0
@@ -90,6 +91,7 @@ def test_a_model_that_is_edited_while_a_sweep_runs(tmp_path: Path, mine: Path) -
     assert store.left() == [0]
 
 
+@pytest.mark.slow
 def test_other_versions_go_on_with_nothing_and_may_finish_what_is_whole(out: Path) -> None:
     study, (chunk, other) = out / "study.toml", sorted((out / "chunks").iterdir())
     before = contents(out)

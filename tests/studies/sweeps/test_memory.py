@@ -65,6 +65,7 @@ def test_points_and_chunks_are_made_when_asked_for(points: int, worlds: int) -> 
     assert taken[0] < 3.0
 
 
+@pytest.mark.slow
 def test_a_sweep_keeps_what_it_needs_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The figures of the cells, 80 bytes a trial; no list of all cells, each of which takes 6 kB."""
     monkeypatch.setattr(store_module, "compute", made_up_rows)

@@ -115,6 +115,7 @@ def test_other_sweeps_have_the_table_only(varied: dict[str, str]) -> None:
     assert pictures_of(made_up(varied, OBSERVERS, 2, lambda *_: 0.1)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("worlds", [1, 4])
 def test_they_can_be_drawn(tmp_path: Path, worlds: int) -> None:
     of_one = made_up({BIAS: "0,1,2"}, OBSERVERS, worlds, lambda p, name, w: error({NOISE: 100, **p}, name, w))

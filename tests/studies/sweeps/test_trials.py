@@ -49,6 +49,7 @@ def trials() -> pa.Table:
     return all_trials(small())
 
 
+@pytest.mark.slow
 def test_each_trial_is_the_run_of_its_own_row() -> None:
     """`cmg-mj run` with the row's own values, to the last bit."""
     of = small()
@@ -67,6 +68,7 @@ def test_the_noise_of_a_world_is_the_same_in_every_cell() -> None:
     assert np.ptp(errors[0]) > 0.05 * errors[0].mean()
 
 
+@pytest.mark.slow
 def test_killed_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is there is not computed again, and the whole is the same as in one go."""
     monkeypatch.setattr(study_module, "CHUNK", 5)
@@ -126,6 +128,7 @@ class Fails:
 FAILS = "tests.studies.sweeps.test_trials:Fails"
 
 
+@pytest.mark.slow
 def test_an_observer_that_raises_costs_its_own_trials_alone() -> None:
     """Its neighbours in the batch have the figures, and the ends, of their own runs."""
     tilts = {"plant.initial_tilt_deg": "0,5,0.5,10,1"}

@@ -52,9 +52,19 @@ def recorder(
     ("kind", "chosen", "truth"),
     [
         ("linear", [], {"tau": 0.0337123}),
-        ("homogeneous", ["k1", "k2", "alpha"], {"k1": 33.0123, "k2": 410.123, "alpha": 0.77123}),
-        ("ltv", ["Q[1]"], {"Q": (1.0, 2.34567e5, 1.0)}),
-        ("luenberger", ["L[0][0]", "L[1][0]"], {"L": ((31.0123, 0.0), (320.123, 0.0), (0.0, 20.0))}),
+        pytest.param(
+            "homogeneous",
+            ["k1", "k2", "alpha"],
+            {"k1": 33.0123, "k2": 410.123, "alpha": 0.77123},
+            marks=pytest.mark.slow,
+        ),
+        pytest.param("ltv", ["Q[1]"], {"Q": (1.0, 2.34567e5, 1.0)}, marks=pytest.mark.slow),
+        pytest.param(
+            "luenberger",
+            ["L[0][0]", "L[1][0]"],
+            {"L": ((31.0123, 0.0), (320.123, 0.0), (0.0, 20.0))},
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_planted_parameters_are_found(kind: str, chosen: list[str], truth: dict) -> None:
@@ -109,6 +119,7 @@ def test_an_estimate_of_zero_is_one_number_where_it_is_the_same(zeros: tuple[flo
     assert f"An estimate of zero: {said}." in caption
 
 
+@pytest.mark.slow
 def test_numbers_that_do_not_matter_are_left_alone() -> None:
     recorded = recorder("ltv", lambda *_: {"Q": (1.0, 2.3e5, 1.0)})
     scenario = load_scenario("observer_tuning", observer="ltv")
@@ -118,6 +129,7 @@ def test_numbers_that_do_not_matter_are_left_alone() -> None:
     assert np.array(study.levels[0].parameters["Q"])[2] == 1.0
 
 
+@pytest.mark.slow
 def test_the_noise_at_which_the_given_parameters_are_best() -> None:
     """Planted: the best tau is 0.02 sqrt(noise/300), a straight line on logarithms, so 0.02 is best at 300."""
     recorded = recorder("linear", lambda noise, _: {"tau": 0.02 * math.sqrt(noise / 300.0)})
@@ -134,6 +146,7 @@ def test_the_noise_at_which_the_given_parameters_are_best() -> None:
     assert best_noise(dataclasses.replace(study, levels=study.levels[:1])) == ("not bracketed", None)
 
 
+@pytest.mark.slow
 def test_of_several_numbers_the_level_with_the_least_loss_counts() -> None:
     """Planted: the given epsilon is nearly the best at 200; the gyro's own noise keeps every loss from zero."""
     truths = {100.0: 0.02, 200.0: 0.029, 400.0: 0.04}

@@ -20,6 +20,7 @@ def test_the_window_is_from_the_push_to_a_second_after_it() -> None:
     assert window_of(load_scenario("observer_tuning", ["push=[]"])) == (0.0, 10.0)
 
 
+@pytest.mark.slow
 def test_what_is_between_two_pushes_is_not_scored() -> None:
     """As in a summary: an estimate of zero would do best there."""
     scenario = load_scenario("observer_tuning", ["seed=5", "push=[{start_s=2},{start_s=4}]", "duration_s=6"], "linear")
@@ -31,6 +32,7 @@ def test_what_is_between_two_pushes_is_not_scored() -> None:
     assert recorded.window == pytest.approx((2.0, 5.1))
 
 
+@pytest.mark.slow
 def test_no_observer_takes_part_in_the_loop_of_the_recording() -> None:
     """Whatever the scenario closes its loop on, the motion recorded is the gyro's loop's."""
     gyro = record(load_scenario("observer_tuning", ["seed=5"]), range(3))
@@ -41,6 +43,7 @@ def test_no_observer_takes_part_in_the_loop_of_the_recording() -> None:
     assert tuning_scenario(load_scenario("push_recovery")).controller.feedback == "fog"
 
 
+@pytest.mark.slow
 def test_scores_are_those_of_the_scenario_itself() -> None:
     """The open-loop observers of an ordinary run, summed up by hand, have the errors that the tuning minimises."""
     scenario = load_scenario("observer_tuning", ["seed=5", 'open_loop_observers=["ltv"]', "duration_s=3.2"], "linear")
@@ -54,6 +57,7 @@ def test_scores_are_those_of_the_scenario_itself() -> None:
         np.testing.assert_allclose(recorded.errors(make_observer(name, DT, model)), np.sqrt((off**2).mean(axis=0)))
 
 
+@pytest.mark.slow
 def test_half_a_second_of_warm_up_is_enough_for_the_papers_observers() -> None:
     scenario = load_scenario("observer_tuning", ["seed=6"])
     whole, short = (record(scenario, range(4), warm_up_s=span) for span in (2.0, 0.5))
@@ -75,6 +79,7 @@ def test_noise_is_that_of_the_level() -> None:
     assert 4.0 < spread[1] / spread[0] < 9.0
 
 
+@pytest.mark.slow
 def test_scenarios_that_differ_in_anything_that_is_recorded_have_recordings_of_their_own() -> None:
     changes = ([], ["sensors.encoder.counts_per_revolution=360"], ["controller.rate_limit_rad_s=2"])
     scenarios = [load_scenario("observer_tuning", ["seed=5", "duration_s=3.2", *change]) for change in changes]

@@ -54,6 +54,7 @@ def labels(axes: Any) -> list[str]:
     return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
+@pytest.mark.slow
 def test_eleven_lines_on_one_page(
     all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
 ) -> None:
@@ -123,6 +124,7 @@ def test_a_picture_has_the_observers_colours(tmp_path: Path, figures: list[matpl
     assert [line.get_color() for line in figures[-1].axes[0].lines] == [hexadecimal(colour("ltv")), "C3"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ticks", [0, 1, 2])
 def test_a_run_of_no_length(
     all_observers: tuple[Trajectory, dict[str, Any]],

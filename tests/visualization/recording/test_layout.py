@@ -138,6 +138,7 @@ def test_the_best_open_loop_observers_are_on(all_observers: tuple[Experiment, Ru
         assert not first.grey | second.hidden
 
 
+@pytest.mark.slow
 def test_the_best_runs_are_on(compared: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
     experiment, runs = compared
     found = views(write(tmp_path / "it.rrd", experiment, runs))

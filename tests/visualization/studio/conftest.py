@@ -1,4 +1,4 @@
-"""Studio keeps its windows' layout in the home directory: a test's is a folder of its own."""
+"""Studio keeps its windows' layout in the home directory and in the current one: a test's are a folder of its own."""
 
 from __future__ import annotations
 
@@ -10,4 +10,5 @@ import pytest
 @pytest.fixture(autouse=True)
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -77,6 +77,7 @@ def test_studios_mouse_reaches_the_rig_and_adds_up_with_a_push() -> None:
 # --- observer, law, sensors, bias --------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_every_observer_takes_over_without_a_bump() -> None:
     """In the middle of the push's swing: the command goes on as if nothing had been until the new one has converged."""
     with session("push.0.start_s=0.5") as studio:
@@ -105,6 +106,7 @@ def test_the_scenarios_observer_has_its_parameters_again() -> None:
         assert vars(studio.live.controller.parts[0].observer)["k1"] == 40.0
 
 
+@pytest.mark.slow
 def test_gains_and_feedback() -> None:
     with session() as studio:
         laws = choosable_laws(studio.live.base)
@@ -129,6 +131,7 @@ def test_gains_and_feedback() -> None:
         assert not studio.live.stopped
 
 
+@pytest.mark.slow
 def test_noise_and_bias() -> None:
     with session("push=[]", "plant.initial_tilt_deg=0.0") as studio:
         studio.run(3.0)

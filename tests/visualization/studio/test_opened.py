@@ -62,6 +62,7 @@ def free_port() -> int:
         return found.getsockname()[1]
 
 
+@pytest.mark.slow
 def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
     """In a process of its own: Studio hooks into Python's log, warnings and exceptions for as long as one lasts."""
     with socket.socket() as taken:
@@ -92,6 +93,7 @@ assert not handle.is_running()
 """
 
 
+@pytest.mark.slow
 def test_both_threads_and_nobody_looking() -> None:
     """The viewer in its thread: the simulation keeps the clock's pace, and the viewer ends when it is told."""
     done = subprocess.run(
@@ -100,6 +102,7 @@ def test_both_threads_and_nobody_looking() -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_the_command_listens_on_loopback_alone_and_ends_with_ctrl_c(tmp_path: Path) -> None:
     process = subprocess.Popen(

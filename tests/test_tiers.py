@@ -1,0 +1,160 @@
+"""What holds the tests together: tiers, the limit of processor time, and that nothing is left in the repository."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+from tests import cpu_limit, footprint, tiers
+from tests.command import ROOT, environment
+
+TESTS = {
+    "daily": ["test_a.py::test_quick", "test_a.py::test_case[1]"],
+    "slow": ["test_a.py::test_case[2]", "test_a.py::test_long"],
+    "papers": ["papers/test_b.py::test_claim"],
+}
+FILES = {
+    "test_a": """
+        import pytest
+        def test_quick(): pass
+        @pytest.mark.parametrize("case", [1, pytest.param(2, marks=pytest.mark.slow)])
+        def test_case(case): pass
+        @pytest.mark.slow
+        def test_long(): pass
+        """,
+    "papers/test_b": "def test_claim(): pass",
+}
+
+
+@pytest.fixture
+def toy(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+    """Tests of each tier."""
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
+    monkeypatch.setattr(tiers, "PAPERS", pytester.path / "papers")
+    monkeypatch.setattr(cpu_limit, "IMPORTED_LATE", ())
+    monkeypatch.setattr(footprint, "ROOT", pytester.path)
+    pytester.makeini("[pytest]\nmarkers =\n  daily\n  slow\n  papers\n")
+    pytester.mkpydir("papers")
+    pytester.makepyfile(**FILES)
+    return pytester
+
+
+def passed(toy: pytest.Pytester, *arguments: str) -> list[str]:
+    """Tests that were run."""
+    result = toy.runpytest_inprocess("-p", "tests.tiers", "-v", "-p", "no:cacheprovider", *arguments)
+    return re.findall(r"^(\S+) PASSED", result.stdout.str(), flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("expression", "which"),
+    [
+        ("", ["daily"]),
+        ("not papers", ["daily"]),
+        ("not slow", ["daily"]),
+        ("not papers and not slow", ["daily"]),
+        ("daily", ["daily"]),
+        ("slow", ["slow"]),
+        ("papers", ["papers"]),
+        ("slow or papers", ["slow", "papers"]),
+        ("daily or slow", ["daily", "slow"]),
+        ("slow and not papers", ["slow"]),
+        ("daily or slow or papers", ["daily", "slow", "papers"]),
+    ],
+)
+def test_which_tests_an_expression_runs(toy: pytest.Pytester, expression: str, which: list[str]) -> None:
+    assert sorted(passed(toy, "-m", expression)) == sorted(name for tier in which for name in TESTS[tier])
+
+
+@pytest.mark.parametrize("name", [*TESTS["slow"], *TESTS["papers"]])
+def test_a_test_that_is_named_runs_whatever_its_tier(toy: pytest.Pytester, name: str) -> None:
+    assert passed(toy, name) == [name]
+    assert passed(toy, str(toy.path / name)) == [name]
+
+
+def test_a_file_that_is_named_runs_its_daily_tests(toy: pytest.Pytester) -> None:
+    assert sorted(passed(toy, "test_a.py")) == sorted(TESTS["daily"])
+    assert passed(toy, "papers") == []
+    assert passed(toy, "-m", "papers", "papers") == TESTS["papers"]
+
+
+def test_a_test_of_the_papers_is_not_marked_slow(toy: pytest.Pytester) -> None:
+    toy.makepyfile(**{"papers/test_b": "import pytest\npytestmark = pytest.mark.slow\ndef test_claim(): pass"})
+    result = toy.runpytest_inprocess("-p", "tests.tiers", "-m", "papers")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+
+
+@pytest.mark.slow
+def test_every_test_is_in_one_tier() -> None:
+    def collected(expression: str) -> list[str]:
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", "-n", "0", "--collect-only", "-p", "no:cacheprovider", "-m", expression],
+            cwd=ROOT,
+            env=environment(PYTEST_ADDOPTS=""),
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return [line for line in done.stdout.splitlines() if "::" in line]
+
+    each = {tier: collected(tier) for tier in tiers.TIERS}
+    assert all(each.values())
+    assert sorted(name for names in each.values() for name in names) == sorted(collected("daily or slow or papers"))
+    assert each["daily"] == collected("not papers") == collected("")
+
+
+BURN = "import time\ndef burn():\n    end = time.process_time() + 0.25\n    while time.process_time() < end: pass\n"
+
+
+@pytest.mark.parametrize(
+    ("code", "fails"),
+    [
+        ("def test_it(): pass", False),
+        ("def test_it(): time.sleep(0.25)", False),
+        ("def test_it(): burn()", True),
+        ("@pytest.mark.slow\ndef test_it(): burn()", False),
+        ("@pytest.fixture(scope='module')\ndef made(): burn()\ndef test_it(made): pass", True),
+        ("@pytest.fixture\ndef made():\n    yield\n    burn()\ndef test_it(made): pass", True),
+        (
+            "import subprocess, sys\n"
+            "def test_it(): subprocess.run([sys.executable, '-c', 'sum(range(20_000_000))'], check=True)",
+            True,
+        ),
+    ],
+    ids=["quick", "waiting", "computing", "slow", "set-up", "teardown", "a child"],
+)
+def test_processor_time_is_limited(toy: pytest.Pytester, code: str, fails: bool) -> None:
+    toy.makepyfile(test_c=f"import pytest\n{BURN}{code}\n")
+    result = toy.runpytest_inprocess(
+        "-p", "tests.tiers", "-p", "tests.cpu_limit", "--cpu-limit=0.05", "test_c.py::test_it"
+    )
+    result.assert_outcomes(passed=1, errors=int(fails))
+    assert ("of processor time with its set-up and its children" in result.stdout.str()) == fails
+
+
+def test_a_slow_machine_has_a_higher_limit(toy: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cpu_limit, "slowness", lambda: 20.0)
+    toy.makepyfile(test_c=f"{BURN}def test_it(): burn()\n")
+    toy.runpytest_inprocess(
+        "-p", "tests.tiers", "-p", "tests.cpu_limit", "--cpu-limit=0.05", "test_c.py"
+    ).assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize(
+    ("code", "litter"),
+    [
+        ("Path('left.txt').write_text('')", "left.txt"),
+        ("Path('docs/new').mkdir()", "docs/new"),
+        ("Path('docs/there.txt').write_text('again')", ""),
+        ("(tmp_path / 'own.txt').write_text('')", ""),
+        ("Path('left.txt').write_text(''); Path('left.txt').unlink()", ""),
+    ],
+)
+def test_nothing_is_left_in_the_repository(toy: pytest.Pytester, code: str, litter: str) -> None:
+    toy.mkdir("docs").joinpath("there.txt").write_text("")
+    toy.makepyfile(test_c=f"from pathlib import Path\ndef test_it(tmp_path):\n    {code}\ndef test_next(): pass\n")
+    result = toy.runpytest_inprocess("-p", "tests.footprint", "test_c.py", f"--basetemp={toy.path.parent / 'own'}")
+    result.assert_outcomes(passed=2, errors=int(bool(litter)))
+    assert not litter or f"test_c.py::test_it: {litter} came into the repository" in result.stdout.str()

@@ -1,0 +1,101 @@
+"""Three tiers of tests: daily (unmarked), slow, papers. Every test is in one of them.
+
+Slow tests and those of the papers run when `-m` names their tier, or when the command line names the test itself
+(`file.py::test`). So neither `-m "not papers"` nor a folder brings slow ones back unseen.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import pytest
+from _pytest.mark.structures import ParameterSet
+
+if TYPE_CHECKING:
+    from xdist.remote import Producer
+    from xdist.scheduler import Scheduling
+
+TIERS = ("daily", "slow", "papers")
+PAPERS = Path(__file__).parent / "papers"
+HINT = "daily tier; the others: -m slow, -m papers; everything: -m 'daily or slow or papers'"
+
+
+def named_tiers(expression: str) -> set[str]:
+    """Tiers whose names stand in an expression of `-m`."""
+    return {name for name in re.findall(r"\w+", expression) if name in TIERS}
+
+
+def tier(item: pytest.Item) -> str:
+    """Return the tier of a test.
+
+    Raises:
+        pytest.UsageError: It would be in two.
+    """
+    in_papers = PAPERS in item.path.parents
+    if in_papers and item.get_closest_marker("slow"):
+        raise pytest.UsageError(f"{item.nodeid}: is of the papers, and cannot be slow as well")
+    return "papers" if in_papers else "slow" if item.get_closest_marker("slow") else "daily"
+
+
+def named_tests(config: pytest.Config) -> list[tuple[Path, str]]:
+    """Tests that the command line names: file, and what follows `::`."""
+    splits = (argument.partition("::") for argument in config.args)
+    return [(config.invocation_params.dir / file, name) for file, colons, name in splits if colons]
+
+
+def is_named(item: pytest.Item, tests: list[tuple[Path, str]]) -> bool:
+    """Return whether a test is one of those named, or a case of one."""
+    own = item.nodeid.partition("::")[2]
+    return any(path.resolve() == item.path and own.partition("[")[0] == name.partition("[")[0] for path, name in tests)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave the papers' folder alone where none of its tests can run: it takes a second to import."""
+    asked = "papers" in named_tiers(config.option.markexpr) or any(
+        PAPERS in (path := config.invocation_params.dir / argument.partition("::")[0]).parents or path == PAPERS
+        for argument in config.args
+    )
+    return True if collection_path == PAPERS and not asked else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark each test with its tier, before pytest reads `-m`; drop those whose tier nobody named."""
+    wanted = {"daily", *named_tiers(config.option.markexpr)}
+    tests = named_tests(config)
+    dropped = []
+    for item in items:
+        its_tier = tier(item)
+        item.add_marker(its_tier)
+        if its_tier not in wanted and not is_named(item, tests):
+            dropped.append(item)
+    if dropped:
+        config.hook.pytest_deselected(items=dropped)
+        items[:] = [item for item in items if item not in set(dropped)]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Scheduling | None:
+    """Share slow tests out one by one, and not by files (`--dist loadfile`): a file of theirs can take minutes."""
+    if not named_tiers(config.option.markexpr) & {"slow", "papers"} or config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import WorkStealingScheduling
+
+    return WorkStealingScheduling(config, log)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say that there are other tiers."""
+    if not named_tiers(config.option.markexpr) & {"slow", "papers"}:
+        terminalreporter.write_line(HINT)
+
+
+T = TypeVar("T")
+
+
+def slow_but(cases: Iterable[T], *daily: T) -> list[T | ParameterSet]:
+    """Return cases for `parametrize`, of which all are slow but these."""
+    return [case if case in daily else pytest.param(case, marks=pytest.mark.slow) for case in cases]
