@@ -61,7 +61,7 @@ OBSERVERS = "cmg_mj/observers/"
 MUTATIONS = [
     *(element(f"law: K_e[{i}]", "cmg_mj/controllers/laws/state_feedback.py", "TABLE_2_GAINS = (", i) for i in range(4)),
     Mutation("law: rate limit", "cmg_mj/controllers/laws/state_feedback.py", r"rate_limit: float = " + NUMBER),
-    Mutation("scenario: rate limit", "cmg_mj/scenario/schema.py", r"rate_limit_rad_s: Positive = " + NUMBER),
+    Mutation("scenario: rate limit", "cmg_mj/scenario/schema.py", r"rate_limit_rad_s: Annotated\[.*?\] = " + NUMBER),
     Mutation("linear: tau", OBSERVERS + "linear.py", r"tau: Positive = " + NUMBER),
     *(element(f"ltv: Q[{i}]", OBSERVERS + "ltv.py", "Q: tuple[Positive, Positive, Positive] = (", i) for i in range(3)),
     *(

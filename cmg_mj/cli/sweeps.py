@@ -16,7 +16,8 @@ from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, note, progress, say_written,
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.replay.report import JsonValue
+    from cmg_mj.results.summary_keys import SummaryValue
+    from cmg_mj.studies.sweeps.file import SweepFields
     from cmg_mj.studies.sweeps.plan import Cost
     from cmg_mj.studies.sweeps.report import SweepTables
     from cmg_mj.studies.sweeps.study import SweepStudy
@@ -147,8 +148,9 @@ def _study(
         raise InputError("--sample and --sobol: one of them")
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
     fields = study_file(arguments.name)
+    settings: SweepFields = {}
     if fields is None:
-        scenario, settings = arguments.scenario(), {}
+        scenario = arguments.scenario()
     else:
         scenario = scenario_of(arguments.name, fields, arguments.settings)
         if arguments.seed is not None:
@@ -171,7 +173,7 @@ def _split(setting: str) -> tuple[str, str]:
     return field.strip(), values
 
 
-def _as_json(tables: SweepTables) -> JsonValue:
+def _as_json(tables: SweepTables) -> SummaryValue:
     from cmg_mj.studies.sweeps.cells import cells_of
     from cmg_mj.studies.sweeps.order import order_rows
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, Protocol, TextIO
 
 import click
 
@@ -20,7 +20,6 @@ from cmg_mj.cli.pace import ProgressRate
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from cmg_mj.replay.report import JsonValue
     from cmg_mj.results.run_folder import RunFolder
 
     Handler = Callable[[int, FrameType | None], None] | signal.Handlers
@@ -127,7 +126,7 @@ def say_written(folder: RunFolder, place: Path, open_it: str, as_json: bool) -> 
         click.echo(f"Written to {final_path(folder, place)}. {open_it}", err=True)
 
 
-def show(value: JsonValue, table: RenderableType, as_json: bool) -> None:
+def show(value: Any, table: RenderableType, as_json: bool) -> None:
     """Print a value as JSON, or a table (or text) as wide as the terminal; in full width without a terminal."""
     from rich.console import Console
 

@@ -11,13 +11,15 @@ from cmg_mj.errors import InputError, shown
 
 def require_number(name: str, value: Any) -> float:
     """Refuse a parameter that is not a real number; NaN and infinity pass."""
+    text = shown(value)
     if not isinstance(value, numbers.Real):
-        raise InputError(f"{name} = {shown(value)}: must be a number")
+        raise InputError(f"{name} = {text}: must be a number")
     return float(value)
 
 
 def require_positive(name: str, value: Any) -> float:
     """Refuse a parameter that is not a positive, finite number."""
+    text = shown(value)
     if not (isinstance(value, numbers.Real) and 0.0 < float(value) < math.inf):
-        raise InputError(f"{name} = {shown(value)}: must be a number greater than 0")
+        raise InputError(f"{name} = {text}: must be a number greater than 0")
     return float(value)

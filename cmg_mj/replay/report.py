@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from rich import box
 from rich.console import Group, RenderableType
@@ -17,10 +17,8 @@ from cmg_mj.replay.scores import RECONSTRUCTED_S, Figures
 from cmg_mj.results import markdown
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import known_interval
-from cmg_mj.results.summary_keys import Key
+from cmg_mj.results.summary_keys import Key, SummaryValue
 from cmg_mj.visualization.plots.readability import observers_to_draw
-
-JsonValue: TypeAlias = "float | str | Sequence[JsonValue] | Mapping[str, JsonValue] | None"
 
 FIGURES = {
     "velocity_rms_error_rad_s": Key("RMS error", "rad/s", "{:.4f}"),
@@ -40,9 +38,9 @@ def shown_first(replayed: ReplayResult) -> list[str]:
     return observers_to_draw({name: replayed.summaries[name] for name in replayed.estimates})
 
 
-def replay_figures(replays: Sequence[ReplayResult]) -> dict[str, JsonValue]:
+def replay_figures(replays: Sequence[ReplayResult]) -> dict[str, SummaryValue]:
     """Return the figures that `cmg-mj replay --json` prints."""
-    figures: dict[str, JsonValue] = {"logs": [log_figures(replayed) for replayed in replays]}
+    figures: dict[str, SummaryValue] = {"logs": [log_figures(replayed) for replayed in replays]}
     if len(replays) > 1:
         figures["mean"] = {
             name: {"logs": mean.logs, **{key: figure._asdict() for key, figure in mean.figures.items()}}
@@ -51,7 +49,7 @@ def replay_figures(replays: Sequence[ReplayResult]) -> dict[str, JsonValue]:
     return figures
 
 
-def log_figures(replayed: ReplayResult) -> dict[str, JsonValue]:
+def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
     """Return the figures of one log."""
     log, noise = replayed.log, replayed.noise
     acceleration = {"acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}

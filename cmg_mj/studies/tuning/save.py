@@ -10,17 +10,17 @@ from pathlib import Path
 from rich import box
 from rich.table import Table
 
-from cmg_mj.replay.report import JsonValue
 from cmg_mj.results.intervals import Interval
+from cmg_mj.results.metrics import finite_or_none
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
-from cmg_mj.results.summary_keys import finite
+from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.tuning.on_simulations import windows_of
 from cmg_mj.studies.tuning.parameters import plain
 from cmg_mj.studies.tuning.study import NoiseLevelResult, TuningResult, best_noise, tuned_scenario
 
 
-def figures_of(study: TuningResult) -> dict[str, JsonValue]:
+def figures_of(study: TuningResult) -> dict[str, SummaryValue]:
     """Return the figures that `cmg-mj tune --json` prints."""
     best = best_noise(study)
     return {
@@ -39,19 +39,19 @@ def figures_of(study: TuningResult) -> dict[str, JsonValue]:
     }
 
 
-def level_figures(level: NoiseLevelResult) -> dict[str, JsonValue]:
+def level_figures(level: NoiseLevelResult) -> dict[str, SummaryValue]:
     """Return one level's figures."""
     return {
         "noise_density_ug_rthz": level.noise_ug_rthz,
         "parameters": plain(level.parameters),
         "at_a_limit": list(level.edges),
-        "fit_rms_error_rad_s": finite(level.fit_rms),
-        "fit_given_rms_error_rad_s": finite(level.fit_given_rms),
+        "fit_rms_error_rad_s": finite_or_none(level.fit_rms),
+        "fit_given_rms_error_rad_s": finite_or_none(level.fit_given_rms),
         "held_out_worlds": len(level.rms),
-        "held_out_rms_error_rad_s": finite(float(level.rms.mean())),
-        "held_out_given_rms_error_rad_s": finite(float(level.given_rms.mean())),
-        "held_out_fit": finite(level.fit),
-        "held_out_given_fit": finite(level.given_fit),
+        "held_out_rms_error_rad_s": finite_or_none(float(level.rms.mean())),
+        "held_out_given_rms_error_rad_s": finite_or_none(float(level.given_rms.mean())),
+        "held_out_fit": finite_or_none(level.fit),
+        "held_out_given_fit": finite_or_none(level.given_fit),
         "held_out_ratio": _interval(level.ratio),
         "verdict": level.verdict,
         "zero_estimate_rms_error_rad_s": level.zero_rms,
@@ -61,7 +61,7 @@ def level_figures(level: NoiseLevelResult) -> dict[str, JsonValue]:
 
 
 def _interval(interval: Interval) -> list[float | None]:
-    return [finite(value) for value in interval]
+    return [finite_or_none(value) for value in interval]
 
 
 def tuning_table(study: TuningResult) -> Table:

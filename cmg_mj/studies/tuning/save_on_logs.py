@@ -11,8 +11,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from cmg_mj.replay.report import JsonValue
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
+from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.studies.tuning.on_logs import SHORTEST_S, LogStudy
 from cmg_mj.studies.tuning.parameters import plain
 from cmg_mj.studies.tuning.save import level_figures, ratio_text
@@ -20,7 +20,7 @@ from cmg_mj.studies.tuning.save import level_figures, ratio_text
 FILES = ("tuned.json",)
 
 
-def figures_of_logs(study: LogStudy) -> dict[str, JsonValue]:
+def figures_of_logs(study: LogStudy) -> dict[str, SummaryValue]:
     """Return the figures that `cmg-mj tune-log --json` prints."""
     level = level_figures(study.level)
     only_of_scenarios = ("noise_density_ug_rthz", "worlds_that_fell", "held_out_worlds")
