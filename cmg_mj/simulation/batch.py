@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Unpack
+from typing import Any, Literal, NamedTuple, TypedDict
+
+import numpy as np
 
 from cmg_mj.controllers.laws import Law, law_class
 from cmg_mj.controllers.laws.registry import OF_LAWS
-from cmg_mj.controllers.make_controller import AnyController
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.field_types import Batched, NoEffect
 from cmg_mj.inputs.marks import marked_fields
-from cmg_mj.observers import Observer
 from cmg_mj.observers.registry import takes_noise
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.result import Result
+from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.batch_values import batch_values
-from cmg_mj.simulation.simulate import SimulationOptions
-
-if TYPE_CHECKING:
-    from cmg_mj.simulation.experiment import Experiment
 
 BATCHED_FIELDS = marked_fields(Scenario, Batched)
 """Fields that worlds of one batch may differ in. Every other decides what is computed, or when."""
@@ -95,19 +92,26 @@ class PlantOptions(TypedDict):
     axis: int
 
 
-def batch_key(experiment: Experiment) -> BatchKey:
-    """Find what worlds of an experiment have in common with all that may run with them, of every axis."""
-    if not experiment.axes:
-        return BatchKey(tuple(_key_parts(experiment, "")))
-    return BatchKey(tuple(part for own in experiment.axes for part in _key_parts(own, own.plant.axis.name)))
+class AxisPart(NamedTuple):
+    """An axis of an experiment."""
+
+    scenario: Scenario
+    design: Design
+    axis: str
+    """Its name; empty on a plant of one axis."""
 
 
-def _key_parts(experiment: Experiment, axis: str) -> Iterator[tuple[KeyPart, Hashable]]:
-    scenario, law = experiment.scenario, experiment.scenario.controller.kind
+def batch_key(parts: Sequence[AxisPart]) -> BatchKey:
+    """Find what worlds of an experiment, given by its axes, have in common with all that may run with them."""
+    return BatchKey(tuple(part for axis_part in parts for part in _key_parts(*axis_part)))
+
+
+def _key_parts(scenario: Scenario, design: Design, axis: str) -> Iterator[tuple[KeyPart, Hashable]]:
+    law = scenario.controller.kind
     for field, value in _leaves(scenario.as_fields()):
         if field.partition(".")[0] not in UNUSED and not can_vary_in_batch(field, law):
             yield KeyPart("field", field, axis), hashable(value)
-    _, model, noise = experiment.design.given
+    _, model, noise = design.given
     yield KeyPart("reduced model", axis=axis), model
     for observer in (scenario.observer.kind, *scenario.open_loop_names()):
         if takes_noise(observer):
@@ -143,58 +147,29 @@ def can_vary_in_batch(field: str, law: str) -> bool:
     return mark is not None and (mark.law_field is None or mark.law_field in getattr(law_class(law), "arrays", ()))
 
 
+def varied_settings(vary: Mapping[str, Sequence[Any] | np.ndarray], scenario: Scenario) -> list[dict[str, Any]]:
+    """Read the settings of each world: see `Experiment.with_varied`.
+
+    Raises:
+        InputError: There is no such field, or the lists differ in length.
+    """
+    lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in vary.values()]
+    if not lists or any(isinstance(values, str) or not isinstance(values, Sequence) for values in lists):
+        raise InputError('vary: must be lists of values by field, such as {"equilibrium_bias_deg": [0.0, 0.5]}')
+    if len({len(values) for values in lists}) > 1:
+        raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world")
+    of_plant = {field.name for field in dataclasses.fields(scenario.plant)}
+    for name in vary:
+        if "." not in name and name not in of_plant and name not in Scenario.model_fields:
+            raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, of_plant)}")
+    names = [f"plant.{name}" if name in of_plant else name for name in vary]
+    return [dict(zip(names, row, strict=True)) for row in zip(*lists, strict=True)]
+
+
 def plant_structure(plant: Plant) -> PlantStructure:
     """Find what a plant has in common with all that may run with it."""
     options = plant.model.opt
     return PlantStructure(options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds)
-
-
-def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:
-    """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
-
-    Args:
-        experiments: One a world.
-        worlds: The worlds' numbers: world i has the same noise in every experiment.
-        **options: Options of `simulate`.
-
-    Returns:
-        The result of all worlds, each as if it had run alone, bit for bit.
-
-    Raises:
-        InputError: They differ in something that worlds of one batch have in common.
-    """
-    require_same_structure([experiment.plant for experiment in experiments], len(worlds))
-    first, *others = once(experiments)
-    key = batch_key(first)
-    for other in others:
-        part = key.first_difference(batch_key(other))
-        if part:
-            raise InputError(f"run_many: {part} differs, which worlds of one batch must have in common")
-    plants, controller, pushes = batch_inputs(experiments, worlds)
-    return first.simulate(plants, controller, pushes, **options)
-
-
-def batch_inputs(
-    experiments: Sequence[Experiment], worlds: Sequence[int], observer: Observer | None = None
-) -> tuple[list[Plant], AnyController, Sequence[Push]]:
-    """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, the pushes of all worlds.
-
-    Args:
-        experiments: One a world.
-        worlds: The worlds' numbers.
-        observer: The observer of all worlds instead of the first experiment's.
-    """
-    plants = [experiment.plant for experiment in experiments]
-    first = experiments[0]
-    controllers, pushes = [], ()
-    for i, own in enumerate(first.parts):
-        parts = [experiment.parts[i] for experiment in experiments]
-        law, sensors, pushes = _batched(
-            [(part.design.fresh_law(), part.scenario.sensors, tuple(part.scenario.push)) for part in parts]
-        )
-        options = plant_options(plants, i)
-        controllers.append(own.axis_controller(worlds, observer=observer, law=law, sensors=sensors, **options))
-    return plants, first.of_axes(controllers), pushes
 
 
 def plant_options(plants: Sequence[Plant], axis: int) -> PlantOptions:
@@ -214,12 +189,7 @@ def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant:
         )
 
 
-def once(experiments: Sequence[Experiment]) -> list[Experiment]:
-    """Each of some experiments once."""
-    return list({id(experiment): experiment for experiment in experiments}.values())
-
-
-def _batched(
+def batched(
     worlds: Sequence[tuple[Law, Sensors, tuple[Push, ...]]],
 ) -> tuple[Law, Sensors, tuple[Push, ...]]:
     """Law, sensors and pushes of many worlds as one, with arrays (n_worlds,) where they differ."""

@@ -15,8 +15,8 @@ from cmg_mj.observers import Estimate, Measurement, Observer
 from cmg_mj.observers.protocol import State, extra_signals
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.batch import BatchKey, PlantStructure, batch_inputs, batch_key, once, plant_structure, run_batch
-from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.simulation.batch import BatchKey, PlantStructure, plant_structure
+from cmg_mj.simulation.experiment import Experiment, batch_inputs, once, run_batch
 from cmg_mj.simulation.simulate import SimulationOptions
 
 MOST_WORLDS = 1024
@@ -131,9 +131,9 @@ class SharedKey(NamedTuple):
 def _shared_key(job: BatchJob) -> SharedKey | None:
     """What jobs of one batch have in common; None for one that has to be by itself."""
     first = job.experiments[0]
-    if first.axes or first.scenario.open_loop_names() or len(set(map(batch_key, once(job.experiments)))) > 1:
+    if first.axes or first.scenario.open_loop_names() or len({one.batch_key for one in once(job.experiments)}) > 1:
         return None
-    key = batch_key(first).without_observer()
+    key = first.batch_key.without_observer()
     return SharedKey(key, plant_structure(first.plant), extra_signals(first.design.observer()))
 
 
@@ -141,7 +141,7 @@ def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[
     """Results of jobs in one batch."""
     parts = []
     # Neighbours with the same observer, with the same noise, are one part.
-    for _, group in groupby(jobs, key=lambda job: batch_key(job.experiments[0])):
+    for _, group in groupby(jobs, key=lambda job: job.experiments[0].batch_key):
         alike = list(group)
         parts.append((alike[0].experiments[0].design.observer(), sum(len(job.worlds) for job in alike)))
     experiments = [experiment for job in jobs for experiment in job.experiments]

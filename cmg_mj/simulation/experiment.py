@@ -16,7 +16,7 @@ from cmg_mj.controllers.laws import Law
 from cmg_mj.controllers.make_controller import AnyController, join_axes
 from cmg_mj.controllers.processor import Processor
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant
@@ -31,7 +31,16 @@ from cmg_mj.scenario.stability_check import hints
 from cmg_mj.scenario.time_grid import time_grid
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
-from cmg_mj.simulation.batch import hashable, plant_options, require_same_structure, run_batch
+from cmg_mj.simulation.batch import (
+    AxisPart,
+    BatchKey,
+    batch_key,
+    batched,
+    hashable,
+    plant_options,
+    require_same_structure,
+    varied_settings,
+)
 from cmg_mj.simulation.prepare import check_axes, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
 
@@ -184,6 +193,13 @@ class Experiment:
         return self.simulate(plants, self.of_axes(controllers), **options)
 
     @property
+    def batch_key(self) -> BatchKey:
+        """What its worlds have in common with all that may run with them."""
+        return batch_key(
+            [AxisPart(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
+        )
+
+    @property
     def parts(self) -> tuple[Experiment, ...]:
         """One an axis."""
         return self.axes or (self,)
@@ -200,19 +216,10 @@ class Experiment:
         Raises:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
-        lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in vary.values()]
-        if not lists or any(isinstance(values, str) or not isinstance(values, Sequence) for values in lists):
-            raise InputError('vary: must be lists of values by field, such as {"equilibrium_bias_deg": [0.0, 0.5]}')
-        if len({len(values) for values in lists}) > 1:
-            raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world")
-        of_plant = {field.name for field in dataclasses.fields(self.scenario.plant)}
-        for name in vary:
-            if "." not in name and name not in of_plant and name not in Scenario.model_fields:
-                raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, of_plant)}")
-        names = [f"plant.{name}" if name in of_plant else name for name in vary]
-        rows = {hashable(row): row for row in zip(*lists, strict=True)}
-        experiments = {key: self.with_settings(dict(zip(names, row, strict=True))) for key, row in rows.items()}
-        return [experiments[hashable(row)] for row in zip(*lists, strict=True)]
+        rows = varied_settings(vary, self.scenario)
+        keys = [hashable(row) for row in rows]
+        experiments = {key: self.with_settings(row) for key, row in dict(zip(keys, rows, strict=True)).items()}
+        return [experiments[key] for key in keys]
 
     def with_settings(self, values: Mapping[str, Any]) -> Experiment:
         """The same with other values of some fields.
@@ -356,3 +363,56 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
     parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
     axes = tuple(Experiment(own, rig, design(own, rig.parameters)) for own, rig in parts)
     return Experiment(scenario, plant, axes[0].design, axes)
+
+
+def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:
+    """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
+
+    Args:
+        experiments: One a world.
+        worlds: The worlds' numbers: world i has the same noise in every experiment.
+        **options: Options of `simulate`.
+
+    Returns:
+        The result of all worlds, each as if it had run alone, bit for bit.
+
+    Raises:
+        InputError: They differ in something that worlds of one batch have in common.
+    """
+    require_same_structure([experiment.plant for experiment in experiments], len(worlds))
+    first, *others = once(experiments)
+    key = first.batch_key
+    for other in others:
+        part = key.first_difference(other.batch_key)
+        if part:
+            raise InputError(f"run_many: {part} differs, which worlds of one batch must have in common")
+    plants, controller, pushes = batch_inputs(experiments, worlds)
+    return first.simulate(plants, controller, pushes, **options)
+
+
+def batch_inputs(
+    experiments: Sequence[Experiment], worlds: Sequence[int], observer: Observer | None = None
+) -> tuple[list[Plant], AnyController, Sequence[Push]]:
+    """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, the pushes of all worlds.
+
+    Args:
+        experiments: One a world.
+        worlds: The worlds' numbers.
+        observer: The observer of all worlds instead of the first experiment's.
+    """
+    plants = [experiment.plant for experiment in experiments]
+    first = experiments[0]
+    controllers, pushes = [], ()
+    for i, part in enumerate(first.parts):
+        parts = [experiment.parts[i] for experiment in experiments]
+        law, sensors, pushes = batched(
+            [(one.design.fresh_law(), one.scenario.sensors, tuple(one.scenario.push)) for one in parts]
+        )
+        options = plant_options(plants, i)
+        controllers.append(part.axis_controller(worlds, observer=observer, law=law, sensors=sensors, **options))
+    return plants, first.of_axes(controllers), pushes
+
+
+def once(experiments: Sequence[Experiment]) -> list[Experiment]:
+    """Each of some experiments once."""
+    return list({id(experiment): experiment for experiment in experiments}.values())

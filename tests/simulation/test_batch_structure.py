@@ -12,9 +12,9 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.simulation.batch import BATCHED_FIELDS, run_batch
+from cmg_mj.simulation.batch import BATCHED_FIELDS
 from cmg_mj.simulation.batch_values import batch_values, value_of_world
-from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 
 N = 6
 

@@ -9,9 +9,8 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation import batched_observers as side_by_side
-from cmg_mj.simulation.batch import run_batch
 from cmg_mj.simulation.batched_observers import BatchJob, run_of, run_side_by_side
-from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 
 
 def experiment(observer: str, *more: str) -> Experiment:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from cmg_mj.errors import InputError, raised
 from cmg_mj.results.per_world_table import ID_COLUMNS
 from cmg_mj.results.summary_keys import Summary
-from cmg_mj.simulation.batch import BatchKey, PlantStructure, batch_key, plant_structure, run_batch
-from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.simulation.batch import BatchKey, PlantStructure, plant_structure
+from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.studies.sweeps.points import Point, Points
 from cmg_mj.studies.sweeps.study import Chunk, SweepStudy
 
@@ -154,7 +154,7 @@ def _monotonic_progress(tick: Callable[[float], None]) -> Callable[[float], None
 
 def _batch_of(experiment: Experiment) -> BatchId:
     """Make a key: worlds with the same one can run in one batch."""
-    return batch_key(experiment), plant_structure(experiment.plant)
+    return experiment.batch_key, plant_structure(experiment.plant)
 
 
 def _identity(study: SweepStudy, chunk: Chunk, world: int) -> Summary:

@@ -16,8 +16,7 @@ from cmg_mj.observers import Estimate, Measurement
 from cmg_mj.results.per_world_table import ID_COLUMNS
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.batch import run_batch
-from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.simulation.simulate import SimulationOptions
 from cmg_mj.studies.sweeps import chunk as work
 from cmg_mj.studies.sweeps import study as study_module
