@@ -97,7 +97,7 @@ class Controller:
         worlds: The number of one world, on floats, or the numbers of many, on arrays.
         feedback: Which rate the law uses: the observer's, the gyro's or the true one.
         angle_source: Whether the law uses y1, y2 as (8) says or the estimates, as the text after (10) says.
-        open_loop_observers: Observers that ride along open loop, by name.
+        open_loop_observers: Observers that run open loop, by name.
         bias_trim_s: For so long from the start, the integrator is held at k_e1/k_e4 e, the value that the observer's
             bias estimate asks for, instead of finding it by integration [s].
         axis: The number of the rig's axis, on which the noise depends.
@@ -172,7 +172,7 @@ class Controller:
         self.step: int | None = None
         """The physics step of the last update."""
         self.steps_per_sample = math.gcd(self.period, *(sensor.steps_per_sample for sensor in self._sampled))
-        """Physics steps between the moments at which anything may be due."""
+        """Physics steps between the instants at which anything may be due."""
 
     def swap_components(
         self,

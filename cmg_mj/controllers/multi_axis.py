@@ -81,7 +81,7 @@ class MultiAxisController:
         self._gyro = gyro or first.sensors.mems_gyro
         self.seed, self.worlds = first.seed, first.worlds
         self.steps_per_sample = math.gcd(*(part.steps_per_sample for part in self.parts))
-        """Physics steps between the moments at which anything may be due."""
+        """Physics steps between the instants at which anything may be due."""
         self._coupling = None if coupling is None else [coefficients.tolist() for coefficients in coupling]
         for part in self.parts:
             part.turns_gimbals = coupling is None

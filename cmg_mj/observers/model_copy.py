@@ -91,7 +91,7 @@ def follow(
         begin: f2 at the beginning of the step.
         middle: In its middle.
         end: At its end.
-        gains: What the correction takes besides e, at these three moments.
+        gains: What the correction takes besides e, at these three instants.
 
     Returns:
         x1 and x2 at the end.

@@ -55,7 +55,7 @@ class SampledSensor(Generic[Reading]):
         measure: What it makes of an ideal reading and a sample's normals: `sensor.make_reading_function()`.
 
     Attributes:
-        steps_per_sample: Physics steps between the moments at which it may be due.
+        steps_per_sample: Physics steps between the instants at which it may be due.
     """
 
     _newest: Reading

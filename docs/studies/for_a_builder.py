@@ -74,7 +74,7 @@ def main() -> None:
     asked = {"mems_gyro": "a gyro"}
     rows += [[f"`{name}`", *errors(results[best], name), "-", "-", "-", asked.get(name, "-")] for name in REFERENCES]
     headings = ["observer", "error [rad/s]", "in push window", "fell", "stands at e [deg]", "instructions", "needs"]
-    print(f"{worlds} worlds; the last rows ride along in the loop of {best}\n")
+    print(f"{worlds} worlds; the last rows are open loop, in the loop of {best}\n")
     print(markdown.table(headings, rows))
 
 

@@ -1,4 +1,4 @@
-"""What the acceptance tests run: observers in the loop, and all of them riding along on the gyro's."""
+"""What the acceptance tests run: observers in the loop, and all of them in open loop on the gyro's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fig. 4 of aranovskiy2020: the three observers riding along open loop while the gyro closes the loop."""
+"""Fig. 4 of aranovskiy2020: the three observers in open loop while the gyro closes the loop."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Riding(NamedTuple):
 
 
 def riding_along(worlds: int, seed: int) -> Riding:
-    """Run the tuning experiment with the three observers riding along."""
+    """Run the tuning experiment with the three observers in open loop."""
     scenario = load_scenario(
         "observer_tuning", [f"seed={seed}", 'open_loop_observers=["ltv", "homogeneous"]'], "linear"
     )

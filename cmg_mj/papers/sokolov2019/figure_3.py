@@ -1,4 +1,4 @@
-"""Fig. 3: the law fed by the gyro, the estimators riding along, a push at 1 s; and what Section V says of (9) there."""
+"""Fig. 3: the law fed by the gyro, the estimators in open loop, a push at 1 s; and what Section V says of (9) there."""
 
 from __future__ import annotations
 
