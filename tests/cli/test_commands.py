@@ -305,7 +305,7 @@ def test_bench(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 def test_bench_of_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.studies.sweeps.cost.DURATION_S", 3.0)
-    monkeypatch.setattr("cmg_mj.studies.sweeps.cost.RIGS", {"plant.equilibrium_bias_deg": "-0.5:0.5"})
+    monkeypatch.setattr("cmg_mj.studies.sweeps.cost.PLANTS", {"plant.equilibrium_bias_deg": "-0.5:0.5"})
     said = cmg_mj("bench", "sweep", "--observers", "linear", "--worlds", 8, "--json")
     assert (said.status, said.err) == (0, "")
     one, many = json.loads(said.out)["figures"]

@@ -144,7 +144,7 @@ def test_while_files_are_written_lets_them_be_finished() -> None:
     write("duration_s = 0.2")
     done = run_python(WRITING.format(times=1))
     assert done.returncode == 130, done
-    assert done.stderr.splitlines()[-1] == "cmg-mj: interrupted when all was done; it is in it"
+    assert done.stderr.splitlines()[-1] == "cmg-mj: interrupted at the end; the complete run is in it"
     assert_whole("it")
 
 
