@@ -23,7 +23,7 @@ class YawCoupling(NamedTuple):
     """By how much the axes of a rig that turns at w couple, (n_axes, n_axes) each, zero on the diagonals.
 
     In a frame that turns at w about the vertical z, with n_i along axis i, two momenta of axis j are swept round. That
-    of its wheels, its gimbals at x3_j, is s_j sin(x3_j), where s_j = sum over its cubes of direction (gimbal axis x
+    of its wheels, its gimbals at x3_j, is s_j sin(x3_j), where s_j = sum over its modules of direction (gimbal axis x
     momentum at x3 = 0); it changes by
 
         s_j cos(x3_j) u_j + w (z x s_j) sin(x3_j),

@@ -1,4 +1,4 @@
-"""One axis of a rig: its line, its cubes and sensors by address, and the reduced model read off about that line."""
+"""One axis of a rig: its line, its modules and sensors by address, and the reduced model read off about that line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from cmg_mj.elementwise import Scalar
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.effective_inertia import at_keyframe, inertia_about
-from cmg_mj.plant.parts import TILT_ELEMENT, Cube
+from cmg_mj.plant.parts import TILT_ELEMENT, Module
 from cmg_mj.plant.tilt_line import Addressed, Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.ideal import IdealReading
@@ -35,7 +35,7 @@ class Axis:
         frame: The body that carries its sensors.
         point: A point of the line, in the frame's axes [m].
         direction: Unit vector along the line, in the frame's axes, (3,).
-        cubes: Addresses of its modules.
+        modules: Addresses of its modules.
         reduced: The reduced model.
         radial_tilt: The tilt estimate for its accelerometers.
         forces: Addresses in sensordata of inner x, inner z, outer x, outer z.
@@ -50,7 +50,7 @@ class Axis:
     frame: int
     point: np.ndarray
     direction: np.ndarray
-    cubes: tuple[Cube, ...]
+    modules: tuple[Module, ...]
     reduced: ReducedModel
     radial_tilt: RadialTilt
     forces: list[int]
@@ -67,12 +67,12 @@ class Axis:
     @cached_property
     def servos(self) -> list[int]:
         """The gimbal servos' controls."""
-        return [cube.servo for cube in self.cubes]
+        return [module.servo for module in self.modules]
 
     @cached_property
     def directions(self) -> list[float]:
         """For each gimbal the sign of u that it is given."""
-        return [cube.direction for cube in self.cubes]
+        return [module.direction for module in self.modules]
 
     @cached_property
     def _forces_of(self) -> Callable[[list[float]], Sequence[float]]:
@@ -86,8 +86,8 @@ class Axis:
     @cached_property
     def _gimbals(self) -> list[tuple[int, float, float]]:
         """Of each gimbal its address, its share of x3 and where it is zero."""
-        n = len(self.cubes)
-        return [(cube.gimbal, cube.direction / n, cube.gimbal_zero) for cube in self.cubes]
+        n = len(self.modules)
+        return [(module.gimbal, module.direction / n, module.gimbal_zero) for module in self.modules]
 
     def ideal(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> IdealReading:
         """What perfect sensors show.
@@ -163,22 +163,22 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
         frame,
         point.copy(),
         direction.copy(),
-        tuple(_cube(model, key, line, cube) for cube in modules),
+        tuple(_find_module(model, key, line, module) for module in modules),
         ReducedModel(1.0, 0.0, 1.0, 1.0, 1.0),
         RadialTilt(*radii),
         [address + along for address in addresses for along in (0, 2)],
-        [int(model.sensor_adr[_id(model, "sensor", f"{cube}/gimbal_encoder")]) for cube in modules],
+        [int(model.sensor_adr[_id(model, "sensor", f"{module}/gimbal_encoder")]) for module in modules],
         int(model.sensor_adr[_id(model, "sensor", f"{prefix}fog")]) + 1,  # its y axis
     )
     return replace(axis, reduced=read_reduced(model, key, axis))
 
 
-def held_cubes(model: mujoco.MjModel, key: int, modules: Sequence[str]) -> tuple[Cube, ...]:
+def find_locked_modules(model: mujoco.MjModel, key: int, modules: Sequence[str]) -> tuple[Module, ...]:
     """Resolve the names of modules of a locked axis, whose gimbals get no share of u."""
-    return tuple(_cube(model, key, None, module) for module in modules)
+    return tuple(_find_module(model, key, None, module) for module in modules)
 
 
-def _cube(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Cube:
+def _find_module(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Module:
     gimbal, flywheel = (_id(model, "joint", f"{name}/{joint}") for joint in ("gimbal", "flywheel"))
     servo, motor = (_id(model, "actuator", f"{name}/{drive}") for drive in ("gimbal_servo", "flywheel_motor"))
     angle, spin = int(model.jnt_qposadr[gimbal]), int(model.jnt_dofadr[flywheel])
@@ -190,11 +190,11 @@ def _cube(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Cube
         inertia = inertia_about(model, key, line, {angle: zero - QUARTER_TURN})
         direction = math.copysign(1.0, inertia.coupling_row[spin] * speed)
     addresses = angle, int(model.jnt_dofadr[gimbal]), int(model.jnt_qposadr[flywheel]), spin
-    return Cube(name, *addresses, servo, motor, direction, zero, speed)
+    return Module(name, *addresses, servo, motor, direction, zero, speed)
 
 
 def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
-    """Read J1, J2, J_d, omega_d and m g l/sqrt(2) off the model's inertia and gravity, a share per cube.
+    """Read J1, J2, J_d, omega_d and m g l/sqrt(2) off the model's inertia and gravity, a share per module.
 
     Args:
         model: The compiled model, as its file has it but for the flywheels' speed.
@@ -204,14 +204,16 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     Returns:
         The reduced model.
     """
-    n = len(axis.cubes)
+    n = len(axis.modules)
     line = axis.line
     upright = inertia_about(model, key, line, {})
-    turned = inertia_about(model, key, line, {c.gimbal: c.gimbal_zero - c.direction * QUARTER_TURN for c in axis.cubes})
+    turned = inertia_about(
+        model, key, line, {c.gimbal: c.gimbal_zero - c.direction * QUARTER_TURN for c in axis.modules}
+    )
     J1 = upright.tilt_inertia / n
     J2 = turned.tilt_inertia / n - J1
-    J_d = sum(abs(turned.coupling_row[c.flywheel_dof]) for c in axis.cubes) / n
-    momentum = sum(turned.coupling_row[c.flywheel_dof] * c.speed for c in axis.cubes)
+    J_d = sum(abs(turned.coupling_row[c.flywheel_dof]) for c in axis.modules) / n
+    momentum = sum(turned.coupling_row[c.flywheel_dof] * c.speed for c in axis.modules)
     data = at_keyframe(model, key)
     data.qvel[:] = 0.0
     line.tilt(data, QUARTER_TURN)

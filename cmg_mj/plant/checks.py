@@ -83,7 +83,7 @@ class RigChecker:
         if _id(model, "joint", "yaw") >= 0:
             self._momentum([module for modules in complete.values() for module in modules])
 
-    def _axis(self, name: str, cubes: Sequence[str]) -> Iterator[str]:
+    def _axis(self, name: str, modules: Sequence[str]) -> Iterator[str]:
         """All of one axis."""
         model, data = self.model, self.data
         self.prefix = f"{name}/" if name else ""
@@ -108,14 +108,14 @@ class RigChecker:
             return
         self.line = np.array([0.0, 0.0, 1.0])
         yield from self._upright()
-        for cube in cubes:
-            yield from self._cube(cube)
+        for module in modules:
+            yield from self._module(module)
         yield from self._sensors()
 
-    def _addresses(self, cube: str) -> tuple[int, int, int, int]:
+    def _addresses(self, module: str) -> tuple[int, int, int, int]:
         """Of gimbal, flywheel, servo and motor; negative for one that is missing."""
-        gimbal, flywheel = (_id(self.model, "joint", f"{cube}/{name}") for name in ("gimbal", "flywheel"))
-        servo, motor = (_id(self.model, "actuator", f"{cube}/{name}") for name in ("gimbal_servo", "flywheel_motor"))
+        gimbal, flywheel = (_id(self.model, "joint", f"{module}/{name}") for name in ("gimbal", "flywheel"))
+        servo, motor = (_id(self.model, "actuator", f"{module}/{name}") for name in ("gimbal_servo", "flywheel_motor"))
         return gimbal, flywheel, servo, motor
 
     def _upright(self) -> Iterator[str]:
@@ -138,17 +138,17 @@ class RigChecker:
                 f"leans by {math.degrees(lean):.3g} deg{cure}"
             )
 
-    def _cube(self, cube: str) -> Iterator[str]:
+    def _module(self, module: str) -> Iterator[str]:
         """Its axes are at right angles, its flywheel turns, its servo holds where it stands."""
         model, data = self.model, self.data
-        gimbal, flywheel, servo, motor = self._addresses(cube)
+        gimbal, flywheel, servo, motor = self._addresses(module)
         turns, spins = data.xaxis[gimbal], data.xaxis[flywheel]
         angle = float(data.qpos[model.jnt_qposadr[gimbal]])
         at_keyframe = f"at the keyframe {EQUILIBRIUM_KEY!r}"
         if not (_is_square(turns, self.axis) and _is_square(spins, turns)):
             yield (
-                f"the axes of '{cube}/gimbal' and the tilt, and of '{cube}/flywheel' and its gimbal, must be at right "
-                "angles"
+                f"the axes of '{module}/gimbal' and the tilt, and of '{module}/flywheel' and its gimbal, must be at "
+                "right angles"
             )
         else:
             # Both lie in the plane that the gimbal turns in: by how much it must turn to part them by a quarter turn.
@@ -156,23 +156,23 @@ class RigChecker:
             off = apart - math.copysign(math.pi / 2.0, apart)
             if abs(math.degrees(off)) > TRUE_DEG:
                 yield (
-                    f"{at_keyframe} the axis of '{cube}/flywheel' must be at right angles to the tilt's; it is "
-                    f"{abs(math.degrees(off)):.3g} deg off ('{cube}/gimbal' = {angle + off:.6g} would be "
+                    f"{at_keyframe} the axis of '{module}/flywheel' must be at right angles to the tilt's; it is "
+                    f"{abs(math.degrees(off)):.3g} deg off ('{module}/gimbal' = {angle + off:.6g} would be "
                     "right)"
                 )
         speed, start = float(data.ctrl[motor]), float(data.qvel[model.jnt_dofadr[flywheel]])
         if speed == 0.0:
-            yield f"keyframe {EQUILIBRIUM_KEY!r} must give '{cube}/flywheel_motor' a speed (in ctrl)"
+            yield f"keyframe {EQUILIBRIUM_KEY!r} must give '{module}/flywheel_motor' a speed (in ctrl)"
         elif abs(start - speed) > 0.01 * abs(speed):
             yield (
-                f"keyframe {EQUILIBRIUM_KEY!r} must start '{cube}/flywheel' at its motor's speed: qvel says {start:g}, "
-                f"ctrl {speed:g}"
+                f"keyframe {EQUILIBRIUM_KEY!r} must start '{module}/flywheel' at its motor's speed: qvel says "
+                f"{start:g}, ctrl {speed:g}"
             )
         if model.actuator_dyntype[servo] == mujoco.mjtDyn.mjDYN_INTEGRATOR:
             setpoint = float(data.act[model.actuator_actadr[servo]])
             if abs(math.degrees(setpoint - angle)) > TRUE_DEG:
                 yield (
-                    f"keyframe {EQUILIBRIUM_KEY!r} must have the setpoint (act) of '{cube}/gimbal_servo' where its "
+                    f"keyframe {EQUILIBRIUM_KEY!r} must have the setpoint (act) of '{module}/gimbal_servo' where its "
                     f"gimbal stands: {angle:.6g}, not {setpoint:.6g}"
                 )
 
@@ -228,12 +228,12 @@ class RigChecker:
             names = [self.prefix + name for name in SENSORS]
             yield f"{names[1]} must lie farther from the tilt axis than {names[0]}"
 
-    def _momentum(self, cubes: list[str]) -> None:
+    def _momentum(self, modules: list[str]) -> None:
         """On a free thrust bearing the flywheels' momenta must cancel, or the rig turns with every tilt."""
         model, data = self.model, self.data
         momenta = []
-        for cube in cubes:
-            _, flywheel, _, _ = self._addresses(cube)
+        for module in modules:
+            _, flywheel, _, _ = self._addresses(module)
             body = int(model.jnt_bodyid[flywheel])
             shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[flywheel]  # of the principal inertias
             momenta.append(

@@ -10,7 +10,7 @@ import numpy as np
 from cmg_mj.controllers.multi_axis import YawCoupling
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.effective_inertia import at_keyframe
-from cmg_mj.plant.parts import Cube
+from cmg_mj.plant.parts import Module
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -28,7 +28,7 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCouplin
     """
     data = at_keyframe(model, key)
     along = [data.xmat[axis.frame].reshape(3, 3) @ axis.direction for axis in axes]
-    swept = [sum((_turned(model, data, cube) for cube in axis.cubes), np.zeros(3)) for axis in axes]
+    swept = [sum((_turned(model, data, module) for module in axis.modules), np.zeros(3)) for axis in axes]
     pushes = [float(n @ own) for n, own in zip(along, swept, strict=True)]
     rows = [(n, own, _inertia(model, data, axis)) for n, own, axis in zip(along, pushes, axes, strict=True)]
     wheels = [[-float(n @ np.cross(UP, s)) / own for s in swept] for n, own, _ in rows]
@@ -40,13 +40,13 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCouplin
     return YawCoupling(np.array(wheels), np.array(body), np.array(shown))
 
 
-def _turned(model: mujoco.MjModel, data: mujoco.MjData, cube: Cube) -> np.ndarray:
+def _turned(model: mujoco.MjModel, data: mujoco.MjData, module: Module) -> np.ndarray:
     """How a wheel's momentum changes with x3 at x3 = 0, in the world (3,) [N m s]."""
-    gimbal, wheel = int(model.dof_jntid[cube.gimbal_dof]), int(model.dof_jntid[cube.flywheel_dof])
+    gimbal, wheel = int(model.dof_jntid[module.gimbal_dof]), int(model.dof_jntid[module.flywheel_dof])
     body = int(model.jnt_bodyid[wheel])
     shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[wheel]  # of the principal inertias
-    momentum = float(model.body_inertia[body] @ shares**2) * cube.speed * data.xaxis[wheel]
-    return cube.direction * np.cross(data.xaxis[gimbal], momentum)
+    momentum = float(model.body_inertia[body] @ shares**2) * module.speed * data.xaxis[wheel]
+    return module.direction * np.cross(data.xaxis[gimbal], momentum)
 
 
 def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarray:

@@ -19,11 +19,11 @@ REQUIRED_PARTS = (
     f"CUBE/flywheel_motor, the sensors CUBE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe {EQUILIBRIUM_KEY}, "
     "for one CUBE or more; of several axes each has its name before these, as roll/tilt and roll/CUBE/gimbal"
 )
-_OF_A_CUBE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
+_OF_A_MODULE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
 
 
 @dataclass(frozen=True)
-class Cube:
+class Module:
     """Addresses of one module in the compiled model.
 
     Attributes:
@@ -34,7 +34,7 @@ class Cube:
         flywheel_dof: Address of its rate in qvel.
         servo: The gimbal servo's control.
         motor: The flywheel motor's control.
-        direction: +1 or -1: the sign of u its gimbal is given, so that all cubes push the same way.
+        direction: +1 or -1: the sign of u its gimbal is given, so that all modules push the same way.
         gimbal_zero: Gimbal angle at which the spin axis is upright, x3 = 0 [rad].
         speed: Nominal flywheel speed, signed [rad/s].
     """
@@ -99,12 +99,12 @@ def missing_parts(spec: mujoco.MjSpec) -> list[str]:
                 f'joint {prefix + TILT_ELEMENT!r} must turn about y (axis="0 1 0")',
             )
             check("joint", prefix + TILT_ELEMENT, _is_hinge, f"joint {prefix + TILT_ELEMENT!r} must be a hinge")
-        for cube in cubes_in(names, axis) or [f"{prefix}cube1"]:
+        for module in modules_in(names, axis) or [f"{prefix}cube1"]:
             for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
-                joint, drive = f"{cube}/{name}", f"{cube}/{actuator}"
+                joint, drive = f"{module}/{name}", f"{module}/{actuator}"
                 check("joint", joint, _is_hinge, f"joint {joint!r} must be a hinge")
                 check("actuator", drive, _drives(joint), f"actuator {drive!r} must drive the joint {joint!r}")
-            joint, encoder = f"{cube}/gimbal", f"{cube}/gimbal_encoder"
+            joint, encoder = f"{module}/gimbal", f"{module}/gimbal_encoder"
             check("sensor", encoder, _reads(joint), f"sensor {encoder!r} must be the jointpos of {joint!r}")
         for name, kind in SENSORS.items():
             check("sensor", prefix + name, _is_a(kind), f"sensor {prefix + name!r} must be of the kind {kind!r}")
@@ -119,9 +119,9 @@ def axes_in(names: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def cubes_in(names: Iterable[str], axis: str) -> list[str]:
+def modules_in(names: Iterable[str], axis: str) -> list[str]:
     """Prefixes of the modules of an axis that elements' names speak of, such as `cube1` or `roll/cube1`."""
-    prefixes = dict.fromkeys(name.rpartition("/")[0] for name in names if name.endswith(_OF_A_CUBE))
+    prefixes = dict.fromkeys(name.rpartition("/")[0] for name in names if name.endswith(_OF_A_MODULE))
     return [prefix for prefix in prefixes if prefix.rpartition("/")[0] == axis]
 
 
@@ -129,7 +129,7 @@ def axes_of(model: mujoco.MjModel) -> dict[str, list[str]]:
     """Find the axes of a compiled model, each with the names of its modules."""
     joints = [model.joint(i).name for i in range(model.njnt)]
     sites = [model.site(i).name for i in range(model.nsite)]
-    return {axis: cubes_in(joints, axis) for axis in axes_in([*joints, *sites])}
+    return {axis: modules_in(joints, axis) for axis in axes_in([*joints, *sites])}
 
 
 def _missing(kind: str, names: list[str], known: list[str]) -> str:

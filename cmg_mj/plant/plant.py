@@ -26,13 +26,13 @@ from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.messages import complaint
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.plant.axis import Axis, find_axis, held_cubes, read_reduced
+from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Cube
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Module
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
@@ -57,7 +57,7 @@ class Plant:
     Attributes:
         settings: What it was made from.
         model: The compiled model, without what is only seen. Do not change it: the plant may be shared.
-        axes: What it tilts about, each with its cubes, sensors and reduced model. That is read off the file as it is
+        axes: What it tilts about, each with its modules, sensors and reduced model. That is read off the file as it is
             but for the flywheels' speed, which the controller knows: without bias or friction, which it does not.
         hints: What on the model is not what the reduced model takes it for, in clauses.
         yaw: Address of q_a, or None if the thrust bearing is locked.
@@ -78,11 +78,13 @@ class Plant:
         self._as_filed = self.model
         self.key = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in self.joint_names else None
-        self._modules = modules
+        self._module_names = modules
         self._axes_as_filed = tuple(
             find_axis(self.model, self.key, name, modules[name]) for name in modules if name not in locked
         )
-        self._held = tuple(cube for name in locked for cube in held_cubes(self.model, self.key, modules[name]))
+        self._held = tuple(
+            module for name in locked for module in find_locked_modules(self.model, self.key, modules[name])
+        )
         self._apply_settings(settings, grid, of_axes)
 
     def changed(
@@ -132,8 +134,10 @@ class Plant:
                 radial_tilt=place_accelerometers(self.model, own, axis, self.path),
             )
             if settings.flywheel_speed_rad_s is not None:
-                cubes = with_flywheel_speed(self.model, self.key, axis.cubes, settings.flywheel_speed_rad_s, self.path)
-                changed = replace(changed, cubes=cubes)
+                modules = with_flywheel_speed(
+                    self.model, self.key, axis.modules, settings.flywheel_speed_rad_s, self.path
+                )
+                changed = replace(changed, modules=modules)
                 changed = replace(changed, reduced=read_reduced(self._as_filed, self.key, changed))
             axes.append(changed)
         self.axes = tuple(axes)
@@ -145,7 +149,7 @@ class Plant:
         filed = float(self.model.opt.timestep)
         vary(self.model, settings, self.path, self.axes, held)
         shaken = (
-            max(abs(cube.speed) for axis in self.axes for cube in axis.cubes)
+            max(abs(module.speed) for axis in self.axes for module in axis.modules)
             if settings.flywheel_imbalance_kg_m
             else 0.0
         )
@@ -179,7 +183,7 @@ class Plant:
                 lock_thrust_bearing(spec, self.path)
             model = compile_model(spec, self.path)
             if self.settings.locked_axes:
-                lock_axes(spec, model, self.settings.locked_axes, self._modules, self.path)
+                lock_axes(spec, model, self.settings.locked_axes, self._module_names, self.path)
                 model = compile_model(spec, self.path)
         for axis in self._axes_as_filed:
             place_accelerometers(model, self._of_axes.get(axis.name, self.settings), axis, self.path)
@@ -194,7 +198,7 @@ class Plant:
             axis: Its name.
 
         Returns:
-            The rig, whose `reduced`, `cubes`, `ideal_readings`, `controller`, ... are that axis'.
+            The rig, whose `reduced`, `modules`, `ideal_readings`, `controller`, ... are that axis'.
 
         Raises:
             InputError: There is no such axis.
@@ -238,9 +242,9 @@ class Plant:
         return self.axis.reduced
 
     @property
-    def cubes(self) -> tuple[Cube, ...]:
+    def modules(self) -> tuple[Module, ...]:
         """Addresses of the modules of the axis."""
-        return self.axis.cubes
+        return self.axis.modules
 
     @property
     def radial_tilt(self) -> RadialTilt:
@@ -294,7 +298,7 @@ class Plant:
     @property
     def interface(self) -> PlantInterface:
         """What a controller of the axis knows of the plant."""
-        zeros = tuple(cube.gimbal_zero for cube in self.cubes)
+        zeros = tuple(module.gimbal_zero for module in self.modules)
         gimbal_angle = GimbalAngle(tuple(self.axis.directions), zeros)
         return PlantInterface(self.radial_tilt, gimbal_angle, self.model.opt.timestep, self.backlash)
 
@@ -365,10 +369,10 @@ class Plant:
     @property
     def parameters(self) -> PlantParameters:
         """What a scenario's controller and observers are made from."""
-        cubes = tuple(cube.name for cube in self.cubes)
+        modules = tuple(module.name for module in self.modules)
         return PlantParameters(
             self.path,
-            cubes,
+            modules,
             self.reduced,
             self.radial_tilt,
             self.gravity,

@@ -12,7 +12,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import Axis
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Cube
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Module
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.sensors.tilt import RadialTilt
@@ -33,7 +33,7 @@ def vary(
     settings: PlantSettings,
     path: Path,
     axes: Sequence[Axis],
-    held: Sequence[Cube] = (),
+    held: Sequence[Module] = (),
 ) -> None:
     """Change a compiled model as its settings say.
 
@@ -51,10 +51,10 @@ def vary(
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    cubes = [*(cube for axis in axes for cube in axis.cubes), *held]
+    modules = [*(module for axis in axes for module in axis.modules), *held]
 
     def gimbals() -> list[int]:
-        return [cube.gimbal_dof for cube in cubes]
+        return [module.gimbal_dof for module in modules]
 
     def tilts() -> list[int]:
         return [_hinge(axis, path) for axis in axes]
@@ -68,26 +68,26 @@ def vary(
     ):
         if value is not None:
             field[joints()] = value
-    _vary_servos(model, settings, path, cubes)
+    _vary_servos(model, settings, path, modules)
     shifts = [bias_shift(model, axis, axis.bias, path) for axis in axes if axis.bias]
     for axis, shift in zip([axis for axis in axes if axis.bias], shifts, strict=True):
         model.body_ipos[axis.frame] += shift
     if settings.flywheel_imbalance_kg_m:
-        for cube in cubes:
-            body = int(model.dof_bodyid[cube.flywheel_dof])
+        for module in modules:
+            body = int(model.dof_bodyid[module.flywheel_dof])
             model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
 
 
 def with_flywheel_speed(
-    model: mujoco.MjModel, key: int, cubes: Sequence[Cube], speed: float, path: Path
-) -> tuple[Cube, ...]:
+    model: mujoco.MjModel, key: int, modules: Sequence[Module], speed: float, path: Path
+) -> tuple[Module, ...]:
     """Let the flywheels turn at another speed from the start, each in its own direction.
 
     Args:
         model: The model, whose keyframe is changed.
         key: The keyframe.
-        cubes: The modules as the file has them.
+        modules: The modules as the file has them.
         speed: [rad/s].
         path: The model's file, for messages.
 
@@ -98,16 +98,16 @@ def with_flywheel_speed(
         InputError: A motor takes no such command.
     """
     found = []
-    for cube in cubes:
-        signed = math.copysign(speed, cube.speed)
-        low, high = model.actuator_ctrlrange[cube.motor]
-        if model.actuator_ctrllimited[cube.motor] and not low <= signed <= high:
+    for module in modules:
+        signed = math.copysign(speed, module.speed)
+        low, high = model.actuator_ctrlrange[module.motor]
+        if model.actuator_ctrllimited[module.motor] and not low <= signed <= high:
             raise InputError(
-                f"plant.flywheel_speed_rad_s = {speed:g}: {path}: actuator '{cube.name}/flywheel_motor' takes only "
+                f"plant.flywheel_speed_rad_s = {speed:g}: {path}: actuator '{module.name}/flywheel_motor' takes only "
                 f"{low:g} to {high:g} rad/s (ctrlrange)"
             )
-        model.key_qvel[key, cube.flywheel_dof] = model.key_ctrl[key, cube.motor] = signed
-        found.append(replace(cube, speed=signed))
+        model.key_qvel[key, module.flywheel_dof] = model.key_ctrl[key, module.motor] = signed
+        found.append(replace(module, speed=signed))
     return tuple(found)
 
 
@@ -175,7 +175,7 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
     return RadialTilt(inner, outer)
 
 
-def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, cubes: Sequence[Cube]) -> None:
+def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:
     """Give the gimbals' servos another stiffness and damping: torque = kp (setpoint - angle) - kv rate."""
     given = {
         "servo_stiffness_n_m_rad": settings.servo_stiffness_n_m_rad,
@@ -185,8 +185,8 @@ def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, cub
     if not names:
         return
     stiffness, damping = given.values()
-    for cube in cubes:
-        servo = cube.servo
+    for module in modules:
+        servo = module.servo
         gain, bias = model.actuator_gainprm[servo], model.actuator_biasprm[servo]
         # A position loop whose setpoint is the integral of its command: what <intvelocity> makes.
         is_loop = (
@@ -197,8 +197,8 @@ def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, cub
         )
         if not is_loop:
             raise InputError(
-                f"plant.{names[0]}: {path}: actuator '{cube.name}/gimbal_servo' is no position loop whose setpoint is "
-                "the integral of its command (<intvelocity>), which alone has this stiffness and damping"
+                f"plant.{names[0]}: {path}: actuator '{module.name}/gimbal_servo' is no position loop whose setpoint "
+                "is the integral of its command (<intvelocity>), which alone has this stiffness and damping"
             )
         per_gear = 1.0 / float(model.actuator_gear[servo, 0]) ** 2  # they are those at the joint
         if stiffness is not None:

@@ -104,7 +104,7 @@ class Design:
             axis=axis,
         )
 
-    def rehearse(self, worlds: int | None = None) -> None:
+    def dry_run(self, worlds: int | None = None) -> None:
         """Try the law and every observer once: one that cannot work is found before a run, not at its first sample.
 
         Args:
@@ -144,7 +144,7 @@ def design(scenario: Scenario, rig: PlantParameters) -> Design:
         _check(scenario)
         controller = scenario.controller
         result = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
-        result.rehearse()
+        result.dry_run()
         integrator_trim(controller.bias_trim_s, result.law, extra_signals(result.observer()))
     return result
 

@@ -17,7 +17,7 @@ class PlantParameters(NamedTuple):
 
     Attributes:
         path: The model's file.
-        cubes: Names of the plant's modules.
+        modules: Names of the plant's modules.
         reduced: The reduced model.
         tilt: The tilt estimate for the plant's accelerometers.
         gravity: Gravitational acceleration [m/s^2].
@@ -27,7 +27,7 @@ class PlantParameters(NamedTuple):
     """
 
     path: Path
-    cubes: tuple[str, ...]
+    modules: tuple[str, ...]
     reduced: ReducedModel
     tilt: RadialTilt
     gravity: float

@@ -27,7 +27,7 @@ class PlantSettings:
             the pushes' edges, follows the rig's fastest motion (`step_limit.py`) and is not above the model file's own.
         integrator: MuJoCo's integrator. Fast flywheels need RK4.
         lock_thrust_bearing: Take the yaw joint out.
-        locked_axes: Of several axes those whose hinges are taken out. Their cubes stay: wheels turning, gimbals held.
+        locked_axes: Names of the axes whose hinges are removed. Their modules stay: wheels turn, gimbals are held.
         turn_rate_rad_s: At which the rig turns about the vertical from the start, held by its `yaw_servo` [rad/s].
         gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
         gimbal_friction_n_m: Dry friction of each gimbal [N m].

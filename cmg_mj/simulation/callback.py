@@ -68,8 +68,8 @@ def _hold(plant: Plant, controller: AnyController, data: mujoco.MjData) -> None:
     """Set the servos' commands to those of the last tick."""
     for axis, part in zip(plant.axes, controller.parts, strict=True):
         if part.gimbal_rate is not None:
-            for cube in axis.cubes:
-                data.ctrl[cube.servo] = cube.direction * part.gimbal_rate
+            for module in axis.modules:
+                data.ctrl[module.servo] = module.direction * part.gimbal_rate
 
 
 class ControlCallback:
@@ -99,8 +99,8 @@ class ControlCallback:
         """Take the control decision if this call is the first at a sampling instant."""
         _hold(self.plant, self.controller, data)
         for axis in self.plant.axes:
-            for cube in axis.cubes:
-                data.ctrl[cube.motor] = cube.speed
+            for module in axis.modules:
+                data.ctrl[module.motor] = module.speed
         if self._is_instant(model.opt.timestep, data.time):
             _tick(self.plant, self.controller, data, lambda: self._sense(data))
 

@@ -296,10 +296,10 @@ class Experiment:
             return hints(self.scenario, self.design, self.plant.parameters)
         return [f"{own.plant.axis.name}: {hint}" for own in self.axes for hint in own.hints]
 
-    def rehearse(self, worlds: int | None = None) -> None:
-        """Try every observer once, on floats or on arrays of so many worlds: see `Design.rehearse`."""
+    def dry_run(self, worlds: int | None = None) -> None:
+        """Try every observer once, on floats or on arrays of so many worlds: see `Design.dry_run`."""
         for own in self.parts:
-            own.design.rehearse(worlds)
+            own.design.dry_run(worlds)
 
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""

@@ -57,11 +57,11 @@ def asked(
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, plant.key)
         for axis, angle, rate in zip(plant.axes, x3, u, strict=True):
-            for cube in axis.cubes:
-                data.qpos[cube.gimbal] = cube.gimbal_zero + cube.direction * angle
-                data.qvel[cube.gimbal_dof] = cube.direction * rate
-                data.qvel[cube.flywheel_dof] *= share
-        first = plant.axis.cubes[0]
+            for module in axis.modules:
+                data.qpos[module.gimbal] = module.gimbal_zero + module.direction * angle
+                data.qvel[module.gimbal_dof] = module.direction * rate
+                data.qvel[module.flywheel_dof] *= share
+        first = plant.axis.modules[0]
         data.qpos[first.gimbal] += first.direction * ahead
         for name, rate in rates.items():
             data.joint(name).qvel[0] = rate

@@ -24,11 +24,11 @@ def test_a_gimbal_with_a_deadband_of_a_tenth(command: float, expected: float) ->
     plant = load_plant(timestep_s=0.001, initial_tilt_deg=0.0, equilibrium_bias_deg=0.0)
     servo.in_velocity_mode(plant, 0.1)
     data = plant.new_data()
-    for cube in plant.cubes:
-        data.ctrl[cube.servo] = cube.direction * command
+    for module in plant.modules:
+        data.ctrl[module.servo] = module.direction * command
     mujoco.mj_step(plant.model, data, 20)
-    for cube in plant.cubes:
-        assert cube.direction * data.qvel[cube.gimbal] == pytest.approx(expected, abs=0.01)
+    for module in plant.modules:
+        assert module.direction * data.qvel[module.gimbal] == pytest.approx(expected, abs=0.01)
 
 
 @pytest.fixture(scope="module")

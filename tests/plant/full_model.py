@@ -21,7 +21,7 @@ class Motion(NamedTuple):
     qvel: np.ndarray
     """(n_worlds, n_steps + 1, n_joints) [rad/s]."""
     act: np.ndarray
-    """The servos' setpoints, (n_worlds, n_steps + 1, n_cubes) [rad]."""
+    """The servos' setpoints, (n_worlds, n_steps + 1, n_modules) [rad]."""
 
 
 def passive(plant: Plant, *, gravity: bool = True) -> mujoco.MjModel:

@@ -87,17 +87,17 @@ def swing(plant: Plant, legs: list[tuple[float, float]]) -> Swing:
     samples = []
     for k in range(round(DURATION_S / HALF_STEP_S) + 1):
         u = rates[int(np.searchsorted(ends_s, k * HALF_STEP_S, side="right"))]
-        for cube in plant.cubes:
-            data.ctrl[cube.servo], data.ctrl[cube.motor] = cube.direction * u, cube.speed
+        for module in plant.modules:
+            data.ctrl[module.servo], data.ctrl[module.motor] = module.direction * u, module.speed
         mujoco.mj_forward(plant.model, data)
-        cube = plant.cubes[0]
+        module = plant.modules[0]
         samples.append(
             (
                 data.qpos[plant.tilt] - UPRIGHT,
-                data.qpos[cube.gimbal] - cube.gimbal_zero,
-                data.qvel[cube.gimbal],
-                data.qvel[cube.flywheel],
-                data.qacc[cube.flywheel],
+                data.qpos[module.gimbal] - module.gimbal_zero,
+                data.qvel[module.gimbal],
+                data.qvel[module.flywheel],
+                data.qacc[module.flywheel],
                 data.qpos[0],
             )
         )
@@ -175,8 +175,8 @@ def test_linearisation_is_the_slope_of_the_full_model(model: str) -> None:
     directions = np.zeros((3, 2 * n))
     directions[0, plant.tilt] = 1.0
     directions[1, n + plant.tilt] = 1.0
-    for cube in plant.cubes:
-        directions[2, n + cube.gimbal] = cube.direction
+    for module in plant.modules:
+        directions[2, n + module.gimbal] = module.direction
     rows = np.concatenate([qpos, qvel]) + h * np.stack([directions, -directions], axis=1).reshape(6, 2 * n)
     forward = states(passive(plant), rows[:, :n], rows[:, n:])
     ahead, behind = np.array([data.qacc[plant.tilt] for data in forward]).reshape(3, 2).T

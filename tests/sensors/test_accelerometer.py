@@ -294,8 +294,8 @@ def test_vibration_of_unbalanced_wheels_at_the_accelerometers() -> None:
         forces = []
         for plant in plants:
             data = plant.new_data()
-            for cube in plant.cubes:
-                data.qpos[cube.flywheel] += math.copysign(angle, cube.speed)
+            for module in plant.modules:
+                data.qpos[module.flywheel] += math.copysign(angle, module.speed)
             mujoco.mj_forward(plant.model, data)
             forces.append(plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist()).accelerations)
         shaken.append(np.subtract(*forces[::-1]))

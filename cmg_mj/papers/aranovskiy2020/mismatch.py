@@ -20,31 +20,31 @@ Change = Callable[[Plant, float], None]
 
 def slower_flywheel(plant: Plant, share: float) -> None:
     """The second flywheel turns slower by a share (Hypothesis 2 and 3: unequal speeds)."""
-    cube, model = plant.cubes[1], plant.model
-    model.key_ctrl[plant.key, cube.motor] *= 1.0 - share
-    model.key_qvel[plant.key, cube.flywheel] *= 1.0 - share
+    module, model = plant.modules[1], plant.model
+    model.key_ctrl[plant.key, module.motor] *= 1.0 - share
+    model.key_qvel[plant.key, module.flywheel] *= 1.0 - share
 
 
 def gimbal_offset(plant: Plant, offset_deg: float) -> None:
     """The second gimbal starts off its place (Hypothesis 2)."""
-    cube, model = plant.cubes[1], plant.model
-    model.key_qpos[plant.key, cube.gimbal] += cube.direction * math.radians(offset_deg)
-    model.key_act[plant.key, model.actuator_actadr[cube.servo]] += cube.direction * math.radians(offset_deg)
+    module, model = plant.modules[1], plant.model
+    model.key_qpos[plant.key, module.gimbal] += module.direction * math.radians(offset_deg)
+    model.key_act[plant.key, model.actuator_actadr[module.servo]] += module.direction * math.radians(offset_deg)
 
 
 def servo_gain(plant: Plant, share: float) -> None:
     """The second servo turns its gimbal farther than commanded, by a share (Hypothesis 1)."""
-    cube, model = plant.cubes[1], plant.model
+    module, model = plant.modules[1], plant.model
     gear = 1.0 / (1.0 + share)
-    zero = model.key_qpos[plant.key, cube.gimbal]
+    zero = model.key_qpos[plant.key, module.gimbal]
     # Its setpoint counts in angle times gear, from where the gimbal starts.
-    model.actuator_gear[cube.servo, 0] = gear
-    model.key_act[plant.key, model.actuator_actadr[cube.servo]] = gear * zero
+    model.actuator_gear[module.servo, 0] = gear
+    model.key_act[plant.key, model.actuator_actadr[module.servo]] = gear * zero
 
 
 def gimbal_friction(plant: Plant, torque_n_m: float) -> None:
     """The second gimbal has dry friction, the first none (Hypothesis 1)."""
-    plant.model.dof_frictionloss[plant.cubes[1].gimbal] = torque_n_m
+    plant.model.dof_frictionloss[plant.modules[1].gimbal] = torque_n_m
 
 
 @dataclass(frozen=True)

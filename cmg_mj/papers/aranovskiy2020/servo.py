@@ -45,9 +45,9 @@ def in_velocity_mode(plant: Plant, deadband: float, lag_s: float = LAG_S) -> Non
         lag_s: I/kv [s].
     """
     model = plant.model
-    for cube in plant.cubes:
-        i = cube.servo
-        dof = int(model.jnt_dofadr[cube.gimbal])
+    for module in plant.modules:
+        i = module.servo
+        dof = int(model.jnt_dofadr[module.gimbal])
         kv = float(model.dof_M0[dof]) / lag_s
         model.actuator_dyntype[i] = int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
         model.actuator_dynprm[i, 0] = COMMAND_LAG_S

@@ -53,8 +53,8 @@ def estimator(name: str, prepared: Experiment, **changed: Any) -> Observer:
 def servo_of(plant: Plant) -> Servo:
     """The gimbal servo that the model file describes."""
     (servo,) = plant.axis.servos
-    (cube,) = plant.cubes
-    dof = int(plant.model.jnt_dofadr[cube.gimbal])
+    (module,) = plant.modules
+    dof = int(plant.model.jnt_dofadr[module.gimbal])
     return Servo(
         float(plant.model.actuator_gainprm[servo, 0]),
         float(-plant.model.actuator_biasprm[servo, 2]),

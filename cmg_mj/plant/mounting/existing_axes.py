@@ -58,7 +58,7 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, pa
         raise InputError(f"{path}: has an axis{known} already: give the new one a name, such as --name pitch")
     key, names_of = model.key(EQUILIBRIUM_KEY).id, axes_of(model)
     axes = [find_axis(model, key, axis, names_of[axis]) for axis in names]
-    modules = [module for axis in axes for module in axis.cubes]
+    modules = [module for axis in axes for module in axis.modules]
     lines = [model.joint(axis.line.joint).name for axis in axes if isinstance(axis.line, HingeLine)]
     return ExistingAxes(
         lines,

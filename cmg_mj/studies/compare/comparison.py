@@ -84,7 +84,7 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
     plant = load_scenario_plant(scenario)
     experiments = [prepare(_untrimmed(scenario.with_observer(kind), plant), plant) for kind in observers]
     for experiment in experiments:
-        experiment.rehearse(worlds=2)
+        experiment.dry_run(worlds=2)
     return experiments
 
 

@@ -191,7 +191,7 @@ def tune(
     kind = scenario.observer.kind
     experiment = prepare(scenario)
     experiment.require_single_axis("tuning")
-    experiment.rehearse(worlds=2)
+    experiment.dry_run(worlds=2)
     given = parameters_of(kind, experiment.design.observer(), scenario.observer.parameters)
     numbers = numbers_of(kind, given, _maker(experiment), parameters)
     numbers = narrowed(numbers, ranges or {}, "--range")

@@ -99,7 +99,7 @@ def _all_observers(branch: Branch) -> rrb.Container:
 def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]:
     """Lay out the best runs over each other; then, if there are more, all runs."""
     few = best_runs([branch.run for branch in branches])
-    module = plant.cubes[0].of_axis
+    module = plant.modules[0].of_axis
     shown = [branch for branch in branches if branch.run.name in few]
     tilt = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_TILT_PLOTS]
     actuators = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_ACTUATOR_PLOTS]

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from cmg_mj.plant.parts import Cube
+from cmg_mj.plant.parts import Module
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.visualization.recording.camera import enclosing_ball
@@ -60,7 +60,7 @@ def log_poses(rec: rr.RecordingStream, branch: str, plant: Plant, time: np.ndarr
     for body in range(1, plant.model.nbody):
         poses = rr.Transform3D.columns(translation=positions[:, body], quaternion=quaternions[:, body])
         rec.send_columns(body_path(branch, plant, body), [at], poses)
-    for module in plant.cubes:
+    for module in plant.modules:
         translation, quaternion = _turned_back(plant, module, qpos)
         poses = rr.Transform3D.columns(translation=translation, quaternion=quaternion)
         rec.send_columns(_slowed_path(branch, plant, module), [at], poses)
@@ -117,7 +117,7 @@ def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return positions, np.roll(quaternions, -1, axis=-1)
 
 
-def _turned_back(plant: Plant, module: Cube, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _turned_back(plant: Plant, module: Module, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute the motion, in the flywheel's frame, from its true angle to the slowed one: translation, quaternion."""
     model = plant.model
     joint = int(model.dof_jntid[module.flywheel_dof])
@@ -129,7 +129,7 @@ def _turned_back(plant: Plant, module: Cube, qpos: np.ndarray) -> tuple[np.ndarr
     return anchor - turned, quaternion
 
 
-def _slowed_path(branch: str, plant: Plant, module: Cube) -> str:
+def _slowed_path(branch: str, plant: Plant, module: Module) -> str:
     return f"{body_path(branch, plant, int(plant.model.dof_bodyid[module.flywheel_dof]))}/slowed"
 
 
@@ -137,7 +137,7 @@ def log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float
     """Record the plant's shapes: one static entity for each geom and site, under its body."""
     model = plant.drawn_model
     parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
-    for module in plant.cubes:
+    for module in plant.modules:
         parents[int(model.dof_bodyid[module.flywheel_dof])] = _slowed_path(branch, plant, module)
     for body, name, shape in drawn_shapes(model, radius):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))

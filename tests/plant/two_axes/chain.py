@@ -22,7 +22,7 @@ SIDE = 0.095
 """Half of a cube's edge: the cubes' centres lie as far from the two middle planes [m]."""
 HEIGHT = 0.134
 """Of the cubes' centres above the joint [m]."""
-CUBES = {
+MODULES = {
     "roll/cube1": ((SIDE, SIDE), -math.pi / 2.0),
     "roll/cube2": ((-SIDE, -SIDE), -math.pi / 2.0),
     "pitch/cube1": ((-SIDE, SIDE), 0.0),
@@ -81,7 +81,7 @@ class Chain:
             Part(*self.of["cross"], cross, nowhere, [yaw, roll]),
             Part(*self.of["frame"], frame, FRAME_HEIGHT * frame[..., :, 2], three),
         ]
-        for i, (name, ((x, y), turned)) in enumerate(CUBES.items()):
+        for i, (name, ((x, y), turned)) in enumerate(MODULES.items()):
             place = frame @ np.array([x, y, HEIGHT])
             half = frame @ _about("z", turned)
             gimbal = half @ _about("x", q[..., 3 + 2 * i])

@@ -124,8 +124,8 @@ def _sinusoidal(plant: Plant, n_periods: int) -> np.ndarray:
     wave = np.sin(2.0 * math.pi * frequency_hz * CONTROL_PERIOD_S * np.arange(n_periods)[:, None] + phase)
     amplitude, mean = np.ones(nu), np.zeros(nu)
     for axis in plant.axes:
-        for cube in axis.cubes:
-            amplitude[cube.motor], mean[cube.motor] = 20.0, cube.speed
+        for module in axis.modules:
+            amplitude[module.motor], mean[module.motor] = 20.0, module.speed
     return mean + amplitude * wave
 
 

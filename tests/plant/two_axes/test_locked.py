@@ -1,4 +1,4 @@
-"""An axis that is locked: its hinge is gone, its cubes are not, and the other axis is what it was."""
+"""An axis that is locked: its hinge is gone, its modules are not, and the other axis is what it was."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ def test_its_wheels_turn_and_its_gimbals_hold() -> None:
     data = plant.new_data()
     mujoco.mj_step(plant.model, data, 200)
     assert abs(math.degrees(plant.axis.line.lean(data.qpos))) > 10.0
-    for cube, speed in (("pitch/cube1", 314.0), ("pitch/cube2", -314.0)):
-        assert data.joint(f"{cube}/flywheel").qvel[0] == pytest.approx(speed, rel=1e-3)
-        assert data.joint(f"{cube}/gimbal").qpos[0] == pytest.approx(math.pi / 2.0, abs=2e-2)
+    for module, speed in (("pitch/cube1", 314.0), ("pitch/cube2", -314.0)):
+        assert data.joint(f"{module}/flywheel").qvel[0] == pytest.approx(speed, rel=1e-3)
+        assert data.joint(f"{module}/gimbal").qpos[0] == pytest.approx(math.pi / 2.0, abs=2e-2)
 
 
 def test_what_changes_all_wheels_and_gimbals_changes_those_that_are_held() -> None:
@@ -47,10 +47,10 @@ def test_what_changes_all_wheels_and_gimbals_changes_those_that_are_held() -> No
         model="two_axes.xml", locked_axes=["pitch"], flywheel_speed_rad_s=200.0, gimbal_friction_n_m=0.01
     )
     data = plant.new_data()
-    for cube, speed in (("pitch/cube1", 200.0), ("pitch/cube2", -200.0), ("roll/cube1", 200.0)):
-        assert data.joint(f"{cube}/flywheel").qvel[0] == speed
-        assert data.actuator(f"{cube}/flywheel_motor").ctrl[0] == speed
-        assert plant.model.joint(f"{cube}/gimbal").frictionloss[0] == 0.01
+    for module, speed in (("pitch/cube1", 200.0), ("pitch/cube2", -200.0), ("roll/cube1", 200.0)):
+        assert data.joint(f"{module}/flywheel").qvel[0] == speed
+        assert data.actuator(f"{module}/flywheel_motor").ctrl[0] == speed
+        assert plant.model.joint(f"{module}/gimbal").frictionloss[0] == 0.01
 
 
 @pytest.mark.parametrize("orientation", ['euler="0 -0.3 0"', 'quat="0.98877107793604228 0 -0.14943813247359922 0"'])

@@ -9,7 +9,7 @@ import pytest
 
 from cmg_mj.plant.plant import Plant, load_plant
 from tests.plant.full_model import mass_matrices, passive, states
-from tests.plant.two_axes.chain import CUBES, Chain, N
+from tests.plant.two_axes.chain import MODULES, Chain, N
 
 N_STATES = 500
 WHEELS = [4, 6, 8, 10]
@@ -31,8 +31,8 @@ def angles() -> np.ndarray:
 
 
 def test_its_coordinates_are_those_of_the_derivation(plant: Plant) -> None:
-    of_cubes = [f"{cube}/{joint}" for cube in CUBES for joint in ("gimbal", "flywheel")]
-    assert plant.joint_names == ["yaw", "roll", "pitch", *of_cubes]
+    of_modules = [f"{module}/{joint}" for module in MODULES for joint in ("gimbal", "flywheel")]
+    assert plant.joint_names == ["yaw", "roll", "pitch", *of_modules]
 
 
 def test_mass_matrix(plant: Plant, chain: Chain, angles: np.ndarray) -> None:

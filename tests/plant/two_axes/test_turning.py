@@ -29,9 +29,9 @@ def plant(request: pytest.FixtureRequest) -> Plant:
 
 def set_gimbals(data: mujoco.MjData, axis: Axis, angle: float, rate: float) -> None:
     """Turn the gimbals of an axis."""
-    for cube in axis.cubes:
-        data.qpos[cube.gimbal] = cube.gimbal_zero + cube.direction * angle
-        data.qvel[cube.gimbal_dof] = cube.direction * rate
+    for module in axis.modules:
+        data.qpos[module.gimbal] = module.gimbal_zero + module.direction * angle
+        data.qvel[module.gimbal_dof] = module.direction * rate
 
 
 def asked_of(
@@ -53,9 +53,9 @@ def asked_of(
         mujoco.mj_resetDataKeyframe(model, data, plant.key)
         for axis, angle, rate in zip(plant.axes, angles, u, strict=True):
             set_gimbals(data, axis, angle, rate)
-            for cube in axis.cubes:
-                data.qvel[cube.flywheel_dof] *= share
-        first = plant.axis.cubes[0]
+            for module in axis.modules:
+                data.qvel[module.flywheel_dof] *= share
+        first = plant.axis.modules[0]
         data.qpos[first.gimbal] += first.direction * off
         for name, rate in rates.items():
             data.joint(name).qvel[0] = rate
