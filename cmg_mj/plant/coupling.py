@@ -29,15 +29,15 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCouplin
     data = at_keyframe(model, key)
     along = [data.xmat[axis.frame].reshape(3, 3) @ axis.direction for axis in axes]
     swept = [sum((_turned(model, data, module) for module in axis.modules), np.zeros(3)) for axis in axes]
-    pushes = [float(n @ own) for n, own in zip(along, swept, strict=True)]
-    rows = [(n, own, _inertia(model, data, axis)) for n, own, axis in zip(along, pushes, axes, strict=True)]
-    wheels = [[-float(n @ np.cross(UP, s)) / own for s in swept] for n, own, _ in rows]
+    pushes = [float(n @ s) for n, s in zip(along, swept, strict=True)]
+    rows = [(n, push, _inertia(model, data, axis)) for n, push, axis in zip(along, pushes, axes, strict=True)]
+    wheels = [[-float(n @ np.cross(UP, s)) / push for s in swept] for n, push, _ in rows]
     body = [
-        [float((n @ about @ n + m @ about @ m - UP @ about @ UP) * (n @ np.cross(m, UP))) / own for m in along]
-        for n, own, about in rows
+        [float((n @ about @ n + m @ about @ m - UP @ about @ UP) * (n @ np.cross(m, UP))) / push for m in along]
+        for n, push, about in rows
     ]
-    shown = [[2.0 * float(n @ np.cross(UP, m)) for m in along] for n, _, _ in rows]
-    return YawCoupling(np.array(wheels), np.array(body), np.array(shown))
+    coriolis = [[2.0 * float(n @ np.cross(UP, m)) for m in along] for n, _, _ in rows]
+    return YawCoupling(np.array(wheels), np.array(body), np.array(coriolis))
 
 
 def _turned(model: mujoco.MjModel, data: mujoco.MjData, module: Module) -> np.ndarray:
@@ -52,18 +52,18 @@ def _turned(model: mujoco.MjModel, data: mujoco.MjData, module: Module) -> np.nd
 def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarray:
     """The inertia of all that tilts about a point of the line, in the world (3, 3) [kg m^2]."""
     pivot = data.xpos[axis.frame] + data.xmat[axis.frame].reshape(3, 3) @ axis.point
-    found = np.zeros((3, 3))
+    inertia = np.zeros((3, 3))
     for body in _tilting(model, int(model.jnt_bodyid[axis.line.joint])):
         axes, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - pivot
-        found += axes @ np.diag(model.body_inertia[body]) @ axes.T
-        found += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return found
+        inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
+        inertia += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return inertia
 
 
 def _tilting(model: mujoco.MjModel, root: int) -> list[int]:
     """A body and all that hangs on it."""
-    found = {root}
+    bodies = {root}
     for body in range(root + 1, model.nbody):  # children come after their parents
-        if int(model.body_parentid[body]) in found:
-            found.add(body)
-    return sorted(found)
+        if int(model.body_parentid[body]) in bodies:
+            bodies.add(body)
+    return sorted(bodies)

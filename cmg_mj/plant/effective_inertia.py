@@ -52,7 +52,7 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
     mujoco.mj_fullM(model, data, dense)
     motion = line.motion(model, data)
     row = motion @ dense
-    own = row @ motion
+    line_inertia = row @ motion
     loose = _free_dofs(model, data) if isinstance(line, HingeLine) else []
     loose = [dof for dof in loose if not motion[dof]]
     if loose:
@@ -61,8 +61,8 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
         if held.size:
             ways = _null_space(held)
             gives, inertia = gives @ ways, ways.T @ inertia @ ways
-        own = own - gives @ np.linalg.solve(inertia, gives)
-    return Inertia(row, float(own))
+        line_inertia = line_inertia - gives @ np.linalg.solve(inertia, gives)
+    return Inertia(row, float(line_inertia))
 
 
 def _free_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:

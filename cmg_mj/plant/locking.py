@@ -91,20 +91,20 @@ def _setting(axes: Sequence[str], path: Path) -> str:
 def _turn(hinge: Any, angle: float) -> None:
     """Turn the body of a hinge, its first joint, about it [rad]."""
     body = hinge.parent
-    own = np.array(body.quat)
+    orientation = np.array(body.quat)
     if body.alt.type != mujoco.mjtOrientation.mjORIENTATION_QUAT:
         compiler = body.compiler
-        own = np.array(
+        orientation = np.array(
             mujoco.MjSpec.resolve_orientation(degree=compiler.degree, sequence=compiler.eulerseq, orientation=body.alt)
         )
         body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-    own /= np.linalg.norm(own)
+    orientation /= np.linalg.norm(orientation)
     turn, both, arm, moved = np.empty(4), np.empty(4), np.empty(3), np.empty(3)
     axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
     mujoco.mju_axisAngle2Quat(turn, axis, angle)
     mujoco.mju_rotVecQuat(arm, np.array(hinge.pos), turn)
-    mujoco.mju_rotVecQuat(moved, np.array(hinge.pos) - arm, own)
-    mujoco.mju_mulQuat(both, own, turn)
+    mujoco.mju_rotVecQuat(moved, np.array(hinge.pos) - arm, orientation)
+    mujoco.mju_mulQuat(both, orientation, turn)
     body.pos, body.quat = np.array(body.pos) + moved, both
 
 
@@ -129,7 +129,9 @@ def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
         spec.delete(element)
     for key in spec.keys:  # which may leave any of these out, or have them wrong, of which the compiler speaks
         values = (key.qpos, of_joints[:1]), (key.qvel, of_joints[1:]), (key.act, states), (key.ctrl, gone)
-        key.qpos, key.qvel, key.act, key.ctrl = (np.delete(of, at if len(of) else []) for of, at in values)
+        key.qpos, key.qvel, key.act, key.ctrl = (
+            np.delete(entries, at if len(entries) else []) for entries, at in values
+        )
 
 
 def _drives(drive: Any, joint: str) -> bool:

@@ -115,8 +115,8 @@ def missing_parts(spec: mujoco.MjSpec) -> list[str]:
 def axes_in(names: Iterable[str]) -> list[str]:
     """Names of the axes that elements' names speak of; the only one of a rig need have none."""
     of_an_axis = {TILT_ELEMENT, *SENSORS}
-    found = [axis for name in names for axis, _, last in [name.rpartition("/")] if last in of_an_axis]
-    return list(dict.fromkeys(found))
+    axes = [axis for name in names for axis, _, last in [name.rpartition("/")] if last in of_an_axis]
+    return list(dict.fromkeys(axes))
 
 
 def modules_in(names: Iterable[str], axis: str) -> list[str]:

@@ -126,12 +126,12 @@ class Plant:
         self.model = copy.copy(self._as_filed)
         axes = []
         for axis in self._axes_as_filed:
-            own = of_axes.get(axis.name, settings)
+            axis_settings = of_axes.get(axis.name, settings)
             changed = replace(
                 axis,
-                bias=math.radians(own.equilibrium_bias_deg),
-                initial_tilt=math.radians(own.initial_tilt_deg),
-                radial_tilt=place_accelerometers(self.model, own, axis, self.path),
+                bias=math.radians(axis_settings.equilibrium_bias_deg),
+                initial_tilt=math.radians(axis_settings.initial_tilt_deg),
+                radial_tilt=place_accelerometers(self.model, axis_settings, axis, self.path),
             )
             if settings.flywheel_speed_rad_s is not None:
                 modules = with_flywheel_speed(
@@ -203,11 +203,11 @@ class Plant:
         Raises:
             InputError: There is no such axis.
         """
-        found = [own for own in self.axes if own.name == axis]
-        if not found:
+        matches = [candidate for candidate in self.axes if candidate.name == axis]
+        if not matches:
             raise InputError(f"{self.path}: no axis {axis!r}; {nearest(axis, self.axis_names)}")
         other = copy.copy(self)
-        other.axes = tuple(found)
+        other.axes = tuple(matches)
         return other
 
     @property

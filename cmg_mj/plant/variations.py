@@ -97,7 +97,7 @@ def with_flywheel_speed(
     Raises:
         InputError: A motor takes no such command.
     """
-    found = []
+    result = []
     for module in modules:
         signed = math.copysign(speed, module.speed)
         low, high = model.actuator_ctrlrange[module.motor]
@@ -107,8 +107,8 @@ def with_flywheel_speed(
                 f"{low:g} to {high:g} rad/s (ctrlrange)"
             )
         model.key_qvel[key, module.flywheel_dof] = model.key_ctrl[key, module.motor] = signed
-        found.append(replace(module, speed=signed))
-    return tuple(found)
+        result.append(replace(module, speed=signed))
+    return tuple(result)
 
 
 def set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> None:
@@ -123,16 +123,16 @@ def set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> N
     Raises:
         InputError: There is no drive that holds the rate, or it takes no such command.
     """
-    said = f"plant.turn_rate_rad_s = {rate:g}: {path}"
+    prefix = f"plant.turn_rate_rad_s = {rate:g}: {path}"
     joint, servo = (
         int(mujoco.mj_name2id(model, kind, name))
         for kind, name in ((mujoco.mjtObj.mjOBJ_JOINT, "yaw"), (mujoco.mjtObj.mjOBJ_ACTUATOR, YAW_SERVO))
     )
     if joint < 0 or servo < 0 or int(model.actuator_trnid[servo, 0]) != joint:
-        raise InputError(f"{said} has no actuator {YAW_SERVO!r} that drives a joint 'yaw', which alone holds a rate")
+        raise InputError(f"{prefix} has no actuator {YAW_SERVO!r} that drives a joint 'yaw', which alone holds a rate")
     low, high = model.actuator_ctrlrange[servo]
     if model.actuator_ctrllimited[servo] and not low <= rate <= high:
-        raise InputError(f"{said}: actuator {YAW_SERVO!r} takes only {low:g} to {high:g} rad/s (ctrlrange)")
+        raise InputError(f"{prefix}: actuator {YAW_SERVO!r} takes only {low:g} to {high:g} rad/s (ctrlrange)")
     model.key_qvel[key, model.jnt_dofadr[joint]] = model.key_ctrl[key, servo] = rate
 
 
@@ -152,20 +152,20 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         InputError: The outer one is no farther out than the inner one.
     """
     as_filed = axis.radial_tilt
-    given = {
+    distances = {
         "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
         "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
     }
-    if all(to is None for to, _ in given.values()):
+    if all(to is None for to, _ in distances.values()):
         return as_filed
-    inner, outer = (was if to is None else to for to, was in given.values())
+    inner, outer = (was if to is None else to for to, was in distances.values())
     if not inner < outer:
-        changed = ", ".join(f"plant.{name}_m = {to:g}" for name, (to, _) in given.items() if to is not None)
+        changed = ", ".join(f"plant.{name}_m = {to:g}" for name, (to, _) in distances.items() if to is not None)
         raise InputError(
             f"{changed}: the inner accelerometer must lie nearer to the tilt axis than the outer one, and they are "
             f"{inner:g} and {outer:g} m away ({path})"
         )
-    for name, (to, was) in given.items():
+    for name, (to, was) in distances.items():
         if to is not None:
             sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, axis.prefix + name)
             site = int(model.sensor_objid[sensor])
@@ -177,14 +177,14 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:
     """Give the gimbals' servos another stiffness and damping: torque = kp (setpoint - angle) - kv rate."""
-    given = {
+    coefficients = {
         "servo_stiffness_n_m_rad": settings.servo_stiffness_n_m_rad,
         "servo_damping_n_m_s_rad": settings.servo_damping_n_m_s_rad,
     }
-    names = [name for name, value in given.items() if value is not None]
+    names = [name for name, value in coefficients.items() if value is not None]
     if not names:
         return
-    stiffness, damping = given.values()
+    stiffness, damping = coefficients.values()
     for module in modules:
         servo = module.servo
         gain, bias = model.actuator_gainprm[servo], model.actuator_biasprm[servo]

@@ -45,10 +45,10 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, pa
     elements = [element.name for kind in (spec.joints, spec.sites, spec.sensors) for element in kind]
     names = axes_in(elements)
     if not names or not any(key.name == EQUILIBRIUM_KEY for key in spec.keys):
-        taken = [element for element in elements if names and axes_in([element])]
-        taken += [f"keyframe {key.name}" for key in spec.keys if key.name == EQUILIBRIUM_KEY]
-        if taken:
-            raise InputError(f"{path}: has an element {taken[0]!r} already, which a mounted pair brings: rename it")
+        conflicts = [element for element in elements if names and axes_in([element])]
+        conflicts += [f"keyframe {key.name}" for key in spec.keys if key.name == EQUILIBRIUM_KEY]
+        if conflicts:
+            raise InputError(f"{path}: has an element {conflicts[0]!r} already, which a mounted pair brings: rename it")
         return ExistingAxes((), (), {}, {})
     missing = missing_parts(spec)
     if missing:

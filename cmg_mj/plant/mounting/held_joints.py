@@ -21,10 +21,10 @@ SAME_PLACE = 1e-3
 """Largest distance of a joint from where a constraint of the file holds it [rad, m]; files have six digits."""
 
 
-def unused_name(name: str, taken: Collection[str]) -> str:
+def unused_name(name: str, names: Collection[str]) -> str:
     """Return the name, or the first of `name_2`, `name_3`, ... that is not taken."""
     number, candidate = 1, name
-    while candidate in taken:
+    while candidate in names:
         number += 1
         candidate = f"{name}_{number}"
     return candidate
@@ -101,7 +101,7 @@ def hold_joints(
             spec.delete(ties[name])
     for name in already - free:
         _check_stands(model, pose, name, ties[name], path)
-    taken = {tie.name for tie in spec.equalities}
+    tie_names = {tie.name for tie in spec.equalities}
     held = [name for name in names if name not in {*free, *on_servos, *already}]
     data = mujoco.MjData(model)
     data.qpos[:] = pose
@@ -114,7 +114,7 @@ def hold_joints(
                 f"{path}: body {body!r} is free and carries no pair: give --release {name} if it is to move"
             )
         add = _weld_ball if kind == int(mujoco.mjtJoint.mjJNT_BALL) else _fix_joint
-        tie = add(spec, model, data, name, unused_name(constraint_name(name), taken))
+        tie = add(spec, model, data, name, unused_name(constraint_name(name), tie_names))
         tie.solimp[:2] = IMPEDANCE
     return held
 

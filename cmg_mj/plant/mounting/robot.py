@@ -152,13 +152,13 @@ def check_names(spec: mujoco.MjSpec, names: Sequence[str], path: Path) -> None:
     Raises:
         InputError: A name is taken.
     """
-    taken = {
+    existing_names = {
         element.name
         for kind in (spec.bodies, spec.frames, spec.joints, spec.sites, spec.sensors, spec.actuators)
         for element in kind
     }
     for name in names:
-        if name in taken:
+        if name in existing_names:
             raise InputError(f"{path}: has an element {name!r} already, which a mounted pair brings: rename it")
 
 
