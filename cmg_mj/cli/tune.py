@@ -183,7 +183,7 @@ def tune_log(
     for setting in settings:
         if not setting.startswith("observer."):
             raise InputError(f"--set {setting}: write observer.PARAMETER=VALUE")
-    given = parameters_of([observer + setting.removeprefix("observer") for setting in settings])
+    start_parameters = parameters_of([observer + setting.removeprefix("observer") for setting in settings])
     noises = noise_numbers(noise)
     check_distinct_logs(logs)
     recordings = [read_log(path, options) for path in logs]
@@ -197,7 +197,7 @@ def tune_log(
                 observer,
                 model=pendulum,
                 noises=noises,
-                given=given.get(observer),
+                start_parameters=start_parameters.get(observer),
                 split=split,
                 settle_s=settle_s,
                 parameters=_names(parameters),

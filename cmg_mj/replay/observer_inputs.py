@@ -60,7 +60,7 @@ def observer_inputs(
     scenario = parse_scenario(dict(log.scenario), log.name)
     plant = plant_parameters_of(scenario)
     noise = _run_noise(log, scenario, plant, noises)
-    _, run_model, sensor_noise = design(scenario, plant).given
+    _, run_model, sensor_noise = design(scenario, plant).constructor_arguments
     in_loop = {scenario.observer.kind: scenario.observer.parameters}
     merged = {kind: {**in_loop.get(kind, {}), **parameters.get(kind, {})} for kind in {**in_loop, **parameters}}
     return ObserverInputs(model or run_model, noise or sensor_noise, merged)

@@ -43,22 +43,22 @@ class Design:
     law: Law
 
     @property
-    def given(self) -> tuple[float, ReducedModel, TiltNoise]:
-        """The parameters that every observer gets: control period [s], reduced model, noise by the datasheet."""
+    def constructor_arguments(self) -> tuple[float, ReducedModel, TiltNoise]:
+        """Arguments of every observer: control period [s], reduced model, noise by the datasheet."""
         return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors)
 
     def fresh_law(self) -> Law:
         """Make the law of a run."""
         controller = self.scenario.controller
-        return self.law if controller.kind in LAWS else controller.law(*self.given[1:])
+        return self.law if controller.kind in LAWS else controller.law(*self.constructor_arguments[1:])
 
     def observer(self) -> Observer:
         """Make the observer in the loop."""
-        return self.scenario.observer.make(*self.given)
+        return self.scenario.observer.make(*self.constructor_arguments)
 
     def open_loop_observers(self) -> dict[str, Observer]:
         """Make the open-loop observers, by name."""
-        return {name: make_observer(name, *self.given) for name in self.scenario.open_loop_names()}
+        return {name: make_observer(name, *self.constructor_arguments) for name in self.scenario.open_loop_names()}
 
     def controller(
         self,

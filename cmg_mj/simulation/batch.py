@@ -111,7 +111,7 @@ def _key_parts(scenario: Scenario, design: Design, axis: str) -> Iterator[tuple[
     for field, value in _leaves(scenario.as_fields()):
         if field.partition(".")[0] not in UNUSED and not can_vary_in_batch(field, law):
             yield KeyPart("field", field, axis), hashable(value)
-    _, model, noise = design.given
+    _, model, noise = design.constructor_arguments
     yield KeyPart("reduced model", axis=axis), model
     for observer in (scenario.observer.kind, *scenario.open_loop_names()):
         if takes_noise(observer):
@@ -200,7 +200,9 @@ def batched(
 def _batched_law(laws: Sequence[Law]) -> Law:
     """One law that stands for a law a world, which differ in what may be arrays alone."""
     law = laws[0]
-    arrays = {name: batch_values([getattr(own, name) for own in laws]) for name in getattr(law, "arrays", ())}
+    arrays = {
+        name: batch_values([getattr(world_law, name) for world_law in laws]) for name in getattr(law, "arrays", ())
+    }
     if all(values is getattr(law, name) for name, values in arrays.items()):
         return law
     batched = copy.copy(law)

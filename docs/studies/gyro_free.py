@@ -230,7 +230,7 @@ def model(noises: Sequence[float]) -> None:
     rows = []
     for noise in noises:
         of = experiment("gyro_free", noise)
-        dt, reduced, said = of.design.given
+        dt, reduced, said = of.design.constructor_arguments
         free = of.run_many(1, keep_trajectory=False).mean(ERROR, "floor_accel") or math.nan
         known = velocity_floor(reduced, dt, said.tilt)
         rows.append([f"{noise:g}", f"{free:.5f}", f"{known:.5f}", f"{100.0 * (1.0 - known / free):.1f} %"])

@@ -84,7 +84,7 @@ def test_noise_gain_is_that_of_the_impulse_response(kind: str, motion: Motion) -
 
 def test_one_that_is_shown_the_acceleration_has_it_in_both(motion: Motion) -> None:
     """A push is at once in the acceleration; of the noise, that of the acceleration is what the rate has most of."""
-    noise = motion.experiment.design.given[2]
+    noise = motion.experiment.design.constructor_arguments[2]
     found = character("gyro_free", motion)
     assert found.lag_s is not None
     assert abs(found.lag_s) < 1e-4

@@ -176,7 +176,10 @@ def test_noise_of_two_accelerometers_follows_from_theirs(tmp_path: Path) -> None
 
 def test_the_noise_of_a_runs_accelerometers_can_be_told(run: Path) -> None:
     """All else of its sensors stays: told what it had, it is the run's; of its resolution the rest."""
-    recorded, of_the_run = read_log(run), prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]
+    recorded, of_the_run = (
+        read_log(run),
+        prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2],
+    )
     assert observer_inputs(recorded, noises={"accelerometer": 300.0}).noise == of_the_run
     more = observer_inputs(recorded, noises={"accelerometer": 600.0}).noise
     assert more.tilt == pytest.approx(2.0 * of_the_run.tilt, rel=1e-4)
@@ -238,8 +241,8 @@ def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
     """Its rig (no --model), its sensors' noise and its observer's parameters: the given error is that of a replay."""
     recorded = read_log(run)
     study = tune_on_logs([recorded], "homogeneous", parameters=["k1"], ranges={"k1": (22.0, 24.0)}, settle_s=0.3)
-    assert study.given["k1"] == 23.0
-    assert study.noises == [prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]]
+    assert study.start_parameters["k1"] == 23.0
+    assert study.noises == [prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]]
     half = recorded.cut(slice(len(recorded) // 2, None))
     study = tune_on_logs([recorded], "gyro_free", parameters=["jerk"], settle_s=0.3)
     error = half["reference_rad_s"] - replay_prepared(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
@@ -252,7 +255,7 @@ def test_every_log_is_tuned_with_its_own_noise(run: Path) -> None:
     plain = read_log(run / "trajectory.parquet", ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
     settings = {"settle_s": 0.2, "parameters": ["tau"], "ranges": {"tau": (0.01, 0.05)}}
     own, other = tune_on_logs([recorded, plain], "linear", **settings).noises
-    assert own == prepare(load_scenario("push_recovery", SETTINGS)).design.given[2]
+    assert own == prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]
     assert other == noise_of(plain) != own
     for noise in tune_on_logs([recorded, plain], "linear", noises={"tilt": 0.7}, **settings).noises:
         assert np.degrees(noise.tilt) == pytest.approx(0.7)

@@ -74,7 +74,7 @@ def character(kind: str, motion: Motion) -> Character:
         Its lag and noise gain.
     """
     experiment = motion.experiment
-    observer = make_observer(kind, *experiment.design.given)
+    observer = make_observer(kind, *experiment.design.constructor_arguments)
     clean = replay(observer, motion.clean).x2
     added = replay(observer, motion.noisy).x2 - clean
     settled = motion.noisy["time_s"] > 1.0
@@ -144,7 +144,7 @@ def update_us(kind: str, motion: Motion) -> float:
         The time [us].
     """
     experiment = motion.experiment
-    observer = make_observer(kind, *experiment.design.given)
+    observer = make_observer(kind, *experiment.design.constructor_arguments)
     short = motion.noisy.between(2.0, 2.5)
     names = "y1_rad", "y2_rad", "acceleration_rad_s2", "u_rad_s"
     return time_of_update(observer, *(short[name][:, 0].tolist() for name in names))

@@ -69,8 +69,8 @@ class Store:
                 finished, or cannot be written.
         """
         path = self.folder / STUDY
-        asked = as_read(self._resolved)
-        there = _require_same(path, asked) if path.exists() else None
+        study = as_read(self._resolved)
+        there = _require_same(path, study) if path.exists() else None
         marks = self._marks()
         left = self.left()
         if left:
@@ -81,10 +81,10 @@ class Store:
                 versions_of[path] = there["scenario"].get("versions")
             _require_versions(versions_of, self._ours.versions)
         elif marks:  # with whatever versions it is finished, the study says so
-            asked["scenario"]["versions"] = dict(marks[0].versions)
+            study["scenario"]["versions"] = dict(marks[0].versions)
         try:
-            if there != asked:
-                write_bytes(path, tomli_w.dumps(asked).encode())
+            if there != study:
+                write_bytes(path, tomli_w.dumps(study).encode())
         except OSError as error:
             raise InputError(f"{self.folder}: cannot be written: {error.strerror or error}") from error
         chunks = self.folder / CHUNKS
@@ -223,14 +223,14 @@ def _require_versions(versions_of: Mapping[Path, FieldValue | None], ours: Mappi
             )
 
 
-def _require_same(path: Path, asked: StudyFields) -> StudyFields:
+def _require_same(path: Path, study: StudyFields) -> StudyFields:
     try:
         there = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         there = {}
     if any(not isinstance(there.get(section), dict) for section in SECTIONS):
         raise InputError(f"{path}: is no study as cmg-mj writes it; name another folder")
-    other = first_difference(without_asides(there), without_asides(asked))
+    other = first_difference(without_asides(there), without_asides(study))
     if other:
         raise InputError(f"{path.parent}: holds another study: {other}; name another folder")
     return there

@@ -105,7 +105,7 @@ class LogStudy:
 
     Attributes:
         kind: The observer.
-        given: Its parameters before.
+        start_parameters: Its parameters before.
         numbers: The tuned numbers.
         insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
         names: The logs.
@@ -118,7 +118,7 @@ class LogStudy:
     """
 
     kind: str
-    given: ParameterValues
+    start_parameters: ParameterValues
     numbers: Sequence[TunedScalar]
     insensitive_parameters: Sequence[str]
     names: Sequence[str]
@@ -146,7 +146,7 @@ def tune_on_logs(
     *,
     model: ReducedModel | None = None,
     noises: Mapping[str, float] | None = None,
-    given: ParameterValues | None = None,
+    start_parameters: ParameterValues | None = None,
     split: float = 0.5,
     settle_s: float = 1.0,
     parameters: Sequence[str] = (),
@@ -161,7 +161,7 @@ def tune_on_logs(
         kind: The observer.
         model: The pendulum, for an observer that needs it; a run's recording brings its own.
         noises: Noises from `noise_numbers`; by default each log's own, as in `replay_prepared`.
-        given: Parameters to start from and to compare with, where not the defaults, or those of a run's loop.
+        start_parameters: Parameters to start from and to compare with, instead of the defaults or a run's own.
         split: The share of each log, from its start, that is fitted; the rest is scored.
         settle_s: Time from every start of an observer that is not scored [s].
         parameters: Names to tune; by default every number of the observer.
@@ -178,8 +178,10 @@ def tune_on_logs(
     if not 0.0 < split < 1.0:
         raise InputError(f"--split {split:g}: must be between 0 and 1, the share that is fitted")
     dt = _common_period(logs)
-    inputs = [observer_inputs(log, model=model, noises=noises, parameters={kind: given or {}}) for log in logs]
-    given = _common_parameters(kind, logs, inputs)
+    inputs = [
+        observer_inputs(log, model=model, noises=noises, parameters={kind: start_parameters or {}}) for log in logs
+    ]
+    start_parameters = _common_parameters(kind, logs, inputs)
     fit, held_out = (
         LogSegments([log.cut(_share(log, split, first=first)) for log in logs], settle_s) for first in (True, False)
     )
@@ -187,7 +189,7 @@ def tune_on_logs(
         # An observer that cannot take part is refused, with the reason.
         replay_log(part, [kind], **log_inputs._asdict(), settle_s=settle_s)
     makers: list[MakeObserver] = [partial(make_observer, kind, dt, log.model or NO_MODEL, log.noise) for log in inputs]
-    values = parameters_of(kind, makers[0](**given), given)
+    values = parameters_of(kind, makers[0](**start_parameters), start_parameters)
     numbers = narrowed(numbers_of(kind, values, makers[0], parameters), ranges or {}, "--range")
 
     def one_per_log(**candidate: ParameterValue) -> list[Observer]:
@@ -226,14 +228,14 @@ def _common_period(logs: Sequence[Log]) -> float:
 
 def _common_parameters(kind: str, logs: Sequence[Log], inputs: Sequence[ObserverInputs]) -> ParameterValues:
     """Return the observer's parameters, which must be the same in all logs."""
-    given = dict(inputs[0].parameters[kind])
+    parameters = dict(inputs[0].parameters[kind])
     for log, log_inputs in zip(logs, inputs, strict=True):
-        if log_inputs.parameters[kind] != given:
+        if log_inputs.parameters[kind] != parameters:
             raise InputError(
                 f"{logs[0].name} and {log.name} ran with different parameters of {kind}: say with which to begin, "
                 "--set observer.NAME=VALUE"
             )
-    return given
+    return parameters
 
 
 def _share(log: Log, split: float, *, first: bool) -> slice:

@@ -29,14 +29,14 @@ class TunedScalar:
     Attributes:
         parameter: The observer's parameter that contains the number.
         place: Indices in the parameter: `(1,)` for the second element, `()` for the parameter itself.
-        given: Its value before the tuning, not zero. Its sign is kept.
+        start: Its value before the tuning, not zero. Its sign is kept.
         low: Smallest size.
         high: Largest size.
     """
 
     parameter: str
     place: tuple[int, ...]
-    given: float
+    start: float
     low: float
     high: float
 
@@ -46,20 +46,20 @@ class TunedScalar:
         return self.parameter + "".join(f"[{i}]" for i in self.place)
 
 
-def parameters_of(kind: str, observer: Observer, given: ParameterValues) -> dict[str, ParameterValue]:
+def parameters_of(kind: str, observer: Observer, arguments: ParameterValues) -> dict[str, ParameterValue]:
     """Return an observer's parameters with their values.
 
     Args:
         kind: The observer's name.
         observer: The observer.
-        given: Parameters that it was constructed from.
+        arguments: Parameters that it was constructed from.
 
     Returns:
         Name -> value, without those that cannot be read off the observer.
     """
     signature = inspect.signature(observer_class(kind)).parameters.values()
     defaults = {p.name: p.default for p in signature if p.name not in BENCH_PARAMETERS}
-    values = {name: getattr(observer, name, default) for name, default in {**defaults, **given}.items()}
+    values = {name: getattr(observer, name, default) for name, default in {**defaults, **arguments}.items()}
     return {name: _as_tuples(value) for name, value in values.items() if value is not inspect.Parameter.empty}
 
 
@@ -77,7 +77,7 @@ def replaced(
     changed = dict(values)
     for number, size in zip(numbers, sizes, strict=True):
         changed[number.parameter] = _put(
-            changed[number.parameter], number.place, math.copysign(float(size), number.given)
+            changed[number.parameter], number.place, math.copysign(float(size), number.start)
         )
     return changed
 
@@ -138,11 +138,11 @@ def _leaves(value: ParameterValue, place: tuple[int, ...]) -> Iterator[tuple[tup
 
 
 def _bounded(
-    name: str, place: tuple[int, ...], given: float, values: ParameterValues, make: MakeObserver
+    name: str, place: tuple[int, ...], start: float, values: ParameterValues, make: MakeObserver
 ) -> TunedScalar:
     """Find by bisection the range of a number that the observer accepts while the others stay."""
-    unbounded = TunedScalar(name, place, given, 0.0, math.inf)
-    size = abs(given)
+    unbounded = TunedScalar(name, place, start, 0.0, math.inf)
+    size = abs(start)
 
     def accepted(candidate: float) -> bool:
         try:
@@ -160,7 +160,7 @@ def _bounded(
             inside, outside = (middle, outside) if accepted(middle) else (inside, middle)
         return inside
 
-    return TunedScalar(name, place, given, farthest(size / SPAN), farthest(size * SPAN))
+    return TunedScalar(name, place, start, farthest(size / SPAN), farthest(size * SPAN))
 
 
 def narrowed(

@@ -30,7 +30,7 @@ def figures_of(study: TuningResult) -> dict[str, SummaryValue]:
         "worlds_fitted": study.worlds,
         "window_s": list(study.window),
         "scored_s": [list(window) for window in windows_of(study.scenario)],
-        "given_parameters": plain(study.given),
+        "given_parameters": plain(study.start_parameters),
         "tuned": [number.name for number in study.numbers],
         "idle": list(study.insensitive_parameters),
         "levels": [level_figures(level) for level in study.levels],
@@ -72,7 +72,7 @@ def tuning_table(study: TuningResult) -> Table:
     table.caption_justify = "left"
     table.add_column("noise\n[ug/rtHz]", justify="right", vertical="bottom")
     for number in study.numbers:
-        table.add_column(f"{number.name}\ngiven {number.given:.4g}", justify="right", vertical="bottom")
+        table.add_column(f"{number.name}\ngiven {number.start:.4g}", justify="right", vertical="bottom")
     for heading in (
         "held out:\ntuned\n[rad/s]",
         "\ngiven\n[rad/s]",
@@ -81,7 +81,7 @@ def tuning_table(study: TuningResult) -> Table:
     ):
         table.add_column(heading, justify="right", vertical="bottom")
     for level in study.levels:
-        signed = {n.name: math.copysign(level.sizes[n.name], n.given) for n in study.numbers}
+        signed = {n.name: math.copysign(level.sizes[n.name], n.start) for n in study.numbers}
         sizes = (f"{size:.4g}{'*' if name in level.edges else ''}" for name, size in signed.items())
         table.add_row(
             f"{level.noise_ug_rthz:g}",

@@ -28,7 +28,7 @@ def figures_of_logs(study: LogStudy) -> dict[str, SummaryValue]:
         "logs": list(study.names),
         "observer": study.kind,
         "split": study.split,
-        "given_parameters": plain(study.given),
+        "given_parameters": plain(study.start_parameters),
         "tuned": [number.name for number in study.numbers],
         "idle": list(study.insensitive_parameters),
         "noise": [
@@ -67,8 +67,8 @@ def logs_table(study: LogStudy) -> Group:
     for heading in ("parameter", "given", "tuned"):
         table.add_column(heading, justify="left" if heading == "parameter" else "right")
     for number in study.numbers:
-        size = math.copysign(level.sizes[number.name], number.given)
-        table.add_row(number.name, f"{number.given:.4g}", f"{size:.4g}{'*' if number.name in level.edges else ''}")
+        size = math.copysign(level.sizes[number.name], number.start)
+        table.add_row(number.name, f"{number.start:.4g}", f"{size:.4g}{'*' if number.name in level.edges else ''}")
     table.add_section()
     table.add_row("held out [rad/s]", f"{level.given_rms.mean():.4f}", f"{level.rms.mean():.4f}")
     table.add_row("given / tuned, 95 %", "", ratio_text(level.ratio) if study.has_interval else "-")

@@ -30,14 +30,14 @@ Height = Callable[[np.ndarray], float]
 
 
 def insensitive_numbers(
-    loss: Loss, numbers: Sequence[TunedScalar], given: float, factor: float = 10.0
+    loss: Loss, numbers: Sequence[TunedScalar], start_loss: float, factor: float = 10.0
 ) -> list[TunedScalar]:
     """Return the numbers that the loss does not depend on: it is the same to six digits if they change tenfold.
 
     Args:
         loss: The loss.
         numbers: The candidates.
-        given: The loss of the given sizes.
+        start_loss: The loss of the given sizes.
         factor: Factor by which each is changed.
 
     Returns:
@@ -45,12 +45,12 @@ def insensitive_numbers(
     """
     insensitive = []
     for i, number in enumerate(numbers):
-        sizes = [abs(other.given) for other in numbers]
+        sizes = [abs(other.start) for other in numbers]
         changes = []
         for moved in (max(sizes[i] / factor, number.low), min(sizes[i] * factor, number.high)):
             value = loss([*sizes[:i], moved, *sizes[i + 1 :]])
-            changes.append(abs(value - given) if math.isfinite(value) else math.inf)
-        if math.isfinite(given) and max(changes) <= 1e-6 * given:
+            changes.append(abs(value - start_loss) if math.isfinite(value) else math.inf)
+        if math.isfinite(start_loss) and max(changes) <= 1e-6 * start_loss:
             insensitive.append(number)
     return insensitive
 
@@ -75,8 +75,8 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
         The best sizes and their loss, which is infinite if there is none.
     """
     low, high = (np.log([getattr(number, end) for number in numbers]) for end in ("low", "high"))
-    given = np.clip(np.log([abs(number.given) for number in numbers]), low, high)
-    best: tuple[float, np.ndarray] = (math.inf, given)
+    start = np.clip(np.log([abs(number.start) for number in numbers]), low, high)
+    best: tuple[float, np.ndarray] = (math.inf, start)
 
     def height(point: np.ndarray) -> float:
         nonlocal best
@@ -89,7 +89,7 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
     if len(numbers) == 1:
         _search_line(height, float(low[0]), float(high[0]))
     else:
-        _search_simplex(height, low, high, given, starts)
+        _search_simplex(height, low, high, start, starts)
     return [float(size) for size in np.exp(np.clip(best[1], low, high))], math.exp(best[0])
 
 
@@ -108,12 +108,12 @@ def _search_line(height: Height, low: float, high: float) -> None:
     )
 
 
-def _search_simplex(height: Height, low: np.ndarray, high: np.ndarray, given: np.ndarray, starts: int) -> None:
-    n = len(given)
-    first = [given]
+def _search_simplex(height: Height, low: np.ndarray, high: np.ndarray, log_sizes: np.ndarray, starts: int) -> None:
+    n = len(log_sizes)
+    first = [log_sizes]
     if starts > 1:
         reach = math.log(SCATTER_FACTOR)
-        floor, ceiling = np.maximum(low, given - reach), np.minimum(high, given + reach)
+        floor, ceiling = np.maximum(low, log_sizes - reach), np.minimum(high, log_sizes + reach)
         # `seed` is what every scipy takes; the name `rng` is known from 1.15 on.
         cube = qmc.LatinHypercube(n, seed=np.random.default_rng(0))  # pyright: ignore[reportCallIssue]
         unit = cube.random(SCATTER * n)

@@ -132,7 +132,7 @@ class TuningResult:
     Attributes:
         scenario: The experiment.
         kind: The observer.
-        given: Its parameters before.
+        start_parameters: Its parameters before.
         numbers: The tuned numbers.
         insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
         worlds: Number of worlds to fit; as many are held out for scoring.
@@ -142,7 +142,7 @@ class TuningResult:
 
     scenario: Scenario
     kind: str
-    given: ParameterValues
+    start_parameters: ParameterValues
     numbers: Sequence[TunedScalar]
     insensitive_parameters: Sequence[str]
     worlds: int
@@ -192,8 +192,8 @@ def tune(
     experiment = prepare(scenario)
     experiment.require_single_axis("tuning")
     experiment.dry_run(worlds=2)
-    given = parameters_of(kind, experiment.design.observer(), scenario.observer.parameters)
-    numbers = numbers_of(kind, given, _maker(experiment), parameters)
+    start_parameters = parameters_of(kind, experiment.design.observer(), scenario.observer.parameters)
+    numbers = numbers_of(kind, start_parameters, _maker(experiment), parameters)
     numbers = narrowed(numbers, ranges or {}, "--range")
     recorded = recorded or recorder(halves(scenario, worlds, densities), warm_up_s=warm_up_s)
     spans = range(worlds), range(worlds, 2 * worlds)
@@ -208,14 +208,14 @@ def tune(
                 on_share((i + min(done, 1.0)) / len(densities))
 
         fit, held_out = (recorded(scenario, span, noise_ug_rthz=density, warm_up_s=warm_up_s) for span in spans)
-        fitter = ParameterFit(kind, _maker(experiment, density), given, fit, share)
+        fitter = ParameterFit(kind, _maker(experiment, density), start_parameters, fit, share)
         if not levels:
             window = fit.window
             numbers, insensitive = fitter.sensitive_parameters(numbers)
         fitter.expected = evaluations(len(numbers))
         start = numbers
         if levels:  # the best values at the level before are near the best at this one
-            start = [replace(n, given=math.copysign(levels[-1].sizes[n.name], n.given)) for n in numbers]
+            start = [replace(n, start=math.copysign(levels[-1].sizes[n.name], n.start)) for n in numbers]
         try:
             levels.append(level_of(density, fitter, start, held_out, starts))
             share(1.0)
@@ -224,12 +224,12 @@ def tune(
                 raise
             break
     names = [number.name for number in insensitive]
-    return TuningResult(scenario, kind, given, numbers, names, worlds, window, levels)
+    return TuningResult(scenario, kind, start_parameters, numbers, names, worlds, window, levels)
 
 
 def _maker(experiment: Experiment, noise_ug_rthz: float | None = None) -> MakeObserver:
     """Return what makes the scenario's observer from its parameters, for the sensor noise of the tuning."""
-    dt, model, noise = experiment.design.given
+    dt, model, noise = experiment.design.constructor_arguments
     if noise_ug_rthz is not None:
         sensors = experiment.scenario.sensors
         accelerometer = replace(sensors.accelerometer, noise_density_ug_rthz=noise_ug_rthz)
@@ -243,7 +243,7 @@ class ParameterFit(Generic[M]):
     Args:
         kind: The observer's name.
         make: Makes what is scored from parameters: an observer, or one for each log.
-        given: The given parameters.
+        start_parameters: The given parameters.
         data: The fitted worlds, or stretches of logs.
         on_share: Called with the completed share of the evaluations.
 
@@ -253,13 +253,18 @@ class ParameterFit(Generic[M]):
     """
 
     def __init__(
-        self, kind: str, make: Callable[..., M], given: ParameterValues, data: ScoringData[M], on_share: OnShare
+        self,
+        kind: str,
+        make: Callable[..., M],
+        start_parameters: ParameterValues,
+        data: ScoringData[M],
+        on_share: OnShare,
     ) -> None:
-        self.kind, self.make, self.given, self.data = kind, make, given, data
+        self.kind, self.make, self.start_parameters, self.data = kind, make, start_parameters, data
         self.on_share = on_share
         self.expected = 1
         self.count = 0
-        self.given_loss = self.mean_error(given)
+        self.given_loss = self.mean_error(start_parameters)
 
     def errors(self, parameters: ParameterValues, data: ScoringData[M]) -> np.ndarray:
         """Return velocity RMS errors, (n_worlds,) [rad/s]; NaN where the observer refuses or fails."""
@@ -279,7 +284,7 @@ class ParameterFit(Generic[M]):
         """Return the mean error of parameters with some sizes [rad/s], and report the progress."""
         self.count += 1
         self.on_share(self.count / self.expected)
-        return self.mean_error(replaced(self.given, numbers, sizes))
+        return self.mean_error(replaced(self.start_parameters, numbers, sizes))
 
     def sensitive_parameters(self, numbers: Sequence[TunedScalar]) -> tuple[list[TunedScalar], list[TunedScalar]]:
         """Divide numbers into those that the estimated rate depends on and the others.
@@ -316,7 +321,7 @@ def level_of(
     sizes, loss = search(lambda sizes: fitter.loss(numbers, sizes), numbers, starts=starts)
     if not math.isfinite(loss):
         raise InputError(f"{fitter.kind}: no parameters give an estimate that stays finite")
-    given_sizes = [abs(_get(fitter.given[number.parameter], number.place)) for number in numbers]
+    given_sizes = [abs(_get(fitter.start_parameters[number.parameter], number.place)) for number in numbers]
     inside = all(number.low <= size <= number.high for number, size in zip(numbers, given_sizes, strict=True))
     if inside and fitter.given_loss <= loss:  # a search stops within its tolerance
         sizes = given_sizes
@@ -324,7 +329,7 @@ def level_of(
         rounded = [float(f"{size:.{DIGITS}g}") for size in sizes]
         if math.isfinite(fitter.loss(numbers, rounded)):  # not beyond an open limit
             sizes = rounded
-    tuned = replaced(fitter.given, numbers, sizes)
+    tuned = replaced(fitter.start_parameters, numbers, sizes)
     return NoiseLevelResult(
         noise_ug_rthz=noise,
         parameters=tuned,
@@ -333,7 +338,7 @@ def level_of(
         fit_rms=fitter.mean_error(tuned),
         fit_given_rms=fitter.given_loss,
         rms=fitter.errors(tuned, held_out),
-        given_rms=fitter.errors(fitter.given, held_out),
+        given_rms=fitter.errors(fitter.start_parameters, held_out),
         zero_rms=held_out.zero_rms,
         largest_acceleration=fitter.data.largest_acceleration,
         fell=fitter.data.fell + held_out.fell,
@@ -379,7 +384,7 @@ def best_noise(study: TuningResult) -> BestNoise:
         return BestNoise("not bracketed", None)
     if len(study.numbers) == 1:
         (number,) = study.numbers
-        off = [math.log(level.sizes[number.name] / abs(number.given)) for level in levels]
+        off = [math.log(level.sizes[number.name] / abs(number.start)) for level in levels]
         crossed = crossing([math.log(level.noise_ug_rthz) for level in levels], off)
         if crossed is not None:
             return BestNoise("found", math.exp(crossed))

@@ -54,7 +54,7 @@ def test_a_sign_stays() -> None:
 def test_a_users_own_observer_is_read_as_well() -> None:
     (gain,) = numbers(OWN)
     assert gain.name == "gain"
-    assert gain.given == 2.0
+    assert gain.start == 2.0
     assert gain.high == pytest.approx(10.0)
 
 
