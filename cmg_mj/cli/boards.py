@@ -23,7 +23,7 @@ from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
 )
 @click.option(
     "--name",
-    "asked",
+    "name",
     metavar="NAME",
     help="Prefix of files, types and functions.  [default: OBSERVER's name]",
 )
@@ -47,7 +47,7 @@ def export(
     observer: str,
     out: str | None,
     precision: Literal["double", "single"],
-    asked: str | None,
+    name: str | None,
     scenario: str,
     settings: tuple[str, ...],
     as_json: bool,
@@ -73,7 +73,7 @@ def export(
     note_hints(experiment.hints)
     experiment.require_single_axis("export")
     controller = experiment.axis_controller()
-    name = name_of(controller.observer, asked)
+    name = name_of(controller.observer, name)
     place = Path("runs") / f"export-{name}-{precision}" if out is None else output_path(out)
     with claim_folder(place, export_files(name)) as folder:
         code = generate_code(controller, precision, name)

@@ -171,19 +171,19 @@ def progress(
     bar = Progress(*columns, console=console, transient=True)
     task = bar.add_task(label, total=total, pace="")
 
-    shown = -total
+    position = -total
 
     def on_progress(done: float, now: str | None = None) -> None:
-        nonlocal shown
+        nonlocal position
         if ctrl_c is not None:
             ctrl_c.check()
         if pace is not None and not console.is_terminal:
             if line := pace.line(done):
                 note(line)
             return
-        if now is None and done - shown < total / 2000.0:
+        if now is None and done - position < total / 2000.0:
             return  # called after every tick, of which one in many is worth drawing
-        shown = done
+        position = done
         bar.update(task, completed=done, description=now)  # None leaves the description as it is
         if pace is not None:
             bar.update(task, pace=pace.text(done))

@@ -23,14 +23,14 @@ class UserClassKind:
         what: `observer` or `law`.
         section: The scenario's section whose `kind` names one and whose other fields are its parameters.
         known: Name a user types -> dotted path of the class.
-        given: Parameters that the bench gives, not the user.
+        bench_parameters: Parameters that the bench gives, not the user.
         methods: What it must have: name -> its parameters, in words.
     """
 
     what: str
     section: str
     known: Mapping[str, str]
-    given: Collection[str]
+    bench_parameters: Collection[str]
     methods: Mapping[str, str]
 
     def find(self, kind: str) -> type:
@@ -71,7 +71,7 @@ class UserClassKind:
 
     def own(self, kind: str) -> list[str]:
         """List the parameters that are the user's choice."""
-        return [name for name in self.takes(kind) if name not in self.given]
+        return [name for name in self.takes(kind) if name not in self.bench_parameters]
 
     def unknown(self, kind: str, names: Iterable[str], common: Iterable[str]) -> list[str]:
         """Find the fields of a section that are neither every class' nor this one's.
@@ -108,7 +108,7 @@ class UserClassKind:
         """
         types = fields_of(self.find(kind))
         for name, value in parameters.items():
-            if name in self.given:
+            if name in self.bench_parameters:
                 raise InputError(f"{self.section}.{name}: set by the bench, which gives it to every {self.what}")
             if name not in types:
                 continue  # a name that the class does not have, or no class of pydantic's: its constructor decides
@@ -120,12 +120,12 @@ class UserClassKind:
                 wrong = not_allowed(f"{self.section}.{name}", value, types[name], finite=finite)
                 raise InputError(f"{wrong} ({self.what} {kind})") from error
 
-    def make(self, kind: str, given: Mapping[str, Any], parameters: Mapping[str, Any]) -> Any:
+    def make(self, kind: str, bench_arguments: Mapping[str, Any], parameters: Mapping[str, Any]) -> Any:
         """Construct one.
 
         Args:
             kind: A name of `known`, or `package.module:Class`.
-            given: What the bench gives it.
+            bench_arguments: What the bench gives it.
             parameters: The user's choice; those left out keep their defaults.
 
         Returns:
@@ -137,9 +137,9 @@ class UserClassKind:
         cls = self.find(kind)
         self.check_names(kind, parameters)
         try:
-            return cls(**given, **parameters)
+            return cls(**bench_arguments, **parameters)
         except ValidationError as error:
-            clause = complaint(cls, error.errors()[0], {**given, **parameters})
+            clause = complaint(cls, error.errors()[0], {**bench_arguments, **parameters})
             raise InputError(f"{self.section}.{clause} ({self.what} {kind})") from error
         except (Exception, SystemExit) as error:  # a user's own class may refuse its parameters in its own way
             raise InputError(f"{self.what} {kind}: {raised(error)}") from error

@@ -200,8 +200,8 @@ class Adaptive:
         change = [h * lm * nu for lm in Lm]
         x1, x2 = reduce(add, map(mul, T1, change), x1), reduce(add, map(mul, T2, change), x2)
         xm = tuple(map(add, xm, change))
-        found = [xm[i] for i in self._shown]
-        return State(x1, x2, xm, T1, T2, y), self._estimate(x1, x2, y2, *found)
+        signals = [xm[i] for i in self._shown]
+        return State(x1, x2, xm, T1, T2, y), self._estimate(x1, x2, y2, *signals)
 
     def _acting(self, tilt: Scalar, inertia: Scalar) -> list[Scalar]:
         """Second row of B0 Cm, an entry a state of the exosystem; of a sinusoid its mean over the sample."""

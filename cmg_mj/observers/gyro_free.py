@@ -124,9 +124,9 @@ class GyroFree:
     @cached_property
     def _noise(self) -> tuple[float, float, float]:
         """C and the variance of n and of v', where v = c n + v' and v' is independent of n."""
-        of = self.noise
+        noise = self.noise
         return (
-            of.correlation * of.tilt / of.acceleration if of.acceleration else 0.0,
-            of.acceleration**2,
-            of.tilt**2 * (1.0 - of.correlation**2),
+            noise.correlation * noise.tilt / noise.acceleration if noise.acceleration else 0.0,
+            noise.acceleration**2,
+            noise.tilt**2 * (1.0 - noise.correlation**2),
         )

@@ -81,7 +81,7 @@ class HomogeneousAdaptive:
 
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, BiasedEstimate]:
         """Advance by one sample period: first the bias, then (11) with it."""
-        adaptive, found = self._adaptive.step(state.adaptive, y, u)
-        bias = found[3]
+        adaptive, adaptive_estimate = self._adaptive.step(state.adaptive, y, u)
+        bias = adaptive_estimate[3]
         homogeneous, estimate = self._homogeneous.step(state.homogeneous, y, u, bias)
         return State(adaptive, homogeneous), BiasedEstimate(*estimate, bias)

@@ -48,8 +48,8 @@ class Luenberger:
     def __post_init__(self) -> None:
         poles = np.linalg.eigvals(self.error_matrix)
         if not is_hurwitz(poles):
-            shown = ", ".join(f"{p:.3g}" for p in poles)
-            raise ValueError(f"L: A - L C must be Hurwitz (left of -{MARGIN:g} 1/s), its eigenvalues are {shown}")
+            eigenvalues = ", ".join(f"{p:.3g}" for p in poles)
+            raise ValueError(f"L: A - L C must be Hurwitz (left of -{MARGIN:g} 1/s), its eigenvalues are {eigenvalues}")
 
     @property
     def error_matrix(self) -> np.ndarray:

@@ -69,13 +69,13 @@ def make_observer(
         InputError: Unknown observer or parameter, or a parameter that the observer refuses.
     """
     check_names(kind, parameters)
-    taken = OF_OBSERVERS.takes(kind)
-    given: dict[str, float | ReducedModel | TiltNoise | None] = {"dt": dt, "model": model}
-    if "noise" in taken:
-        if noise is None and taken["noise"].default is inspect.Parameter.empty:
+    signature = OF_OBSERVERS.takes(kind)
+    bench_arguments: dict[str, float | ReducedModel | TiltNoise | None] = {"dt": dt, "model": model}
+    if "noise" in signature:
+        if noise is None and signature["noise"].default is inspect.Parameter.empty:
             raise InputError(f"observer {kind}: needs the noise of its sensors (a TiltNoise after the model)")
-        given["noise"] = noise
-    return OF_OBSERVERS.make(kind, given, parameters)
+        bench_arguments["noise"] = noise
+    return OF_OBSERVERS.make(kind, bench_arguments, parameters)
 
 
 def check_names(kind: str, names: Iterable[str]) -> None:

@@ -101,12 +101,12 @@ class Metrics:
         self._squares["velocity_push"] += _sum_of_squares(block.x2, pushed)
         if self._floors:
             self._floors.add(block.y1, block.x2, counted, pushed)
-        judged = counted & (tick * self._dt >= self._bias_from - 1e-9)
+        bias_ticks = counted & (tick * self._dt >= self._bias_from - 1e-9)
         for name, estimate in zip(self.observers, block.estimates, strict=True):
             self._errors[name].add(estimate["x2_rad_s"], block, counted, pushed)
             for signal in self._targets:
                 if signal in estimate:
-                    self._add_signal(name, signal, estimate[signal], judged)
+                    self._add_signal(name, signal, estimate[signal], bias_ticks)
         for name, rate in (references or {}).items():
             self._errors[name].add(rate, block, counted, pushed)
         self._saturated += (counted & (np.abs(block.u) >= self._limit)).sum(axis=0)
@@ -116,11 +116,11 @@ class Metrics:
         self._last_outside = np.maximum(self._last_outside, np.where(outside, tick, -1).max(axis=0, initial=-1))
         self._last_tick = np.maximum(self._last_tick, np.where(counted, tick, -1).max(axis=0, initial=-1))
 
-    def _add_signal(self, name: str, signal: str, values: np.ndarray, judged: np.ndarray) -> None:
+    def _add_signal(self, name: str, signal: str, values: np.ndarray, ticks: np.ndarray) -> None:
         sums = self._signals[name].setdefault(signal, np.zeros((3, len(self._count))))
-        sums[0] += judged.sum(axis=0)
-        sums[1] += _sum(values, judged)
-        sums[2] += _sum_of_squares(values - self._targets[signal], judged)
+        sums[0] += ticks.sum(axis=0)
+        sums[1] += _sum(values, ticks)
+        sums[2] += _sum_of_squares(values - self._targets[signal], ticks)
 
     def _signal_figures(self, name: str, world: int) -> Figures:
         """Give the true value, the mean estimate and its RMS error of each signal; None if the run ended too early."""

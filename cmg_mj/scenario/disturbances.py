@@ -84,10 +84,10 @@ def push_windows(pushes: Iterable[Push]) -> list[Window]:
 
 def inside(time: np.ndarray, windows: Sequence[Window]) -> np.ndarray:
     """Which of these times [s] lie in any of the windows; the same shape."""
-    found = np.zeros(np.shape(time), dtype=bool)
+    mask = np.zeros(np.shape(time), dtype=bool)
     for start, end in windows:
-        found |= (time > start - 1e-9) & (time < end - 1e-9)
-    return found
+        mask |= (time > start - 1e-9) & (time < end - 1e-9)
+    return mask
 
 
 def add_swing_torques(

@@ -59,27 +59,27 @@ def _take_observer(fields: dict[str, Any], observer: str) -> None:
     """Another observer instead of the file's, on all axes; parameters that are another's go."""
     common = _kind_of(fields, "observer")
     axes = fields.get("axes")
-    for own in axes.values() if isinstance(axes, dict) else ():
-        section = own.get("observer") if isinstance(own, dict) else None
+    for axis in axes.values() if isinstance(axes, dict) else ():
+        section = axis.get("observer") if isinstance(axis, dict) else None
         if isinstance(section, dict) and section.get("kind", common) != observer:
-            own.pop("observer")
+            axis.pop("observer")
     if common != observer or not isinstance(fields.get("observer", {}), dict):
         fields["observer"] = {"kind": observer}
 
 
 def _drop_gains(fields: dict[str, Any], overrides: Iterable[str]) -> None:
     """The file's gains are its law's: another law, which --set names, does without unless --set gives it some."""
-    given = [setting.partition("=")[0].strip() for setting in overrides]
+    set_fields = [setting.partition("=")[0].strip() for setting in overrides]
     for name in ("gains", "lqr"):
-        if not any(f"{field}.".startswith(f"controller.{name}.") for field in given):
+        if not any(f"{field}.".startswith(f"controller.{name}.") for field in set_fields):
             fields["controller"].pop(name, None)
 
 
 def _kind_of(fields: Mapping[str, Any], section: str) -> Any:
     """The kind of observer or law that a file names, or the default."""
     usual = {"observer": ObserverSettings().kind, "controller": ControllerSettings().kind}[section]
-    given = fields.get(section)
-    return given.get("kind", usual) if isinstance(given, Mapping) else usual
+    section_fields = fields.get(section)
+    return section_fields.get("kind", usual) if isinstance(section_fields, Mapping) else usual
 
 
 def _read(path: Path, name: str) -> dict[str, Any]:

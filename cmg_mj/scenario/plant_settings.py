@@ -67,8 +67,8 @@ class PlantSettings:
 
     def changes(self) -> dict[str, float]:
         """What is given of friction, damping, inertia, backlash, servos, wheels and places of the accelerometers."""
-        of = ("gimbal", "servo", "accelerometer", "tilt", "flywheel")
-        fields = [field for field in dataclasses.fields(self) if field.name.startswith(of)]
+        prefixes = ("gimbal", "servo", "accelerometer", "tilt", "flywheel")
+        fields = [field for field in dataclasses.fields(self) if field.name.startswith(prefixes)]
         return {field.name: value for field in fields if (value := getattr(self, field.name)) != field.default}
 
     def changes_of_physics(self) -> dict[str, float]:

@@ -41,13 +41,19 @@ def resolved(scenario: Scenario, designs: Mapping[str, Design]) -> dict[str, Any
         return fields
     axes = {}
     for name, design in designs.items():
-        own = _resolved(design.scenario, design)
-        axes[name] = {section: own[section] for section in AxisSettings.model_fields}
-        axes[name]["plant"] = {field: own["plant"][field] for field in own["plant"] if field in AxisPlant.model_fields}
+        axis_fields = _resolved(design.scenario, design)
+        axes[name] = {section: axis_fields[section] for section in AxisSettings.model_fields}
+        axes[name]["plant"] = {
+            field: axis_fields["plant"][field] for field in axis_fields["plant"] if field in AxisPlant.model_fields
+        }
         for field in ALL_AXES_LAW_FIELDS:
             axes[name]["controller"].pop(field)
-    given = scenario.as_fields()
-    return {**fields, **{name: given[name] for name in ("controller", "observer", "open_loop_observers")}, "axes": axes}
+    scenario_fields = scenario.as_fields()
+    return {
+        **fields,
+        **{name: scenario_fields[name] for name in ("controller", "observer", "open_loop_observers")},
+        "axes": axes,
+    }
 
 
 def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
@@ -77,13 +83,13 @@ def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
     return _plain(fields)
 
 
-def _parameters(given: dict[str, Any], part: Any, by_bench: Collection[str]) -> dict[str, Any]:
+def _parameters(parameters: dict[str, Any], part: Any, by_bench: Collection[str]) -> dict[str, Any]:
     """The parameters that were given, and the defaults of the rest as far as they are known and TOML can hold them."""
     if not dataclasses.is_dataclass(part):
-        return given
+        return parameters
     names = [f.name for f in dataclasses.fields(part) if f.init and f.name not in by_bench]
-    defaults = {name: _plain(getattr(part, name, None)) for name in names if name not in given}
-    return {name: value for name, value in defaults.items() if _is_toml(value)} | given
+    defaults = {name: _plain(getattr(part, name, None)) for name in names if name not in parameters}
+    return {name: value for name, value in defaults.items() if _is_toml(value)} | parameters
 
 
 @functools.cache

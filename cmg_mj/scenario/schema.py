@@ -279,8 +279,10 @@ class Scenario(BaseModel):
         """
         common = self.observer.kind
         axes = {
-            name: own if own.observer.get("kind", common) == kind else own.model_copy(update={"observer": {}})
-            for name, own in self.axes.items()
+            name: settings
+            if settings.observer.get("kind", common) == kind
+            else settings.model_copy(update={"observer": {}})
+            for name, settings in self.axes.items()
         }
         observer = self.observer if kind == common else ObserverSettings(kind=kind)
         return self.model_copy(update={"observer": observer, "axes": axes})
@@ -289,12 +291,12 @@ class Scenario(BaseModel):
         """The same experiment with another control law, with its default parameters, on all axes."""
         common = self.controller.kind
         axes = {
-            name: own
-            if own.controller.get("kind", common) == kind
-            else own.model_copy(
-                update={"controller": {n: v for n, v in own.controller.items() if n in COMMON_LAW_FIELDS}}
+            name: settings
+            if settings.controller.get("kind", common) == kind
+            else settings.model_copy(
+                update={"controller": {n: v for n, v in settings.controller.items() if n in COMMON_LAW_FIELDS}}
             )
-            for name, own in self.axes.items()
+            for name, settings in self.axes.items()
         }
         if kind == common:
             return self.model_copy(update={"axes": axes})
@@ -346,14 +348,14 @@ def _unknown_to_bench_law(fields: Mapping[str, Any]) -> list[str]:
     return OF_LAWS.unknown(kind, section, ControllerSettings.model_fields) if is_bench_law else []
 
 
-def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+def _merged(common: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """A section with another's fields in the place of its own, down to the last."""
     both = {
-        name: _merged(common[name], own[name])
-        for name in common.keys() & own.keys()
-        if isinstance(common[name], Mapping) and isinstance(own[name], Mapping)
+        name: _merged(common[name], overrides[name])
+        for name in common.keys() & overrides.keys()
+        if isinstance(common[name], Mapping) and isinstance(overrides[name], Mapping)
     }
-    return {**common, **own, **both}
+    return {**common, **overrides, **both}
 
 
 def _clauses(wrong: Iterable[str]) -> str:

@@ -66,14 +66,14 @@ class _GridTime:
 
     Attributes:
         field: The field that gives it.
-        shown: Its value as the user wrote it.
+        text: Its value as the user wrote it.
         seconds: The time [s].
         exact: The time without what a float cannot hold of it [s].
         unit: `Hz` of a rate's period, `s` of a time; none of what a part does inside.
     """
 
     field: str
-    shown: str
+    text: str
     seconds: float
     exact: Fraction
     unit: str = ""
@@ -81,7 +81,7 @@ class _GridTime:
     def check(self, timestep: float) -> None:
         """Refuse what is no whole number of physics steps [s], and name the nearest that are."""
         try:
-            whole_steps(self.seconds, timestep, self.field, self.shown)
+            whole_steps(self.seconds, timestep, self.field, self.text)
         except InputError as error:
             if not self.unit:
                 raise
@@ -140,7 +140,7 @@ def common_period(scenario: Scenario) -> float:
         common = _common_divisor(common, time.exact)
         if common and common < _fraction(FINEST_S):
             raise InputError(
-                f"{time.field} = {time.shown}: does not fit the other rates and times: no physics step of {FINEST_S:g} "
+                f"{time.field} = {time.text}: does not fit the other rates and times: no physics step of {FINEST_S:g} "
                 "s or more divides them all; take rounder numbers, or set plant.timestep_s"
             )
     return float(common)
@@ -156,8 +156,8 @@ def _grid_times(scenario: Scenario) -> Iterator[_GridTime]:
         accelerometer = part.sensors.accelerometer
         if accelerometer.bandwidth_hz:
             rate = accelerometer.raw_rate_hz
-            shown = f"{accelerometer.bandwidth_hz:g} Hz, sampled at {rate:g} Hz inside the part"
-            yield _GridTime(f"{prefix}sensors.accelerometer.bandwidth_hz", shown, 1.0 / rate, _fraction(1.0 / rate))
+            text = f"{accelerometer.bandwidth_hz:g} Hz, sampled at {rate:g} Hz inside the part"
+            yield _GridTime(f"{prefix}sensors.accelerometer.bandwidth_hz", text, 1.0 / rate, _fraction(1.0 / rate))
         for field, time, unit in numbers:
             if unit == "s":
                 yield _GridTime(field, f"{time:g} s", time, _fraction(time), unit)

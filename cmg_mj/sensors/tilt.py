@@ -112,16 +112,16 @@ class RadialTilt:
         correlation = (w_inner + w_outer) / (math.sqrt(2.0) * both)
         return TiltNoise(sigma * both / gravity, sigma * math.sqrt(2.0) / span, correlation)
 
-    def offset(self, tilt: float, shown: Callable[[Forces], Forces], gravity: float) -> float:
+    def offset(self, tilt: float, response: Callable[[Forces], Forces], gravity: float) -> float:
         """How far y1 is off, at rest, for what the accelerometers make of the specific forces.
 
         Args:
             tilt: The true tilt of the radial line [rad].
-            shown: True specific forces (inner x, z, outer x, z) -> what the accelerometers show [m/s^2].
+            response: True specific forces (inner x, z, outer x, z) -> what the accelerometers show [m/s^2].
             gravity: [m/s^2].
 
         Returns:
             y1 less the tilt [rad].
         """
         x, z = -gravity * math.sin(tilt), gravity * math.cos(tilt)
-        return self(*shown((x, z, x, z))) - tilt
+        return self(*response((x, z, x, z))) - tilt

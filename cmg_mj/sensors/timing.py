@@ -7,14 +7,14 @@ import math
 from cmg_mj.errors import InputError
 
 
-def whole_steps(duration: float, timestep: float, field: str, shown: str) -> int:
+def whole_steps(duration: float, timestep: float, field: str, text: str) -> int:
     """How many physics steps a duration has.
 
     Args:
         duration: Duration [s].
         timestep: Physics step [s].
         field: The scenario field to name in the error.
-        shown: Its value as the user wrote it.
+        text: Its value as the user wrote it.
 
     Returns:
         The whole number of steps.
@@ -26,7 +26,7 @@ def whole_steps(duration: float, timestep: float, field: str, shown: str) -> int
     steps = round(ratio) if math.isfinite(ratio) else 0
     if abs(steps * timestep - duration) > 1e-9 * max(duration, timestep) + 1e-12 or (duration > 0 and steps == 0):
         raise InputError(
-            f"{field} = {shown}: not a whole number of physics steps of {timestep:g} s; "
+            f"{field} = {text}: not a whole number of physics steps of {timestep:g} s; "
             f"rates must divide {1.0 / timestep:g} Hz and times be multiples of {timestep:g} s"
         )
     return steps

@@ -63,15 +63,15 @@ class BatchedObservers:
     def step(self, state: list[State], y: Measurement, u: Scalar) -> tuple[list[State], Estimate]:
         """Advance each by one sample period; estimates are arrays (n_worlds,)."""
         steps = [
-            observer.step(own, _measurement(y, worlds), u[worlds])
-            for own, (observer, worlds) in zip(state, self._parts, strict=True)
+            observer.step(observer_state, _measurement(y, worlds), u[worlds])
+            for observer_state, (observer, worlds) in zip(state, self._parts, strict=True)
         ]
         estimates = [
             [np.broadcast_to(part, shape) for part in estimate]
             for (_, estimate), shape in zip(steps, self._shapes, strict=True)
         ]
         whole = self._estimate(*(np.concatenate(parts) for parts in zip(*estimates, strict=True)))
-        return [own for own, _ in steps], whole
+        return [observer_state for observer_state, _ in steps], whole
 
 
 def _measurement(y: Measurement, worlds: slice) -> Measurement:

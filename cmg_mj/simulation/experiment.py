@@ -73,10 +73,10 @@ class Experiment:
     @property
     def observer_title(self) -> str:
         """The observer in the loop; of several axes with observers of their own, each with its axis."""
-        kinds = [own.scenario.observer.kind for own in self.parts]
+        kinds = [part.scenario.observer.kind for part in self.parts]
         if len(set(kinds)) == 1:
             return kinds[0]
-        return ", ".join(f"{own.plant.axis.name} {kind}" for own, kind in zip(self.parts, kinds, strict=True))
+        return ", ".join(f"{part.plant.axis.name} {kind}" for part, kind in zip(self.parts, kinds, strict=True))
 
     @property
     def observer_names(self) -> list[str]:
@@ -265,7 +265,7 @@ class Experiment:
             plant,
             controller,
             scenario.duration_s,
-            observers={name: own.observer_names for name, own in zip(self.plant.axis_names, self.parts, strict=True)},
+            observers={name: part.observer_names for name, part in zip(self.plant.axis_names, self.parts, strict=True)},
             pushes=scenario.push if pushes is None else pushes,
             swings=scenario.swing,
             settings=scenario.metrics,
@@ -294,12 +294,12 @@ class Experiment:
         """What is no mistake and yet likely to make the rig fall, in clauses."""
         if not self.axes:
             return hints(self.scenario, self.design, self.plant.parameters)
-        return [f"{own.plant.axis.name}: {hint}" for own in self.axes for hint in own.hints]
+        return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
 
     def dry_run(self, worlds: int | None = None) -> None:
         """Try every observer once, on floats or on arrays of so many worlds: see `Design.dry_run`."""
-        for own in self.parts:
-            own.design.dry_run(worlds)
+        for part in self.parts:
+            part.design.dry_run(worlds)
 
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
@@ -315,23 +315,23 @@ class Experiment:
         if base is None:
             return {}
         law = self.scenario.controller.kind
-        own = {} if law == base.controller.kind else {"controller.kind": law}
+        law_change = {} if law == base.controller.kind else {"controller.kind": law}
         other = base.with_observer(self.scenario.observer.kind).with_law(law)
         if other.model_dump(mode="json") == self.scenario.model_dump(mode="json"):
-            return own
+            return law_change
         try:
             bundled = prepare(other)
         except InputError:  # it does not suit this observer
             bundled = prepare(base)
-        return own | differences(bundled.resolved(), self.resolved())
+        return law_change | differences(bundled.resolved(), self.resolved())
 
     def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
         """The resolved scenario: running it again gives the same run; its head says if that needs options."""
-        said = [(ON_THE_BOARD, "--driver board")] if driver == "board" else []
-        said += [(ANOTHER_WORLD.format(world=world), f"--world {world}")] if world else []
-        lines = [" ".join([*(why for why, _ in said), "To the same numbers it runs with"])]
-        lines += [" ".join(["    cmg-mj run scenario.toml", *(option for _, option in said)])]
-        head = "".join(f"# {line}\n" for line in lines) + "\n" if said else ""
+        options = [(ON_THE_BOARD, "--driver board")] if driver == "board" else []
+        options += [(ANOTHER_WORLD.format(world=world), f"--world {world}")] if world else []
+        lines = [" ".join([*(why for why, _ in options), "To the same numbers it runs with"])]
+        lines += [" ".join(["    cmg-mj run scenario.toml", *(option for _, option in options)])]
+        head = "".join(f"# {line}\n" for line in lines) + "\n" if options else ""
         return head + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path, driver: Driver = "native", world: int = 0) -> None:
@@ -361,7 +361,10 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
     if len(plant.axes) == 1 and not scenario.axes:
         return Experiment(scenario, plant, design(scenario, plant.parameters))
     parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
-    axes = tuple(Experiment(own, rig, design(own, rig.parameters)) for own, rig in parts)
+    axes = tuple(
+        Experiment(axis_scenario, axis_plant, design(axis_scenario, axis_plant.parameters))
+        for axis_scenario, axis_plant in parts
+    )
     return Experiment(scenario, plant, axes[0].design, axes)
 
 

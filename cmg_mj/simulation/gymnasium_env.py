@@ -84,7 +84,7 @@ class ScissoredPairEnv(gymnasium.Env):
                 raise InputError(f"readings: {name!r}: no such reading; {nearest(name, READINGS)}")
         if isinstance(scenario, str):
             scenario = load_scenario(scenario, settings)
-        self.experiment = self._given = prepare(scenario)
+        self.experiment = self._base = prepare(scenario)
         self.render_mode = render_mode
         self.metadata = {**type(self).metadata, "render_fps": round(1.0 / self.experiment.law.dt)}
         self._readings = tuple(readings)
@@ -136,10 +136,10 @@ class ScissoredPairEnv(gymnasium.Env):
 
     def _changed(self, settings: Mapping[str, Any]) -> Experiment:
         if not settings:
-            return self._given
-        changed = self._given.with_settings(settings)
-        law, given = changed.law, self._given.law
-        if (law.dt, law.rate_limit) != (given.dt, given.rate_limit):
+            return self._base
+        changed = self._base.with_settings(settings)
+        law, base_law = changed.law, self._base.law
+        if (law.dt, law.rate_limit) != (base_law.dt, base_law.rate_limit):
             raise InputError("reset: settings: the control rate and the gimbals' limit stay those of the environment")
         return changed
 
@@ -192,11 +192,11 @@ class ScissoredPairEnv(gymnasium.Env):
         """
         if not self._running:
             raise InputError("step: the episode has ended, or has not begun: call reset() first")
-        given = np.asarray(action, dtype=float).ravel()
-        if given.size != 1 or not np.isfinite(given[0]):
+        values = np.asarray(action, dtype=float).ravel()
+        if values.size != 1 or not np.isfinite(values[0]):
             raise InputError(f"step: the action must be one finite number, not {action!r}")
         limit = self.experiment.law.rate_limit
-        u = min(max(float(given[0]) * self._unit, -limit), limit)
+        u = min(max(float(values[0]) * self._unit, -limit), limit)
         cost = self._cost(u)
         self._controller.command_rate(u)
         self._physics.command(self._controller.gimbal_rate)

@@ -167,10 +167,10 @@ class MultiAxisRecorder:
 
     def since(self, tick: int) -> Trajectory:
         """The ticks from one on: see `TickRecorder.since`."""
-        found = self._joined({name: rows.since(tick) for name, rows in self.rows.items()})
-        assert found is not None
-        return found
+        trajectory = self._joined({name: rows.since(tick) for name, rows in self.rows.items()})
+        assert trajectory is not None
+        return trajectory
 
     def _joined(self, trajectories: Mapping[str, Trajectory | None]) -> Trajectory | None:
-        kept = {name: trajectory for name, trajectory in trajectories.items() if trajectory is not None}
-        return Trajectory.joined(kept) if kept else None
+        parts = {name: trajectory for name, trajectory in trajectories.items() if trajectory is not None}
+        return Trajectory.joined(parts) if parts else None

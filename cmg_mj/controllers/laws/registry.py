@@ -58,10 +58,10 @@ def make_law(
         InputError: Unknown law or parameter, or a parameter that the law refuses.
     """
     OF_LAWS.check_names(kind, parameters)
-    taken = OF_LAWS.takes(kind)
-    given: dict[str, Any] = {"dt": dt, "rate_limit": rate_limit}
-    given |= {name: value for name, value in (("model", model), ("noise", noise)) if name in taken}
-    law = OF_LAWS.make(kind, given, parameters)
-    if any(getattr(law, name, None) != given[name] for name in ("dt", "rate_limit")):
+    signature = OF_LAWS.takes(kind)
+    bench_arguments: dict[str, Any] = {"dt": dt, "rate_limit": rate_limit}
+    bench_arguments |= {name: value for name, value in (("model", model), ("noise", noise)) if name in signature}
+    law = OF_LAWS.make(kind, bench_arguments, parameters)
+    if any(getattr(law, name, None) != bench_arguments[name] for name in ("dt", "rate_limit")):
         raise InputError(f"law {kind}: must keep dt and rate_limit, which it is given, under these names")
     return law

@@ -93,7 +93,7 @@ def gravity_mismatch(
     if not off or right:
         return None
     names = " and ".join(off)
-    shown = " and ".join(f"{size:.4g}" for size in off.values())
+    sizes_text = " and ".join(f"{size:.4g}" for size in off.values())
     units, scales = [], []
     for name, size in off.items():
         for role in (f"{name}_x", f"{name}_z"):
@@ -104,7 +104,7 @@ def gravity_mismatch(
     cure = "--scale " + ",".join(scales)
     if all(unit for _, unit in units):
         cure = "--units " + ",".join(f"{role}={unit}" for role, unit in units)
-    return f"the {names} accelerometer's specific force is {shown} times gravity's 9.81 m/s^2 (median): {cure}"
+    return f"the {names} accelerometer's specific force is {sizes_text} times gravity's 9.81 m/s^2 (median): {cure}"
 
 
 def second_derivative_mismatch(

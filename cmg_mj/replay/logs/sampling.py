@@ -132,8 +132,8 @@ class Sampler:
         if again.any():
             first = time[1:][again][0]
             self.notes.append(f"{_rows(again.sum())} with the time of the row before discarded, first at {first:.6g} s")
-            kept = np.concatenate([[True], ~again])
-            time, values = time[kept], {name: column[kept] for name, column in values.items()}
+            mask = np.concatenate([[True], ~again])
+            time, values = time[mask], {name: column[mask] for name, column in values.items()}
         return time, values
 
     def _on_a_grid(
@@ -221,9 +221,9 @@ class Sampler:
         if not resampled:  # rows stay where they are, and those that are missing come between them
             places = np.rint((time - time[0]) / dt).astype(int)
             places = np.maximum.accumulate(places)
-            kept = np.concatenate([[True], np.diff(places) > 0])
-            time, places = time[kept], places[kept]
-            values = {name: column[kept] for name, column in values.items()}
+            mask = np.concatenate([[True], np.diff(places) > 0])
+            time, places = time[mask], places[mask]
+            values = {name: column[mask] for name, column in values.items()}
             stamps, grid = places * dt, dt * np.arange(places[-1] + 1)
             filled = {name: bridge(grid, stamps, column, name in held) for name, column in values.items()}
             return Part(time[0] + grid, filled, time, time[0] + stamps)

@@ -184,7 +184,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def unused_folder(
-    parent: Path, name: str, names: Iterable[str], asked_toml: str, asked: str = "scenario.toml"
+    parent: Path, name: str, names: Iterable[str], request_toml: str, request_file: str = "scenario.toml"
 ) -> RunFolder:
     """Claim a folder that no other run has written: the name itself, or with a number behind it.
 
@@ -194,8 +194,8 @@ def unused_folder(
         parent: Where the folders are.
         name: The name wanted.
         names: What will be written.
-        asked_toml: What is asked for, as the folder will say it.
-        asked: The file that says it.
+        request_toml: What is asked for, as the folder will say it.
+        request_file: The file that says it.
 
     Returns:
         The folder.
@@ -205,7 +205,7 @@ def unused_folder(
     """
     for number in itertools.count(1):
         folder = parent / (name if number == 1 else f"{name}-{number}")
-        if not os.path.lexists(folder) or _is_unused(folder) or _is_of(folder / asked, asked_toml):
+        if not os.path.lexists(folder) or _is_unused(folder) or _is_of(folder / request_file, request_toml):
             with suppress(FolderInUse):
                 return RunFolder(folder, names)
     raise AssertionError("count() does not end")
@@ -216,9 +216,9 @@ def _is_unused(folder: Path) -> bool:
     return folder.is_dir() and all(path.name == HIDDEN for path in folder.iterdir())
 
 
-def _is_of(path: Path, asked_toml: str) -> bool:
+def _is_of(path: Path, request_toml: str) -> bool:
     """Whether cmg_mj has written the result of what this file asks for there."""
     try:
-        return Manifest.read(path.parent).has(path) and path.read_text(encoding="utf-8") == asked_toml
+        return Manifest.read(path.parent).has(path) and path.read_text(encoding="utf-8") == request_toml
     except (OSError, ValueError):
         return False

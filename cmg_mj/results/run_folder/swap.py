@@ -103,13 +103,13 @@ def _is_dead(beside: Path, lock: Lock) -> bool:
 def _swap_folders(new: Path, folder: Path, lock: Lock) -> bool:
     """Swap whole folders; False, and nothing is changed, where that cannot be done."""
     going = [path.name for path in _superseded(folder, Manifest.read(new)) if not users_files(path)]
-    kept = [name for name in users_files(folder) if name not in going]
-    if _stands_in(folder) or any((folder / name).is_dir() and not (folder / name).is_symlink() for name in kept):
+    user_files = [name for name in users_files(folder) if name not in going]
+    if _stands_in(folder) or any((folder / name).is_dir() and not (folder / name).is_symlink() for name in user_files):
         return False
     beside = _beside(folder)
     try:
         os.link(lock.path, new / HIDDEN / "lock")
-        for name in kept:
+        for name in user_files:
             os.link(folder / name, new / name, follow_symlinks=False)
         shutil.copystat(folder, new)
         os.utime(new)

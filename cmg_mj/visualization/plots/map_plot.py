@@ -99,5 +99,5 @@ def _in_legend(
     markersize: float | None = None,
     linewidth: float | None = None,
 ) -> None:
-    looks = {"color": color, "markersize": markersize, "linewidth": linewidth}
-    axes.plot([], [], style, label=label.lstrip("_"), **looks)  # matplotlib hides a leading underscore
+    properties = {"color": color, "markersize": markersize, "linewidth": linewidth}
+    axes.plot([], [], style, label=label.lstrip("_"), **properties)  # matplotlib hides a leading underscore
