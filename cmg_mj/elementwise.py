@@ -27,7 +27,7 @@ SMALLEST = 1e-200  # below this a number counts as zero where it is divided by
 
 
 class Symbolic:
-    """What stands for a number while a formula is traced, as `export` does.
+    """A symbol in place of a number while a formula is traced, as `export` does.
 
     NumPy's functions hand over to what brings an `__array_ufunc__`, so that a symbol takes the arrays' branches. It is
     asked for only where those are not the plain function.

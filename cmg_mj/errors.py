@@ -39,7 +39,7 @@ def nearest(name: str, allowed: Iterable[str], label: str = "allowed") -> str:
 
 
 def raised(error: BaseException) -> str:
-    """What a user's code raised, `ValueError: too large`, whatever showing its own words does."""
+    """Describe what a user's code raised, `ValueError: too large`, even if its own message raises."""
     try:
         text = str(error)
     except Exception:

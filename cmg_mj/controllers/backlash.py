@@ -26,7 +26,7 @@ class Backlash:
         self._gimbal: Scalar = None
 
     def __call__(self, u: Scalar) -> Scalar:
-        """What the gimbals make of a command that is held for a period.
+        """Return the gimbals' rate under a command that is held for a period.
 
         Args:
             u: The rate of the motors [rad/s].

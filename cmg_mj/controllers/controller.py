@@ -45,7 +45,7 @@ class Tick(NamedTuple):
 
 
 class SensorReadings(NamedTuple):
-    """What `Controller.decide` takes (floats, or arrays (n_worlds,))."""
+    """Arguments of `Controller.decide`: floats, or arrays (n_worlds,)."""
 
     forces: Sequence[Scalar]
     """Specific force: inner x, inner z, outer x, outer z [m/s^2]."""
@@ -58,7 +58,7 @@ class SensorReadings(NamedTuple):
 
 
 class PlantInterface(NamedTuple):
-    """What a controller knows of the plant that it drives."""
+    """The plant's properties that its controller knows."""
 
     tilt: RadialTilt
     """The tilt from its accelerometers."""
@@ -136,7 +136,7 @@ class Controller:
         self.worlds = worlds
         self.axis = axis
         self.turns_gimbals = True
-        """Whether `update` does: with other axes, what a turn couples comes in between."""
+        """True if `update` turns the gimbals; with several axes the compensation of a turn comes between."""
         self.feedback: Feedback = feedback
         self.angle_source: AngleSource = angle_source
         self.open_loop_observers = dict(open_loop_observers or {})
@@ -154,7 +154,7 @@ class Controller:
 
     @property
     def parts(self) -> Sequence[Controller]:
-        """Those of the axes: of a rig's only one itself."""
+        """Controllers of the axes; for one axis, the controller itself."""
         return (self,)
 
     def reset(self) -> None:
@@ -168,7 +168,7 @@ class Controller:
         )
         self._true_rate: Scalar = math.nan
         self.coriolis: Scalar | None = None
-        """What in the accelerometers' angular acceleration is none, on a rig that turns [rad/s^2]."""
+        """Coriolis part of the measured angular acceleration, on a plant that turns [rad/s^2]."""
         self.step: int | None = None
         """The physics step of the last update."""
         self.steps_per_sample = math.gcd(self.period, *(sensor.steps_per_sample for sensor in self._sampled))
@@ -244,7 +244,7 @@ class Controller:
                 sensor.sample(step, ideal)
 
     def readings(self, step: int) -> SensorReadings:
-        """What the sensors show at a physics step.
+        """Return the sensors' readings at a physics step.
 
         Args:
             step: Number of the physics step.
@@ -267,7 +267,7 @@ class Controller:
         self.gimbal_rate = u if self._backlash is None else self._backlash(u)
 
     def decide(self, step: int, forces: Forces, encoders: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Tick:
-        """What a control tick makes of the samples that have been delivered.
+        """Take the control decision of a tick from the samples that have been delivered.
 
         Args:
             step: Number of the physics step.

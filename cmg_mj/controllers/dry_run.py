@@ -66,7 +66,7 @@ def dry_run_law(law: Law, extra: int, worlds: int | None) -> None:
 
 
 def _check_command(call: str, returned: Any, state: Any, worlds: int | None, tilt: float) -> None:
-    """What a law returned is a state and a gimbal rate."""
+    """Check that a law returned a state and a gimbal rate."""
     if not isinstance(returned, tuple) or len(returned) != 2:
         raise InputError(f"{call} must return (state, u), not {shown(returned)}")
     _check_number(call, "u", returned[1], worlds, tilt)

@@ -12,7 +12,7 @@ from cmg_mj.observers.protocol import BIAS
 
 
 def integrator_trim(bias_trim_s: float, law: Law, extra_signals: Sequence[str]) -> tuple[int, float]:
-    """How the integrator is trimmed by the observer's estimate of the bias.
+    """Find the part of the estimate that trims the integrator, and the gain on it.
 
     Args:
         bias_trim_s: For how long [s]; 0 for not at all.

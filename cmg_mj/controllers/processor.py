@@ -16,7 +16,7 @@ from cmg_mj.sensors.sampled import Sensors
 
 
 class Decision(NamedTuple):
-    """What a processor has decided."""
+    """A processor's decision."""
 
     u: float
     """Gimbal rate [rad/s]."""
@@ -27,7 +27,7 @@ class Decision(NamedTuple):
 
 
 class Processor(Protocol):
-    """What takes the control decision in the controller's place, in C or otherwise."""
+    """A processor that takes the control decision in the controller's place, in C or otherwise."""
 
     def start(self) -> None:
         """The next update is the first."""
@@ -100,7 +100,7 @@ class ProcessorController(Controller):
         self.processor.start()
 
     def decide(self, step: int, forces: Forces, encoders: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Tick:
-        """What the processor makes of the samples that have been delivered; as `Controller.decide`."""
+        """Let the processor decide on the samples that have been delivered; see `Controller.decide`."""
         try:
             decision = self.processor.update(tuple(forces), encoders)
         except RunStopped as error:

@@ -31,7 +31,7 @@ class State(NamedTuple):
     x1: Scalar
     x2: Scalar
     xm: tuple[Scalar, ...]
-    """What is unknown: the constant if there is one, then the two parts of the sinusoid."""
+    """State of the exosystem: the constant if there is one, then the two parts of the sinusoid."""
     T1: tuple[Scalar, ...]
     T2: tuple[Scalar, ...]
     y: Measurement

@@ -20,7 +20,7 @@ from cmg_mj.sensors.tilt import TiltNoise
 
 
 class State(NamedTuple):
-    """What sample k is expected to be, p, z, b, and its covariance."""
+    """Prediction of sample k, p, z, b, and its covariance."""
 
     p: Scalar
     z: Scalar

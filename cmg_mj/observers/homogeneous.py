@@ -65,7 +65,7 @@ class Homogeneous:
         return self.k1 * a, self.k2 * b
 
     def friction(self, x2: Scalar, x3: Scalar) -> Scalar:
-        """What friction takes from f2, divided by x2 [1/s]."""
+        """Return the part of f2 that friction takes, divided by x2 [1/s]."""
         width = self.friction_width_rad_s
         torque = self.friction_n_m / sqrt(x2 * x2 + width * width) + self.damping_n_m_s
         return torque / (self.model.gimbals * self.model.inertia(x3))

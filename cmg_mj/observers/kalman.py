@@ -30,7 +30,7 @@ Four = tuple[Scalar, Scalar, Scalar, Scalar]
 
 
 class Covariance(NamedTuple):
-    """Of the error of (x1, x2, x3, torque). The other half is this one: so it stays symmetric."""
+    """Covariance of the error of (x1, x2, x3, torque). Only one half is stored, so that it stays symmetric."""
 
     p11: Scalar
     p12: Scalar
@@ -114,7 +114,7 @@ class Kalman:
 
     @cached_property
     def process_noise(self) -> Covariance:
-        """What a sample period adds to the covariance, exactly for the linearisation (6)."""
+        """Covariance added by a sample period, exact for the linearisation (6)."""
         from scipy.linalg import expm
 
         per_torque = 1.0 / (self.model.gimbals * self.model.J1)

@@ -95,7 +95,7 @@ RESERVED = ("x1_rad", "x2_rad_s", "x3_rad")
 
 
 def needs(observer: Observer | type) -> tuple[str, ...]:
-    """What an observer, or its class, cannot do without beside y1, out of `NEEDS`.
+    """Return the `NEEDS` of an observer, or of its class: its required inputs beside y1.
 
     One that does not say counts as needing the model and the gimbals, as the papers' observers do.
 

@@ -31,7 +31,7 @@ Rounding moves a pole at zero by about 1e-16 times the largest entry, to either 
 
 
 def is_hurwitz(poles: ArrayLike) -> bool:
-    """Whether every mode fades.
+    """Check that every mode fades.
 
     Args:
         poles: Eigenvalues of a system's matrix [1/s].

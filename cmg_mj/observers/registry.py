@@ -92,5 +92,5 @@ def check_names(kind: str, names: Iterable[str]) -> None:
 
 
 def takes_noise(kind: str) -> bool:
-    """Whether an observer is told the noise of its sensors."""
+    """Return whether an observer is constructed with the noise of its sensors."""
     return "noise" in OF_OBSERVERS.takes(kind)

@@ -47,7 +47,7 @@ class ObserverRunner:
 
     @property
     def started(self) -> bool:
-        """Whether they have seen a sample."""
+        """Return whether the observers have seen a sample."""
         return bool(self._running)
 
     def start(self, y: Measurement, step: int) -> list[Sequence[Scalar]]:
@@ -117,7 +117,7 @@ class ObserverRunner:
             self._user_codes[i].fail_from(error, step)
 
     def _has_right_shape(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> bool:
-        """Whether an estimate has all its parts, arrays (n_worlds,)."""
+        """Return whether an estimate has all its parts, arrays (n_worlds,)."""
         shape = y.y1.shape
         return len(estimate) == width and all(
             getattr(part, "shape", None) == shape and part.dtype == float for part in estimate

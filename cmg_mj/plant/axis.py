@@ -61,7 +61,7 @@ class Axis:
 
     @property
     def prefix(self) -> str:
-        """What its elements' names begin with."""
+        """Prefix of its elements' names."""
         return f"{self.name}/" if self.name else ""
 
     @cached_property
@@ -85,12 +85,12 @@ class Axis:
 
     @cached_property
     def _gimbals(self) -> list[tuple[int, float, float]]:
-        """Of each gimbal its address, its share of x3 and where it is zero."""
+        """Address, share of x3 and zero of each gimbal."""
         n = len(self.modules)
         return [(module.gimbal, module.direction / n, module.gimbal_zero) for module in self.modules]
 
     def ideal(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> IdealReading:
-        """What perfect sensors show.
+        """Return the readings of perfect sensors.
 
         Args:
             sensordata: MuJoCo's sensor readings after a forward pass, indexed by address: floats, or an array
@@ -114,7 +114,7 @@ class Axis:
         return angle
 
     def apparent_bias(self, accelerometer: Accelerometer, gravity: float) -> float:
-        """What an observer of the bias should find: e less the tilt that the accelerometers' constant errors make.
+        """Return the bias an observer should find: e less the tilt made by the accelerometers' constant errors.
 
         With y1 = x1 - e + offset, the two cannot be told apart.
 

@@ -113,7 +113,7 @@ class RigChecker:
         yield from self._sensors()
 
     def _addresses(self, module: str) -> tuple[int, int, int, int]:
-        """Of gimbal, flywheel, servo and motor; negative for one that is missing."""
+        """Return the addresses of gimbal, flywheel, servo and motor; negative for one that is missing."""
         gimbal, flywheel = (_id(self.model, "joint", f"{module}/{name}") for name in ("gimbal", "flywheel"))
         servo, motor = (_id(self.model, "actuator", f"{module}/{name}") for name in ("gimbal_servo", "flywheel_motor"))
         return gimbal, flywheel, servo, motor
@@ -248,7 +248,7 @@ class RigChecker:
 
 
 def survives_first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Whether the physics gets through its first steps.
+    """Check that the physics gets through its first steps.
 
     Args:
         model: The rig as it is run.

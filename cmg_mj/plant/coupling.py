@@ -16,7 +16,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCoupling:
-    """What a turn about the vertical couples.
+    """Compute the coupling of the axes in a turn about the vertical.
 
     Args:
         model: The compiled model.
@@ -41,7 +41,7 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCouplin
 
 
 def _turned(model: mujoco.MjModel, data: mujoco.MjData, module: Module) -> np.ndarray:
-    """How a wheel's momentum changes with x3 at x3 = 0, in the world (3,) [N m s]."""
+    """Return the derivative of a wheel's momentum by x3 at x3 = 0, in the world (3,) [N m s]."""
     gimbal, wheel = int(model.dof_jntid[module.gimbal_dof]), int(model.dof_jntid[module.flywheel_dof])
     body = int(model.jnt_bodyid[wheel])
     shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[wheel]  # of the principal inertias

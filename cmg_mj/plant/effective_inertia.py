@@ -79,7 +79,7 @@ def _free_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
 
 
 def _weld_jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """How fast what welds and connects tie together parts for the joints' rates, (n, nv): a ball is held by a weld."""
+    """Return the Jacobian of the errors of welds and connects, (n, nv). A weld holds a ball joint."""
     kinds = int(mujoco.mjtEq.mjEQ_WELD), int(mujoco.mjtEq.mjEQ_CONNECT)
     rows = np.zeros((data.nefc, model.nv))
     if data.nefc and mujoco.mj_isSparse(model):
@@ -92,7 +92,7 @@ def _weld_jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
 
 
 def _contacts(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """How fast touching bodies part or slide at each contact for the joints' rates, (n, nv).
+    """Return the Jacobian of the relative motion at each contact, parting or sliding, (n, nv).
 
     What twists or rolls there is not held: it is of the size of a foot.
     """

@@ -140,7 +140,7 @@ def _drives(drive: Any, joint: str) -> bool:
 
 
 def _states(drive: Any) -> int:
-    """How many numbers of act an actuator has."""
+    """Count an actuator's numbers in act."""
     if int(drive.dyntype) == int(mujoco.mjtDyn.mjDYN_NONE):
         return 0
     return max(1, int(drive.actdim))

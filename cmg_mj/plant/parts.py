@@ -57,7 +57,7 @@ class Module:
 
 
 def missing_parts(spec: mujoco.MjSpec) -> list[str]:
-    """What a parsed model lacks: a rig has certain joints, actuators, sensors and a keyframe, by name.
+    """List the joints, actuators, sensors and the keyframe that a rig needs and a parsed model lacks.
 
     The compiler, which comes after this, would only say that the keyframe has the wrong size.
 

@@ -113,7 +113,7 @@ class Plant:
         return other
 
     def is_of_same_file(self, settings: PlantSettings) -> bool:
-        """Whether `changed` can take these settings: their model is compiled from the same file, locked alike."""
+        """Return whether `changed` can take these settings: the same model file with the same locks."""
         names = ("model", "lock_thrust_bearing", "locked_axes")
         return all(getattr(self.settings, name) == getattr(settings, name) for name in names)
 
@@ -170,7 +170,7 @@ class Plant:
 
     @property
     def _error_source(self) -> str:
-        """What is wrong if the physics is: the settings that change it, if there are, or else the file."""
+        """Culprit if the physics fails: the settings that change it, or without such settings the file."""
         changes = [f"plant.{name} = {value:g}" for name, value in self.settings.changes_of_physics().items()]
         return ", ".join(changes) or str(self.path)
 
@@ -217,7 +217,7 @@ class Plant:
 
     @cached_property
     def turning(self) -> YawCoupling:
-        """What a turn about the vertical couples."""
+        """Coupling of the axes in a turn about the vertical."""
         return turning(self._as_filed, self.key, self.axes)
 
     def largest_tilt(self, qpos: Addressed) -> Scalar:
@@ -258,7 +258,7 @@ class Plant:
 
     @property
     def bias(self) -> float:
-        """Of the axis: e [rad]."""
+        """Bias e of the axis [rad]."""
         return self.axis.bias
 
     @property
@@ -279,7 +279,7 @@ class Plant:
         return line
 
     def ideal_readings(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> Any:
-        """What perfect sensors show: of the axis (see `Axis.ideal`), or `MultiAxisReading` of several."""
+        """Return the readings of perfect sensors: of the axis (see `Axis.ideal`), or `MultiAxisReading` of several."""
         if len(self.axes) == 1:
             return self.axis.ideal(sensordata, qvel)
         upward = sensordata[self.axis.gyro + 1]
@@ -290,14 +290,14 @@ class Plant:
         return self.axis.gimbal_angle(qpos)
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
-        """What an observer of the bias should find: see `Axis.apparent_bias`."""
+        """Return the bias that an observer should find: see `Axis.apparent_bias`."""
         return self.axis.apparent_bias(accelerometer, self.gravity)
 
     # --- running -------------------------------------------------------------------------------------------
 
     @property
     def interface(self) -> PlantInterface:
-        """What a controller of the axis knows of the plant."""
+        """The plant as a controller of the axis knows it."""
         zeros = tuple(module.gimbal_zero for module in self.modules)
         gimbal_angle = GimbalAngle(tuple(self.axis.directions), zeros)
         return PlantInterface(self.radial_tilt, gimbal_angle, self.model.opt.timestep, self.backlash)
@@ -368,7 +368,7 @@ class Plant:
 
     @property
     def parameters(self) -> PlantParameters:
-        """What a scenario's controller and observers are made from."""
+        """Parameters from which a scenario's controller and observers are made."""
         modules = tuple(module.name for module in self.modules)
         return PlantParameters(
             self.path,
@@ -402,7 +402,7 @@ class Plant:
 
     @cached_property
     def joint_kinds(self) -> tuple[str, ...]:
-        """Of each joint `hinge`, `slide`, `ball` or `free`; none if all are hinges."""
+        """Kind of each joint: `hinge`, `slide`, `ball` or `free`; empty if all are hinges."""
         kinds = tuple(JOINT_KINDS[int(kind)] for kind in self.model.jnt_type)
         return () if set(kinds) == {"hinge"} else kinds
 

@@ -208,7 +208,7 @@ def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, mod
 
 
 def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np.ndarray:
-    """How far the frame's centre of mass moves so that the whole rig's turns about the line by e.
+    """Compute the shift of the frame's centre of mass that turns the whole plant's about the line by e.
 
     The first moment of all that tilts is turned, not lengthened: gravity's torque keeps its amplitude.
 

@@ -87,7 +87,7 @@ class LogReplays:
 
     @property
     def complete(self) -> bool:
-        """Whether all logs have been replayed."""
+        """Return whether all logs have been replayed."""
         return len(self.results) == len(self.logs)
 
     @property

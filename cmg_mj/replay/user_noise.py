@@ -30,7 +30,7 @@ def noise_of(
     tilt_deg: float | None = None,
     acceleration_rad_s2: float | None = None,
 ) -> TiltNoise:
-    """What observers are told of the sensors' noise.
+    """Return the sensors' noise that observers are told.
 
     Args:
         log: With two accelerometers, both noises follow from theirs.

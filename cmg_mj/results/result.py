@@ -24,7 +24,7 @@ Driver = Literal["native", "callback", "board"]
 
 @dataclass
 class Outcome:
-    """How one world ended.
+    """The end of one world.
 
     Attributes:
         kind: `done`, `fell`, `stopped` (observer or plant failed) or `interrupted`.
@@ -40,7 +40,7 @@ class Outcome:
 
     @property
     def fell(self) -> bool:
-        """Whether the rig fell."""
+        """Return whether the plant fell."""
         return self.kind == "fell"
 
 

@@ -66,12 +66,12 @@ class PlantSettings:
     flywheel_imbalance_kg_m: Annotated[float, Batched()] = 0.0
 
     def changes(self) -> dict[str, float]:
-        """What is given of friction, damping, inertia, backlash, servos, wheels and places of the accelerometers."""
+        """Return the changed settings of gimbals, servos, accelerometers, tilt and flywheels: field -> value."""
         prefixes = ("gimbal", "servo", "accelerometer", "tilt", "flywheel")
         fields = [field for field in dataclasses.fields(self) if field.name.startswith(prefixes)]
         return {field.name: value for field in fields if (value := getattr(self, field.name)) != field.default}
 
     def changes_of_physics(self) -> dict[str, float]:
-        """What of these moves masses and makes torques."""
+        """Return those of the `changes` that move masses or make torques."""
         others = ("accelerometer_inner_m", "accelerometer_outer_m", "gimbal_backlash_arcmin")
         return {name: value for name, value in self.changes().items() if name not in others}

@@ -94,7 +94,7 @@ def _parameters(parameters: dict[str, Any], part: Any, by_bench: Collection[str]
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """What a run depends on (read once: that takes longer than to simulate a second)."""
+    """Return the versions that a run depends on. They are read once: that takes longer than to simulate a second."""
     names = ("cmg_mj", "mujoco", "numpy", "scipy")
     return {name: version(name) for name in names} | {"python": platform.python_version()}
 

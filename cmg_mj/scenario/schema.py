@@ -76,7 +76,7 @@ class ControllerSettings(BaseModel):
     feedback: Annotated[Feedback, WhateverTheLaw()] = "observer"
     """Which rate the law uses."""
     angle_source: AngleSource = "measured"
-    """Whether the law uses the measured angles, as (8), or the estimated ones, as the text after (10)."""
+    """Source of the law's angles: measured, as in (8), or estimated, as in the text after (10)."""
     compensate_turning: Annotated[bool, OnAllAxes(), WhateverTheLaw()] = True
     """Several axes: whether the gimbals also turn against what a turn about the vertical couples."""
     bias_trim_s: Instant = 0.0
@@ -90,7 +90,7 @@ class ControllerSettings(BaseModel):
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """What was given that belongs to the law alone."""
+        """The section's fields that belong to the law alone."""
         return dict(self.__pydantic_extra__ or {})
 
     def law(self, model: ReducedModel, noise: TiltNoise) -> Law:
@@ -123,7 +123,7 @@ class ObserverSettings(BaseModel):
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """What was given besides the kind."""
+        """The section's fields besides the kind."""
         return dict(self.__pydantic_extra__ or {})
 
     def make(self, dt: float, model: ReducedModel, noise: TiltNoise) -> Observer:
@@ -133,7 +133,7 @@ class ObserverSettings(BaseModel):
 
 @dataclass(frozen=True, config=STRICT)
 class MetricsSettings:
-    """What counts as settled and as fallen, and from when on a bias estimate is judged.
+    """Limits that count as settled and as fallen, and the time from which a bias estimate is judged.
 
     Attributes:
         settle_band_deg: Settled is |x1| inside this band until the end [deg].
@@ -147,7 +147,7 @@ class MetricsSettings:
 
 
 class CompareSettings(BaseModel):
-    """What `cmg-mj compare` does if it is not told otherwise; other commands do without."""
+    """Defaults of `cmg-mj compare`; other commands ignore this section."""
 
     model_config = FORBID
     observers: Annotated[list[str], Field(min_length=1)] | Literal["all"] = "all"
@@ -170,7 +170,7 @@ class AxisPlant(create_model("AxisPlant", __config__=FORBID, **_PER_AXIS)):
 
 
 class AxisSettings(BaseModel):
-    """What one axis of several has of its own, in the words of the sections that hold for all."""
+    """Settings of one axis of several, in the same sections as those of all axes."""
 
     model_config = FORBID
     plant: AxisPlant = Field(default_factory=AxisPlant)
@@ -200,7 +200,7 @@ class Scenario(BaseModel):
     """Observers that run open loop, with their default parameters."""
     sensors: Sensors = Field(default_factory=Sensors)
     axes: dict[str, AxisSettings] = Field(default_factory=dict)
-    """What axes of several have of their own, by name."""
+    """Settings of single axes, by name."""
     push: list[Push] = Field(default_factory=list)
     swing: list[Swing] = Field(default_factory=list)
     metrics: MetricsSettings = Field(default_factory=MetricsSettings)

@@ -51,7 +51,7 @@ class Loop(NamedTuple):
 
     @property
     def hint(self) -> str | None:
-        """What is wrong with the gains, if anything is."""
+        """The fault of the gains, if they have one."""
         remedy = (
             "a higher rate or less latency is needed" if self.suited else "[controller.lqr] solves for gains that suit"
         )
@@ -124,7 +124,7 @@ def _distance(K: np.ndarray, A: np.ndarray, B: np.ndarray, along: np.ndarray, de
 
 
 def hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]:
-    """What is no mistake and yet likely to make a rig fall.
+    """Find what is no mistake and yet likely to make a plant fall.
 
     Args:
         scenario: The scenario.

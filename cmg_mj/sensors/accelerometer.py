@@ -110,7 +110,7 @@ class Accelerometer:
 
     @property
     def sample_sigma(self) -> float:
-        """Of one sample from the mean, with what the resolution adds: what a filter is told [m/s^2]."""
+        """Standard deviation of one sample with the quantisation, as filters are told it [m/s^2]."""
         step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
         return math.hypot(self.white_noise_sigma, step / math.sqrt(12.0))
 
@@ -122,12 +122,12 @@ class Accelerometer:
 
     @property
     def flicker_floor(self) -> float:
-        """Of the Allan deviation of each axis' 1/f noise [m/s^2]."""
+        """Floor of the Allan deviation of each axis' 1/f noise [m/s^2]."""
         return self.bias_instability_ug * 1e-6 * STANDARD_GRAVITY
 
     @property
     def imperfections(self) -> dict[str, float | tuple[float, float]]:
-        """What is switched on beyond noise, range and resolution: field -> its value."""
+        """Imperfections that are switched on beyond noise, range and resolution: field -> its value."""
         names = [field.name for field in dataclasses.fields(self)]
         optional = ["bias_mg", *names[names.index("scale_error") :]]
         return {name: value for name in optional if (value := getattr(self, name)) not in (0.0, (0.0, 0.0))}

@@ -30,7 +30,7 @@ class Encoder:
 
     @property
     def sample_sigma(self) -> float:
-        """Of one reading from the angle, by the resolution [rad]."""
+        """Standard deviation of one reading from the angle, by the resolution [rad]."""
         return 2.0 * math.pi / self.counts_per_revolution / math.sqrt(12.0) if self.counts_per_revolution else 0.0
 
     def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Sequence[Scalar]]:

@@ -14,13 +14,13 @@ Forces = Sequence[Scalar] | np.ndarray
 
 
 class IdealReading(NamedTuple):
-    """What perfect sensors would show at one instant (floats, or arrays (n_worlds,))."""
+    """Readings of perfect sensors at one instant: floats, or arrays (n_worlds,)."""
 
     accelerations: Forces
     gimbals: Sequence[Scalar]
     """Gimbal angles, one a gimbal [rad]."""
     gyro: Scalar
-    """What a gyro on the frame shows along the tilt axis [rad/s]."""
+    """Rate of the frame along the tilt axis, as a gyro on it measures [rad/s]."""
     rate: Scalar
     """The true tilt rate, q_b' [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
 
@@ -29,6 +29,6 @@ class MultiAxisReading(NamedTuple):
     """The same of a rig of several axes."""
 
     axes: Sequence[IdealReading]
-    """What those of each axis would show."""
+    """Readings of each axis."""
     turn_rate: Scalar
-    """What a gyro on the frame shows upward [rad/s]."""
+    """Upward rate of the frame, as a gyro on it measures [rad/s]."""

@@ -60,7 +60,7 @@ class MemsGyro:
 
     @property
     def flicker_floor(self) -> float:
-        """Of the Allan deviation of the 1/f noise [rad/s]."""
+        """Floor of the Allan deviation of the 1/f noise [rad/s]."""
         return math.radians(self.bias_instability_deg_h) / 3600.0
 
     def make_reading_function(self, dt: float, noise: Iterator) -> Callable[[np.ndarray], np.ndarray]:
@@ -84,7 +84,7 @@ class MemsGyro:
         flicker = Flicker(self.flicker_floor, dt, drawn(1)[0, 1:])
 
         def errors(n: int) -> np.ndarray:
-            """Of the next n samples, (n, n_worlds) [rad/s]."""
+            """Return the errors of the next n samples, (n, n_worlds) [rad/s]."""
             normals = drawn(n)
             return sigma * normals[:, 0] + flicker.advance(normals[:, 1:])
 

@@ -147,7 +147,7 @@ def _combine_samples(inner: Forces, outer: Forces) -> Forces:
 
 
 def _flicker_source(sensor: Accelerometer, noise: Iterator) -> Callable[[], Forces]:
-    """What the 1/f noise adds to the next sample of each channel: four floats, or an array (4, n_worlds) [m/s^2]."""
+    """Make the source of each channel's 1/f noise: four floats a sample, or an array (4, n_worlds) [m/s^2]."""
 
     def drawn() -> np.ndarray:
         numbers = np.asarray(next(noise))
@@ -165,7 +165,7 @@ def _flicker_source(sensor: Accelerometer, noise: Iterator) -> Callable[[], Forc
 def sampled_sensors(
     sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence[int], axis: int = 0
 ) -> tuple[SampledSensor[Forces], SampledSensor[Sequence[Scalar]], SampledSensor[Scalar]]:
-    """What the controller reads, at work: the accelerometers, the encoders, the gyro.
+    """Start the sensors that the controller reads: the accelerometers, the encoders, the gyro.
 
     Args:
         sensors: The sensors.

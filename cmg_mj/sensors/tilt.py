@@ -50,7 +50,7 @@ class RadialTilt:
 
     @cached_property
     def _weights(self) -> tuple[Scalar, Scalar]:
-        """Of the inner and the outer accelerometer in the combination that is gravity alone."""
+        """Weights of the inner and the outer accelerometer in the combination that is gravity alone."""
         span = self.r_outer - self.r_inner
         return self.r_outer / span, self.r_inner / span
 
@@ -113,7 +113,7 @@ class RadialTilt:
         return TiltNoise(sigma * both / gravity, sigma * math.sqrt(2.0) / span, correlation)
 
     def offset(self, tilt: float, response: Callable[[Forces], Forces], gravity: float) -> float:
-        """How far y1 is off, at rest, for what the accelerometers make of the specific forces.
+        """Compute the error of y1 at rest that the accelerometers' response to the specific forces makes.
 
         Args:
             tilt: The true tilt of the radial line [rad].

@@ -8,7 +8,7 @@ from cmg_mj.errors import InputError
 
 
 def whole_steps(duration: float, timestep: float, field: str, text: str) -> int:
-    """How many physics steps a duration has.
+    """Count the physics steps of a duration.
 
     Args:
         duration: Duration [s].

@@ -46,7 +46,7 @@ class KeyPart(NamedTuple):
 
     @property
     def is_of_observer(self) -> bool:
-        """Whether it makes no difference to the physics, the sensors and the law."""
+        """Return whether the part changes neither the physics nor the sensors nor the law."""
         return self.kind == "noise of observer" or (self.kind == "field" and self.name.partition(".")[0] == "observer")
 
     def __str__(self) -> str:
@@ -76,7 +76,7 @@ class BatchKey:
 
 
 class PlantStructure(NamedTuple):
-    """What the plants of one batch have in common."""
+    """Common properties of the plants of one batch."""
 
     timestep: float
     integrator: int
@@ -85,7 +85,7 @@ class PlantStructure(NamedTuple):
 
 
 class PlantOptions(TypedDict):
-    """What a controller of many worlds has of an axis of their plants."""
+    """Options of a controller of many worlds that come from an axis of their plants."""
 
     tilt: RadialTilt
     backlash: Scalar
@@ -140,7 +140,7 @@ def hashable(value: Any) -> Hashable:
 
 
 def can_vary_in_batch(field: str, law: str) -> bool:
-    """Whether worlds of one batch may differ in a field, under a law of this kind."""
+    """Return whether worlds of one batch may differ in a field, under a law of this kind."""
     parts = [part for part in field.split(".") if not part.isdecimal()]
     names = [".".join(parts[: i + 1]) for i in range(len(parts))]
     mark = next((BATCHED_FIELDS[name] for name in names if name in BATCHED_FIELDS), None)

@@ -45,13 +45,13 @@ def batch_values(values: Sequence[T]) -> T:
 
 
 def split_values(value: T, worlds: int) -> list[T]:
-    """What a value, stacked or not, is in each world."""
+    """Return the value of each world, from a value that is stacked or not."""
     first = value_of_world(value, 0)
     return [first] * worlds if first is value else [value_of_world(value, world) for world in range(worlds)]
 
 
 def value_of_world(value: T, world: int) -> T:
-    """What a stacked value is in one world.
+    """Return a stacked value's value in one world.
 
     Args:
         value: What `batch_values` returned.

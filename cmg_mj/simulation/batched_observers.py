@@ -24,7 +24,7 @@ MOST_WORLDS = 1024
 
 
 class BatchJob(NamedTuple):
-    """What `Experiment.run_many` would run by itself.
+    """Worlds that `Experiment.run_many` would run by themselves.
 
     Attributes:
         experiments: One a world, all with the same observer.
@@ -121,7 +121,7 @@ def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
 
 
 class SharedKey(NamedTuple):
-    """What jobs with different observers have in common."""
+    """Key that jobs with different observers share."""
 
     key: BatchKey
     plant: PlantStructure
@@ -129,7 +129,7 @@ class SharedKey(NamedTuple):
 
 
 def _shared_key(job: BatchJob) -> SharedKey | None:
-    """What jobs of one batch have in common; None for one that has to be by itself."""
+    """Return the key that jobs of one batch share; None for a job that cannot share a batch."""
     first = job.experiments[0]
     if first.axes or first.scenario.open_loop_names() or len({one.batch_key for one in once(job.experiments)}) > 1:
         return None

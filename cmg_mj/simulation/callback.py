@@ -112,7 +112,7 @@ class ControlCallback:
             return _forward(model, self._scratch)
 
     def _is_instant(self, h: float, t: float) -> bool:
-        """Whether a call at time t is the first of a step of length h, and not one of its later stages."""
+        """Return whether a call at time t is the first of a step of length h, not one of its later stages."""
         backwards = t < self._latest
         self._latest = t
         if self._instant is not None and not backwards:

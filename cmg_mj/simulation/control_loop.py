@@ -29,14 +29,14 @@ class ControlTick(NamedTuple):
 
 
 class Ending(NamedTuple):
-    """How a world ended that the loop stopped."""
+    """The end of a world that the loop stopped."""
 
     step: int
     """Number of the physics step."""
     tilt: float = 0.0
     """Its tilt from the keyframe, beyond the fall angle or no number [rad]."""
     message: str = ""
-    """What its observer or law returned, if that is why."""
+    """Description of the observer's or law's return value, if that is the reason."""
 
 
 class ControlLoop:

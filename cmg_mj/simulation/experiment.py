@@ -194,7 +194,7 @@ class Experiment:
 
     @property
     def batch_key(self) -> BatchKey:
-        """What its worlds have in common with all that may run with them."""
+        """Key that its worlds share with all worlds that may run in one batch with them."""
         return batch_key(
             [AxisPart(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
         )
@@ -274,10 +274,10 @@ class Experiment:
         )
 
     def require_single_axis(self, what: str) -> None:
-        """What takes one axis refuses a rig of several.
+        """Refuse a plant of several axes.
 
         Args:
-            what: It.
+            what: The operation that takes one axis, for the message.
 
         Raises:
             InputError: The rig has several.
@@ -291,7 +291,7 @@ class Experiment:
 
     @property
     def hints(self) -> list[str]:
-        """What is no mistake and yet likely to make the rig fall, in clauses."""
+        """Clauses on what is no mistake and yet likely to make the plant fall."""
         if not self.axes:
             return hints(self.scenario, self.design, self.plant.parameters)
         return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
@@ -307,7 +307,7 @@ class Experiment:
 
     @functools.cached_property
     def differences(self) -> dict[str, Any]:
-        """What differs from the bundled scenario it is based on: `section.field` -> its value.
+        """Differences from the bundled scenario it is based on: `section.field` -> its value.
 
         Title, seed and observer are left out; a scenario of the user's own differs from none.
         """

@@ -39,7 +39,7 @@ class Physics(Protocol):
 
     @property
     def stop_failed(self) -> Callable[[Tick], Sequence[tuple[int, str]]] | None:
-        """What stops the worlds whose observer or law returned a non-finite value, and returns their indices and why.
+        """Function that stops worlds whose observer or law returned a non-finite value. It returns indices and reasons.
 
         None for one world, where the controller raises.
         """

@@ -37,10 +37,10 @@ Recorder = TickRecorder | MultiAxisRecorder
 
 
 class SimulationOptions(TypedDict, total=False):
-    """How to run, which changes no figure."""
+    """Options of a run that change no figure."""
 
     keep_trajectory: bool
-    """Whether to keep every tick; without it memory does not grow with the duration."""
+    """True to keep every tick; if False, memory does not grow with the duration."""
     on_progress: Callable[[float], None] | None
     """Called after every tick with the simulated time [s]; a KeyboardInterrupt it raises ends the run."""
     on_start: Callable[[Recorder], None] | None

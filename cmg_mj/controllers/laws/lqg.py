@@ -25,7 +25,7 @@ Four = tuple[float, float, float, float]
 
 
 class LqgState(NamedTuple):
-    """What the filter expects at the next sample, and the integrator."""
+    """The filter's prediction of the next sample, and the integrator."""
 
     x1: Scalar
     x2: Scalar

@@ -11,7 +11,7 @@ from cmg_mj.observers.protocol import Estimate, Measurement, State
 
 
 class FeedbackState(Estimate):
-    """What is fed back to a law: x1 [rad], x2 [rad/s], x3 [rad], floats for one world, arrays (n_worlds,) for many.
+    """Feedback of a law: x1 [rad], x2 [rad/s], x3 [rad], floats for one world, arrays (n_worlds,) for many.
 
     x1 and x3 are measured or estimated (`controller.angle_source`), x2 is the observer's, the gyro's or the true one
     (`controller.feedback`). `extra` has what the observer in the loop estimates beyond x, in the order of its
@@ -83,7 +83,7 @@ NEEDS = ("estimate",)
 
 
 def needs(law: Law | type[Law]) -> tuple[str, ...]:
-    """What a law, or its class, takes beside y, out of `NEEDS`; one that does not say counts as taking all.
+    """Return the `NEEDS` of a law, or of its class: its inputs beside y. A law without the attribute takes all.
 
     Raises:
         InputError: It names something else.

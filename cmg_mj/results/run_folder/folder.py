@@ -131,7 +131,7 @@ class RunFolder:
             shutil.rmtree(new, ignore_errors=True)  # unless it has been moved to its place
 
     def _has_room_for(self, manifest: Manifest) -> bool:
-        """Whether nothing would be lost: no complete result for one that is not, and nothing of the user's."""
+        """Return whether writing loses nothing: no complete result for an incomplete one, no file of the user's."""
         loses = not manifest.complete and Manifest.read(self._folder).stands(self._folder)
         return not loses and not set(manifest.files) & set(users_files(self._folder))
 
@@ -212,12 +212,12 @@ def unused_folder(
 
 
 def _is_unused(folder: Path) -> bool:
-    """Whether there is nothing in a folder, but perhaps what a killed run has left."""
+    """Return whether a folder is empty, except for the remains of a killed run."""
     return folder.is_dir() and all(path.name == HIDDEN for path in folder.iterdir())
 
 
 def _is_of(path: Path, request_toml: str) -> bool:
-    """Whether cmg_mj has written the result of what this file asks for there."""
+    """Return whether cmg_mj wrote this file, and the file makes the same request."""
     try:
         return Manifest.read(path.parent).has(path) and path.read_text(encoding="utf-8") == request_toml
     except (OSError, ValueError):

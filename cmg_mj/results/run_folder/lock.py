@@ -50,7 +50,7 @@ class Lock:
                 os.close(descriptor)
 
     def is_the_file(self, path: Path, descriptor: int | None = None) -> bool:
-        """Whether the file that is locked has this name, too."""
+        """Return whether the locked file has this name, too."""
         try:
             return os.path.samestat(os.fstat(self._descriptor if descriptor is None else descriptor), os.stat(path))
         except FileNotFoundError:

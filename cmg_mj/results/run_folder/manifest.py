@@ -44,14 +44,14 @@ class Manifest:
         (folder / HIDDEN / "files.json").write_text(json.dumps(stored, indent=2) + "\n", encoding="utf-8")
 
     def has(self, path: Path) -> bool:
-        """Whether a file is as cmg_mj has written it."""
+        """Return whether a file is as cmg_mj has written it."""
         try:
             return not path.is_symlink() and path.is_file() and self.files.get(path.name) == _digest(path)
         except OSError:
             return False
 
     def stands(self, folder: Path) -> bool:
-        """Whether this is a complete result, and all of it still there."""
+        """Return whether this is a complete result, and all of it still there."""
         return self.complete and all((folder / name).is_file() for name in self.files)
 
 

@@ -83,12 +83,12 @@ def _asides(folder: Path) -> list[Path]:
 
 
 def _superseded(folder: Path, by: Manifest) -> list[Path]:
-    """What was set aside and goes when a complete result comes, if nobody writes to it just now."""
+    """List the results set aside that a complete result removes, without those being written now."""
     return [path for path in _asides(folder) if by.complete and not (path / HIDDEN / "lock").exists()]
 
 
 def _is_dead(beside: Path, lock: Lock) -> bool:
-    """Whether it is cmg_mj's, and of a process that has ended."""
+    """Return whether the folder is cmg_mj's, and of a process that has ended."""
     if not (beside / HIDDEN).is_dir():
         return not any(beside.iterdir())
     if lock.is_the_file(beside / HIDDEN / "lock"):
@@ -127,7 +127,7 @@ def _swap_folders(new: Path, folder: Path, lock: Lock) -> bool:
 
 
 def _stands_in(folder: Path) -> bool:
-    """Whether the current folder is this one or in it: whoever stands there would stand in the old one."""
+    """Return whether the current folder is this one or in it; a swap would leave its user in the old one."""
     try:
         here = Path.cwd().resolve()
     except OSError:  # it has been taken away

@@ -38,7 +38,7 @@ class PushMargin(NamedTuple):
     """E: the largest impulse about the line, as a push of 0.1 s, that it recovers from, the median of ten worlds
     [N m s]. 0 if it falls without one."""
     worst_impulse: float
-    """That of the worst of the worlds [N m s]."""
+    """Largest impulse in the worst of the worlds [N m s]."""
 
 
 def push_margin(scenario: Scenario, design: Design) -> PushMargin:

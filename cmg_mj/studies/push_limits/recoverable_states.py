@@ -12,7 +12,7 @@ TRAVEL = math.pi / 2.0
 
 
 class RecoverableLimit(NamedTuple):
-    """What no controller can exceed, on the linearised reduced model (6) with the gimbals' geometry kept.
+    """Upper bound for any controller, on the linearised reduced model (6) with the gimbals' geometry kept.
 
     With lambda^2 = m g h/J, the part z = x1 + x2/lambda of a state grows as z' = lambda z - (H/J) cos(x3) u/lambda.
     Nothing takes more off it than gimbals that turn at once as fast as they can, x3 = u t, up to their travel theta. It

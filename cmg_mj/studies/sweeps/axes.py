@@ -69,7 +69,7 @@ class VariedField:
 
     @property
     def is_range(self) -> bool:
-        """Whether the values are a range to be sampled."""
+        """Return whether the values are a range to be sampled."""
         return not self.values
 
     def at(self, shares: np.ndarray) -> list[FieldValue]:

@@ -65,7 +65,7 @@ class Trials:
 
     @property
     def fell(self) -> np.ndarray:
-        """Whether each trial fell, (n_points, n_observers, n_worlds); one refused or stopped neither fell nor stood."""
+        """Mask of the trials that fell, (n_points, n_observers, n_worlds). A refused or stopped one did not."""
         return self.outcome == "fell"
 
     def figure(self, key: str) -> np.ndarray:

@@ -22,7 +22,7 @@ ORDER_FIGURES = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "t
 
 
 class OrderCount(NamedTuple):
-    """How often an order held.
+    """Count of how often an order held.
 
     Attributes:
         held: Number of worlds, or points, in which the order held.

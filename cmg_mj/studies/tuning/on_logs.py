@@ -131,7 +131,7 @@ class LogStudy:
 
     @property
     def has_interval(self) -> bool:
-        """Whether the stretches are long enough for an interval."""
+        """Return whether the stretches are long enough for an interval."""
         return self.stretch_s >= SHORTEST_S
 
     def settings(self) -> list[str]:

@@ -361,7 +361,7 @@ class BestNoise(NamedTuple):
     """The sensor noise at which the given parameters are the best ones."""
 
     where: Literal["found", "below", "above", "not bracketed"]
-    """Whether that noise lies between the levels, below or above them, or cannot be bracketed."""
+    """Place of that noise: found between the levels, below or above them, or not bracketed."""
     noise_ug_rthz: float | None
     """The noise density, if it was found [ug/sqrt(Hz)]."""
 
