@@ -56,10 +56,10 @@ def test_without_a_gap_the_command_goes_through_as_it_is() -> None:
     np.testing.assert_array_equal(turned[:, 1], [alone(float(rate)) for rate in rates[:, 1]])
 
 
-def trajectory(of: Experiment, driver: Any = "native") -> Trajectory:
-    found = of.run(driver=driver).trajectory
-    assert found is not None
-    return found
+def trajectory(setup: Experiment, driver: Any = "native") -> Trajectory:
+    result = setup.run(driver=driver).trajectory
+    assert result is not None
+    return result
 
 
 def gimbals_from_commands(run: Trajectory, gap: float) -> np.ndarray:
@@ -94,37 +94,37 @@ def test_a_users_own_loop_has_it_too() -> None:
 
     from cmg_mj.simulation.callback import control
 
-    of = experiment("plant.gimbal_backlash_arcmin=60.0", "plant.timestep_s=0.005")
-    controller, data = of.axis_controller(), of.plant.new_data()
+    setup = experiment("plant.gimbal_backlash_arcmin=60.0", "plant.timestep_s=0.005")
+    controller, data = setup.axis_controller(), setup.plant.new_data()
     for _ in range(100):
-        control(of.plant, controller, data)
-        mujoco.mj_step(of.plant.model, data)
-    assert data.qpos[of.plant.tilt] - of.plant.tilt_zero + of.plant.bias == trajectory(of)["x1_rad"][100]
+        control(setup.plant, controller, data)
+        mujoco.mj_step(setup.plant.model, data)
+    assert data.qpos[setup.plant.tilt] - setup.plant.tilt_zero + setup.plant.bias == trajectory(setup)["x1_rad"][100]
     controller.reset()
     assert controller.gimbal_rate is None
 
 
 def test_observers_are_told_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    of = experiment("plant.gimbal_backlash_arcmin=60.0")
-    told: list[float] = []
-    controller = of.axis_controller()
+    setup = experiment("plant.gimbal_backlash_arcmin=60.0")
+    commands: list[float] = []
+    controller = setup.axis_controller()
     observer: Any = controller.observer
-    monkeypatch.setattr(type(observer), "step", _recorded(type(observer).step, told))
+    monkeypatch.setattr(type(observer), "step", _recorded(type(observer).step, commands))
     commanded = []
     step = 0
-    ideal = of.plant.ideal_readings(of.plant.new_data().sensordata.tolist(), of.plant.new_data().qvel.tolist())
+    ideal = setup.plant.ideal_readings(setup.plant.new_data().sensordata.tolist(), setup.plant.new_data().qvel.tolist())
     while len(commanded) < 20:
         if controller.update(step, ideal):
             assert controller.tick is not None
             commanded.append(controller.tick.u)
         step += controller.steps_per_sample
-    assert told == commanded[:-1]
+    assert commands == commanded[:-1]
     assert controller.gimbal_rate != commanded[-1] or controller.gimbal_rate == 0.0
 
 
-def _recorded(step: Any, told: list[float]) -> Any:
+def _recorded(step: Any, commands: list[float]) -> Any:
     def recorded(self: Any, state: Any, y: Any, u: float) -> Any:
-        told.append(u)
+        commands.append(u)
         return step(self, state, y, u)
 
     return recorded

@@ -74,11 +74,11 @@ def test_closed_loop_poles_of_table_2() -> None:
     K = [[-StateFeedback(DT)(*row)[0] for row in (1e-3 * np.eye(4)).tolist()]]
     poles = np.linalg.eigvals(A_E - B_E @ (1e3 * np.array(K)))
     expected = [-10.47 - 4.60j, -10.47 + 4.60j, -0.203 - 0.295j, -0.203 + 0.295j]
-    found = sorted(poles, key=lambda s: (round(s.real, 2), s.imag))
-    np.testing.assert_allclose([s.real for s in found], [s.real for s in expected], atol=6e-3)
-    np.testing.assert_allclose([s.imag for s in found], [s.imag for s in expected], atol=6e-3)
-    np.testing.assert_allclose([s.real for s in found[2:]], -0.203, atol=6e-4)
-    np.testing.assert_allclose([abs(s.imag) for s in found[2:]], 0.295, atol=6e-4)
+    result = sorted(poles, key=lambda s: (round(s.real, 2), s.imag))
+    np.testing.assert_allclose([s.real for s in result], [s.real for s in expected], atol=6e-3)
+    np.testing.assert_allclose([s.imag for s in result], [s.imag for s in expected], atol=6e-3)
+    np.testing.assert_allclose([s.real for s in result[2:]], -0.203, atol=6e-4)
+    np.testing.assert_allclose([abs(s.imag) for s in result[2:]], 0.295, atol=6e-4)
 
 
 # --- the law -------------------------------------------------------------------------------------------------
@@ -285,12 +285,12 @@ READINGS = [reading(0.01, 0.0, 0.5), reading(0.02, 0.1, 0.6), reading(-0.01, 0.2
 ESTIMATES = [Estimate(0.01, 0.0, 0.0), *(Estimate(0.001 * k, 0.1 * k, -0.05 * k) for k in (1, 2, 3))]
 
 
-def ticks(of: Controller, readings: list[IdealReading] = READINGS) -> list[Any]:
-    found = []
+def ticks(loop: Controller, readings: list[IdealReading] = READINGS) -> list[Any]:
+    result = []
     for k, ideal in enumerate(readings):
-        assert of.update(5 * k, ideal)
-        found.append(of.tick)
-    return found
+        assert loop.update(5 * k, ideal)
+        result.append(loop.tick)
+    return result
 
 
 def test_measurements_are_tilt_and_half_the_difference_of_the_gimbals() -> None:
@@ -316,23 +316,23 @@ def test_first_estimate_is_at_rest_at_the_measurement() -> None:
 
 def test_observer_gets_the_sample_and_the_command_held_since_the_last() -> None:
     observer = Script(ESTIMATES.__getitem__)
-    found = ticks(controller(observer))
-    assert observer.asked == [(now.y1, now.y2, before.u) for before, now in itertools.pairwise(found)]
+    result = ticks(controller(observer))
+    assert observer.asked == [(now.y1, now.y2, before.u) for before, now in itertools.pairwise(result)]
 
 
 @pytest.mark.parametrize("angles", ["measured", "estimated"])
 @pytest.mark.parametrize("feedback", ["observer", "fog", "truth"])
 def test_law_acts_on_the_signals_it_was_told_to(feedback: Any, angles: Any) -> None:
     """(8) with y1, y2 or their estimates; the rate from the observer, the gyro (here off by 0.02) or the truth."""
-    of = controller(Script(ESTIMATES.__getitem__), feedback=feedback, angle_source=angles)
-    of.sensors = Sensors(
+    loop = controller(Script(ESTIMATES.__getitem__), feedback=feedback, angle_source=angles)
+    loop.sensors = Sensors(
         IDEAL_SENSORS.accelerometer,
         IDEAL_SENSORS.encoder,
         Fog(angle_random_walk_deg_rth=0.0, bandwidth_hz=0.0, bias_deg_h=math.degrees(0.02) * 3600.0),
     )
-    of.reset()
+    loop.reset()
     x_e = 0.0
-    for ideal, estimate, tick in zip(READINGS, ESTIMATES, ticks(of), strict=True):
+    for ideal, estimate, tick in zip(READINGS, ESTIMATES, ticks(loop), strict=True):
         assert tick.fog == pytest.approx(ideal.rate + 0.02, rel=1e-12)
         x1, x3 = (estimate.x1, estimate.x3) if angles == "estimated" else (tick.y1, tick.y2)
         x2 = {"observer": estimate.x2, "fog": tick.fog, "truth": ideal.rate}[feedback]
@@ -357,14 +357,19 @@ class WithBias(Script):
 
 
 def test_extra_signals_follow_the_state() -> None:
-    of = controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4 * k, 0.5 * k)))
-    assert of.extra_signals == [("torque_n_m", "bias_rad")]
-    assert [tuple(tick.estimates[0])[3:] for tick in ticks(of)] == [(0.0, 0.0), (0.4, 0.5), (0.8, 1.0), (0.4 * 3, 1.5)]
+    loop = controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4 * k, 0.5 * k)))
+    assert loop.extra_signals == [("torque_n_m", "bias_rad")]
+    assert [tuple(tick.estimates[0])[3:] for tick in ticks(loop)] == [
+        (0.0, 0.0),
+        (0.4, 0.5),
+        (0.8, 1.0),
+        (0.4 * 3, 1.5),
+    ]
 
 
 def test_signals_that_are_not_declared_are_left_out() -> None:
-    found = ticks(controller(Script(lambda k: (0.1, 0.2, 0.3, 0.4))))
-    assert [tuple(tick.estimates[0]) for tick in found[1:]] == [(0.1, 0.2, 0.3)] * 3
+    result = ticks(controller(Script(lambda k: (0.1, 0.2, 0.3, 0.4))))
+    assert [tuple(tick.estimates[0]) for tick in result[1:]] == [(0.1, 0.2, 0.3)] * 3
 
 
 def test_a_declared_signal_that_is_missing_or_nan_stops_the_run() -> None:
@@ -384,11 +389,11 @@ def test_names_of_signals_are_checked(names: Any) -> None:
 
 def test_trim_holds_the_integrator_where_the_bias_asks_for_it() -> None:
     """u = 0 at y1 = -e needs k_e4 x_e = k_e1 e; from the end of the trim on, x_e' = -x3 as ever."""
-    found = ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, 0.01 * k)), bias_trim_s=2.0 * DT))
+    result = ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, 0.01 * k)), bias_trim_s=2.0 * DT))
     expected = [0.0, 35.0 / 0.3 * 0.01]
-    expected += [expected[-1] - DT * found[1].y2, expected[-1] - DT * (found[1].y2 + found[2].y2)]
-    assert [tick.x_e for tick in found] == pytest.approx(expected, rel=1e-12)
-    assert -35.0 * -0.01 - 0.3 * found[1].x_e == pytest.approx(0.0, abs=1e-15)  # at rest at y1 = -e nothing is asked
+    expected += [expected[-1] - DT * result[1].y2, expected[-1] - DT * (result[1].y2 + result[2].y2)]
+    assert [tick.x_e for tick in result] == pytest.approx(expected, rel=1e-12)
+    assert -35.0 * -0.01 - 0.3 * result[1].x_e == pytest.approx(0.0, abs=1e-15)  # at rest at y1 = -e nothing is asked
 
 
 def test_trim_needs_a_bias_and_an_integrator() -> None:
@@ -401,40 +406,40 @@ def test_trim_needs_a_bias_and_an_integrator() -> None:
 
 
 def test_reset_starts_the_same_run_again() -> None:
-    of = controller(make_observer("homogeneous", DT, PAPER), seed=3)
-    of.sensors = Sensors()
-    of.reset()
-    first = ticks(of)
-    of.reset()
-    assert of.tick is None
-    assert ticks(of) == first
+    loop = controller(make_observer("homogeneous", DT, PAPER), seed=3)
+    loop.sensors = Sensors()
+    loop.reset()
+    first = ticks(loop)
+    loop.reset()
+    assert loop.tick is None
+    assert ticks(loop) == first
 
 
 def test_nothing_is_due_between_ticks() -> None:
     observer = Script(ESTIMATES.__getitem__)
-    of = controller(observer)
-    assert (of.period, of.steps_per_sample) == (5, 5)
-    due = [of.update(step, READINGS[0]) for step in range(16)]
+    loop = controller(observer)
+    assert (loop.period, loop.steps_per_sample) == (5, 5)
+    due = [loop.update(step, READINGS[0]) for step in range(16)]
     assert [step for step, is_due in enumerate(due) if is_due] == [0, 5, 10, 15]
     assert len(observer.asked) == 3
 
 
 def test_steps_per_sample_is_where_anything_may_be_due() -> None:
     sensors = Sensors(Accelerometer(rate_hz=1000.0), Encoder(rate_hz=100.0), Fog(rate_hz=500.0))
-    of = Controller(
+    loop = Controller(
         Script(ESTIMATES.__getitem__),
         StateFeedback(0.01),
         sensors,
         PlantInterface(RadialTilt(0.1, 0.3), GimbalAngle((1.0,), (0.0,)), 0.0005),
     )
-    assert (of.period, of.steps_per_sample) == (20, 2)
+    assert (loop.period, loop.steps_per_sample) == (20, 2)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_an_estimate_that_is_no_number_stops_the_run(value: float) -> None:
-    of = controller(Script(lambda k: Estimate(0.0, value if k == 2 else 0.0, 0.0)))
+    loop = controller(Script(lambda k: Estimate(0.0, value if k == 2 else 0.0, 0.0)))
     with pytest.raises(RunStopped, match=rf"observer Script returned {value} for x2 at t = 0\.01 s"):
-        ticks(of)
+        ticks(loop)
 
 
 @pytest.mark.parametrize("estimate", [Estimate(math.nan, 0.0, 0.0), Estimate(0.0, 0.0, math.nan)])
@@ -523,14 +528,14 @@ def test_gimbals_move_oppositely_at_the_commanded_rate() -> None:
 def test_another_observer_rides_along_and_takes_over() -> None:
     """The command is the one's until the other takes over, which began with the next sample and knows its held u."""
     one, other = Script(lambda k: Estimate(0.0, 1.0, 0.0)), Script(lambda k: Estimate(0.0, -1.0, 0.0))
-    of = controller(one)
+    loop = controller(one)
     rates = []
     for k in range(3 + TAKEOVER_TICKS + 5):
         if k == 3:
-            of.swap_components(observer=other)
-        of.update(5 * k, READINGS[k % 4])
-        assert of.tick is not None
-        rates.append(of.tick.estimates[0][1])
+            loop.swap_components(observer=other)
+        loop.update(5 * k, READINGS[k % 4])
+        assert loop.tick is not None
+        rates.append(loop.tick.estimates[0][1])
     assert rates == [0.0, *[1.0] * (2 + TAKEOVER_TICKS), *[-1.0] * 5]
     assert len(one.asked) == 2 + TAKEOVER_TICKS
     assert len(other.asked) == TAKEOVER_TICKS + 4
@@ -543,33 +548,33 @@ def test_it_takes_over_at_once_from_one_that_fails() -> None:
             raise KeyError("gone")
         return Estimate(0.0, 1.0, 0.0)
 
-    of = controller(Script(failing))
+    loop = controller(Script(failing))
     rates = []
     for k in range(9):
         if k == 3:
-            of.swap_components(observer=Script(lambda k: Estimate(0.0, -1.0, 0.0)))
-        of.update(5 * k, READINGS[0])
-        assert of.tick is not None
-        rates.append(of.tick.estimates[0][1])
+            loop.swap_components(observer=Script(lambda k: Estimate(0.0, -1.0, 0.0)))
+        loop.update(5 * k, READINGS[0])
+        assert loop.tick is not None
+        rates.append(loop.tick.estimates[0][1])
     assert rates == [0.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
 
 
 def test_before_the_first_tick_an_observer_is_exchanged_at_once() -> None:
-    of = controller(Script(lambda k: Estimate(0.0, 1.0, 0.0)))
-    of.swap_components(observer=Script(ESTIMATES.__getitem__))
-    assert [tick.estimates[0] for tick in ticks(of)][1:] == ESTIMATES[1:]
+    loop = controller(Script(lambda k: Estimate(0.0, 1.0, 0.0)))
+    loop.swap_components(observer=Script(ESTIMATES.__getitem__))
+    assert [tick.estimates[0] for tick in ticks(loop)][1:] == ESTIMATES[1:]
 
 
 def test_law_and_feedback_change_with_the_integrator_as_it_was() -> None:
-    of = controller(Script(ESTIMATES.__getitem__))
-    of.update(0, READINGS[0])
-    of.update(5, READINGS[1])
+    loop = controller(Script(ESTIMATES.__getitem__))
+    loop.update(0, READINGS[0])
+    loop.update(5, READINGS[1])
     other = StateFeedback(DT, (30.0, 3.0, -0.5, 0.1))
-    of.swap_components(law=other, feedback="truth")
-    of.update(10, READINGS[2])
-    assert of.tick is not None
-    assert of.tick.x_e == pytest.approx(-DT * 0.1)
-    assert of.tick.u == other(of.tick.y1, 0.7, of.tick.y2, of.tick.x_e)[0]
+    loop.swap_components(law=other, feedback="truth")
+    loop.update(10, READINGS[2])
+    assert loop.tick is not None
+    assert loop.tick.x_e == pytest.approx(-DT * 0.1)
+    assert loop.tick.u == other(loop.tick.y1, 0.7, loop.tick.y2, loop.tick.x_e)[0]
 
 
 def test_sensors_start_afresh_between_their_samples_too() -> None:
@@ -579,21 +584,21 @@ def test_sensors_start_afresh_between_their_samples_too() -> None:
         IDEAL_SENSORS.encoder,
         IDEAL_SENSORS.fog,
     )
-    of = controller(Script(lambda k: Estimate(0.0, 0.0, 0.0)))
-    of.sensors = slow
-    of.reset()
-    of.update(0, READINGS[0])
-    of.update(5, READINGS[1])
-    assert of.tick is not None
-    assert of.tick.y1 == pytest.approx(0.01)
-    of.swap_components(sensors=Sensors(Accelerometer(rate_hz=50.0, bias_mg=(1.0, 1.0)), slow.encoder, slow.fog))
-    of.update(10, READINGS[2])
-    assert of.tick.y1 != pytest.approx(0.01, abs=0.005)
+    loop = controller(Script(lambda k: Estimate(0.0, 0.0, 0.0)))
+    loop.sensors = slow
+    loop.reset()
+    loop.update(0, READINGS[0])
+    loop.update(5, READINGS[1])
+    assert loop.tick is not None
+    assert loop.tick.y1 == pytest.approx(0.01)
+    loop.swap_components(sensors=Sensors(Accelerometer(rate_hz=50.0, bias_mg=(1.0, 1.0)), slow.encoder, slow.fog))
+    loop.update(10, READINGS[2])
+    assert loop.tick.y1 != pytest.approx(0.01, abs=0.005)
 
 
 def test_rates_stay_while_it_runs() -> None:
-    of = controller(Script(ESTIMATES.__getitem__))
+    loop = controller(Script(ESTIMATES.__getitem__))
     with pytest.raises(InputError, match=r"controller.rate_hz: stays 200 Hz"):
-        of.swap_components(law=StateFeedback(0.01))
+        loop.swap_components(law=StateFeedback(0.01))
     with pytest.raises(InputError, match="sensors: their rates stay"):
-        of.swap_components(sensors=Sensors(Accelerometer(rate_hz=1000.0)))
+        loop.swap_components(sensors=Sensors(Accelerometer(rate_hz=1000.0)))

@@ -40,11 +40,11 @@ def observer(kind: str, dt: float = DT, model: ReducedModel = PAPER, **parameter
     return make_observer(kind, dt, model, NOISE, **parameters)
 
 
-def run(of: Observer, y1: Signal, y2: Signal, u: Signal) -> tuple[np.ndarray, list]:
+def run(estimator: Observer, y1: Signal, y2: Signal, u: Signal) -> tuple[np.ndarray, list]:
     """Estimates after the first sample, (n - 1, 3), and all n states."""
-    states, estimates = [of.init(Measurement(float(y1[0]), float(y2[0])))], []
+    states, estimates = [estimator.init(Measurement(float(y1[0]), float(y2[0])))], []
     for a, b, held in zip(y1[1:], y2[1:], u, strict=False):
-        state, estimate = of.step(states[-1], Measurement(float(a), float(b)), float(held))
+        state, estimate = estimator.step(states[-1], Measurement(float(a), float(b)), float(held))
         states.append(state)
         estimates.append(estimate)
     return np.array(estimates), states

@@ -43,9 +43,9 @@ def adaptive(model: ReducedModel = PAIR, dt: float = DT, **parameters: Any) -> A
 
 @pytest.mark.parametrize("mode", MODES)
 def test_names_what_it_estimates(mode: str) -> None:
-    of = adaptive(**MODES[mode])
-    assert extra_signals(of) == SIGNALS[mode]
-    _, estimate = of.step(of.init(Measurement(0.01, 0.2)), Measurement(0.012, 0.21), 0.4)
+    estimator = adaptive(**MODES[mode])
+    assert extra_signals(estimator) == SIGNALS[mode]
+    _, estimate = estimator.step(estimator.init(Measurement(0.01, 0.2)), Measurement(0.012, 0.21), 0.4)
     assert estimate._fields == ("x1", "x2", "x3", *SIGNALS[mode])
     assert estimate.x3 == 0.21
 
@@ -83,11 +83,11 @@ def reduced_run(
     return y1 + rng.normal(0.0, noise, n + 1) if noise else y1, y2, u, x2
 
 
-def replay(of: Adaptive, y1: Signal, y2: Signal, u: Signal) -> np.ndarray:
+def replay(estimator: Adaptive, y1: Signal, y2: Signal, u: Signal) -> np.ndarray:
     """Estimates after the first sample."""
-    state, rows = of.init(Measurement(float(y1[0]), float(y2[0]))), []
+    state, rows = estimator.init(Measurement(float(y1[0]), float(y2[0]))), []
     for k in range(1, len(y1)):
-        state, estimate = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        state, estimate = estimator.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
         rows.append(estimate)
     return np.array(rows)
 
@@ -96,16 +96,16 @@ def replay(of: Adaptive, y1: Signal, y2: Signal, u: Signal) -> np.ndarray:
 def test_finds_the_bias(e_deg: float) -> None:
     """Without noise; what is left is sin(y1 + e) less sin y1 + e cos y1, 1e-4 of e."""
     y1, y2, u, x2 = reduced_run(PAIR, math.radians(e_deg), lambda t: 0.0, 8.0)
-    found = replay(adaptive(), y1, y2, u)
-    assert math.degrees(found[-1, 3]) == pytest.approx(e_deg, rel=2e-3)
-    assert abs(found[-1, 1] - x2[-1]) < 1e-3
+    result = replay(adaptive(), y1, y2, u)
+    assert math.degrees(result[-1, 3]) == pytest.approx(e_deg, rel=2e-3)
+    assert abs(result[-1, 1] - x2[-1]) < 1e-3
 
 
 def test_finds_the_torque_on_the_whole_rig_if_the_bias_is_known() -> None:
     y1, y2, u, x2 = reduced_run(PAIR, math.radians(1.0), lambda t: 0.15, 8.0)
-    found = replay(adaptive(bias=False, torque=True, known_bias_deg=1.0), y1, y2, u)
-    assert found[-1, 3] == pytest.approx(0.15, rel=2e-3)
-    assert abs(found[-1, 1] - x2[-1]) < 1e-3
+    result = replay(adaptive(bias=False, torque=True, known_bias_deg=1.0), y1, y2, u)
+    assert result[-1, 3] == pytest.approx(0.15, rel=2e-3)
+    assert abs(result[-1, 1] - x2[-1]) < 1e-3
     wrong = replay(adaptive(bias=False, torque=True), y1, y2, u)  # the bias is taken for a torque: 2 M sin e more
     assert wrong[-1, 3] == pytest.approx(0.15 + 2.0 * PAIR.gravity_torque * math.sin(math.radians(1.0)), rel=2e-3)
 
@@ -113,14 +113,14 @@ def test_finds_the_torque_on_the_whole_rig_if_the_bias_is_known() -> None:
 def test_finds_bias_and_sinusoid() -> None:
     w, e = 2.0 * math.pi * 1.0, math.radians(0.8)
     y1, y2, u, x2 = reduced_run(PAIR, e, lambda t: 0.2 * math.sin(w * t + 0.7), 14.0)
-    found = replay(adaptive(sinusoid_hz=1.0), y1, y2, u)
+    result = replay(adaptive(sinusoid_hz=1.0), y1, y2, u)
     t = DT * np.arange(1, len(y1))
     late = t > 12.0
-    assert np.abs(found[late, 3] - e).max() < 0.02 * e
-    assert np.abs(found[late, 4] - 0.2 * np.sin(w * t[late] + 0.7)).max() < 0.004
-    assert np.abs(found[late, 1] - x2[1:][late]).max() < 2e-3
+    assert np.abs(result[late, 3] - e).max() < 0.02 * e
+    assert np.abs(result[late, 4] - 0.2 * np.sin(w * t[late] + 0.7)).max() < 0.004
+    assert np.abs(result[late, 1] - x2[1:][late]).max() < 2e-3
     blind = replay(adaptive(), y1, y2, u)
-    rms = [float(np.sqrt(np.mean((rows[late, 1] - x2[1:][late]) ** 2))) for rows in (found, blind)]
+    rms = [float(np.sqrt(np.mean((rows[late, 1] - x2[1:][late]) ** 2))) for rows in (result, blind)]
     print(f"velocity RMS error with a gait's torque: knowing of it {rms[0]:.1e}, not {rms[1]:.1e} rad/s")
     assert rms[0] < 0.1 * rms[1]
 
@@ -128,40 +128,40 @@ def test_finds_bias_and_sinusoid() -> None:
 def test_noise_moves_the_bias_by_what_the_linear_filter_says() -> None:
     """With T at rest, (7) to (9) are a linear filter of y1; its variance is a Lyapunov equation's. 40 seeds."""
     sigma, e, many = math.radians(0.3), math.radians(1.0), 40
-    of, errors = adaptive(), []
+    estimator, errors = adaptive(), []
     y1, y2, u, _ = reduced_run(PAIR, e, lambda t: 0.0, 10.0)
     noisy = y1[:, None] + np.random.default_rng(9).normal(0.0, sigma, (len(y1), many))
     ones = np.ones(many)
-    state = of.init(Measurement(noisy[0], y2[0] * ones))
+    state = estimator.init(Measurement(noisy[0], y2[0] * ones))
     for k in range(1, len(y1)):
-        state, estimate = of.step(state, Measurement(noisy[k], y2[k] * ones), u[k - 1] * ones)
+        state, estimate = estimator.step(state, Measurement(noisy[k], y2[k] * ones), u[k - 1] * ones)
         if k * DT >= 7.0:
             errors.append(estimate.bias_rad - e)
 
-    b, (l1, l2) = PAIR.gravity_torque / PAIR.J1, of.L
+    b, (l1, l2) = PAIR.gravity_torque / PAIR.J1, estimator.L
     T = np.array([b / -l2, l1 * b / l2])  # 0 = (A + L C2) T + B0
-    gain = -of.Gamma[0] * of.Sigma * T[0]  # (9)
+    gain = -estimator.Gamma[0] * estimator.Sigma * T[0]  # (9)
     correction = np.array([l1 + T[0] * gain, l2 + T[1] * gain, gain])
     F = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, b], [0.0, 0.0, 0.0]]) + np.outer(correction, [1.0, 0.0, 0.0])
     g = np.array([0.0, b, 0.0]) - correction  # gravity at the measured tilt, and the correction
     variance = solve_continuous_lyapunov(F, -np.outer(g, g) * sigma**2 * DT)[2, 2]
-    found, expected = float(np.degrees(np.std(errors))), math.degrees(math.sqrt(variance))
-    print(f"bias error: mean {np.degrees(np.mean(errors)):.4f} deg, RMS {found:.4f}, expected {expected:.4f}")
-    assert found == pytest.approx(expected, rel=0.1)
+    result, expected = float(np.degrees(np.std(errors))), math.degrees(math.sqrt(variance))
+    print(f"bias error: mean {np.degrees(np.mean(errors)):.4f} deg, RMS {result:.4f}, expected {expected:.4f}")
+    assert result == pytest.approx(expected, rel=0.1)
     assert abs(np.degrees(np.mean(errors))) < 0.02
 
 
 @pytest.mark.parametrize("hertz", [0.0, 3.0])
 def test_learning_rate_is_the_stiffness_that_a_quiet_rig_comes_to(hertz: float) -> None:
     """Sigma times the sum of Gamma_i T1_i^2, with the T that the observer itself has after 3 s at rest."""
-    of = adaptive(bias=not hertz, sinusoid_hz=hertz)
-    state = of.init(Measurement(0.0, 0.0))
+    estimator = adaptive(bias=not hertz, sinusoid_hz=hertz)
+    state = estimator.init(Measurement(0.0, 0.0))
     for _ in range(600):
-        state, _ = of.step(state, Measurement(0.0, 0.0), 0.0)
-    weights = (of.Gamma[2],) * 2 if hertz else of.Gamma[:1]
-    found = of.Sigma * sum(weight * T1**2 for weight, T1 in zip(weights, state.T1, strict=True))
-    print(f"learning rate {of.learning_rate:.4f} 1/s, found {found:.4f}")
-    assert of.learning_rate == pytest.approx(found, rel=0.02)
+        state, _ = estimator.step(state, Measurement(0.0, 0.0), 0.0)
+    weights = (estimator.Gamma[2],) * 2 if hertz else estimator.Gamma[:1]
+    result = estimator.Sigma * sum(weight * T1**2 for weight, T1 in zip(weights, state.T1, strict=True))
+    print(f"learning rate {estimator.learning_rate:.4f} 1/s, found {result:.4f}")
+    assert estimator.learning_rate == pytest.approx(result, rel=0.02)
 
 
 @pytest.mark.parametrize("rate_hz", [50.0, 200.0, 1000.0])
@@ -173,10 +173,10 @@ def test_defaults_are_taken_at_every_sample_rate(mode: str, rate_hz: float) -> N
 def test_an_error_decays_as_the_gains_say() -> None:
     """Without learning: (A + L C2) with the defaults, poles of 25 rad/s and damping ratio 0.7."""
     dt, n = 5e-4, 80
-    of = adaptive(dt=dt, Gamma=(1e-12, 1e-12, 1e-12))
-    state, still = of.init(Measurement(0.0, 0.0))._replace(x1=0.02, x2=-0.3), Measurement(0.0, 0.0)
+    estimator = adaptive(dt=dt, Gamma=(1e-12, 1e-12, 1e-12))
+    state, still = estimator.init(Measurement(0.0, 0.0))._replace(x1=0.02, x2=-0.3), Measurement(0.0, 0.0)
     for _ in range(n):
-        state, _ = of.step(state, still, 0.0)
+        state, _ = estimator.step(state, still, 0.0)
     matrix = np.array([[-2.0 * 0.7 * 25.0, 1.0], [-(25.0**2), 0.0]])
     assert (state.x1, state.x2) == pytest.approx(tuple(expm(matrix * n * dt) @ [0.02, -0.3]), rel=1e-3)
 
@@ -210,8 +210,8 @@ def test_refused(parameters: dict[str, Any], message: str) -> None:
 
 def test_default_weights_learn_a_bias_and_a_torque_at_1_per_second() -> None:
     """Sigma Gamma T1^2, T1 the steady solution of (8): (M/J1)/w^2 a radian and 1/(gimbals J1)/w^2 a N m, w^2 = -L2."""
-    of = Adaptive(DT, PAIR)
-    w2, (bias, torque, sinusoid) = -of.L[1], of.Gamma
-    assert of.Sigma * bias * (PAPER.gravity_torque / PAPER.J1 / w2) ** 2 == pytest.approx(1.0, rel=0.02)
-    assert of.Sigma * torque * (1.0 / (2.0 * PAPER.J1) / w2) ** 2 == pytest.approx(1.0, rel=0.02)
+    estimator = Adaptive(DT, PAIR)
+    w2, (bias, torque, sinusoid) = -estimator.L[1], estimator.Gamma
+    assert estimator.Sigma * bias * (PAPER.gravity_torque / PAPER.J1 / w2) ** 2 == pytest.approx(1.0, rel=0.02)
+    assert estimator.Sigma * torque * (1.0 / (2.0 * PAPER.J1) / w2) ** 2 == pytest.approx(1.0, rel=0.02)
     assert sinusoid == torque  # per unit of torque the same, whatever its frequency

@@ -26,11 +26,11 @@ def flat(state: Any) -> list:
     return [state]
 
 
-def walk(of: Any, samples: Sequence[tuple[Any, ...]]) -> tuple[Any, list[Estimate]]:
+def walk(estimator: Any, samples: Sequence[tuple[Any, ...]]) -> tuple[Any, list[Estimate]]:
     """Last state and all estimates along samples (y1, y2, acceleration, u held since the sample before)."""
-    state, estimates = of.init(Measurement(*samples[0][:3])), []
+    state, estimates = estimator.init(Measurement(*samples[0][:3])), []
     for *y, u in samples[1:]:
-        state, estimate = of.step(state, Measurement(*y), u)
+        state, estimate = estimator.step(state, Measurement(*y), u)
         estimates.append(estimate)
     return state, estimates
 
@@ -50,58 +50,58 @@ def test_every_parameter_is_documented(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_is_a_frozen_value(kind: str) -> None:
-    of = observer(kind)
-    assert dataclasses.is_dataclass(of)
-    assert of == observer(kind)
+    estimator = observer(kind)
+    assert dataclasses.is_dataclass(estimator)
+    assert estimator == observer(kind)
     with pytest.raises(dataclasses.FrozenInstanceError):
-        object.__getattribute__(of, "__setattr__")("dt", 0.1)
+        object.__getattribute__(estimator, "__setattr__")("dt", 0.1)
 
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_starts_at_rest_at_the_measured_angles(kind: str) -> None:
     """At the equilibrium nothing moves, so the estimate stays (0, 0, y2) while the measurement does."""
-    of = observer(kind)
-    state = of.init(Measurement(0.0, 0.3, 0.0))
+    estimator = observer(kind)
+    state = estimator.init(Measurement(0.0, 0.3, 0.0))
     for _ in range(5):
-        state, estimate = of.step(state, Measurement(0.0, 0.3, 0.0), 0.0)
+        state, estimate = estimator.step(state, Measurement(0.0, 0.3, 0.0), 0.0)
         np.testing.assert_allclose(estimate[:3], (0.0, 0.0, 0.3), rtol=0.0, atol=1e-14)
 
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_step_has_no_memory_but_the_state(kind: str) -> None:
     """The same state gives the same step, from another instance, after other steps, and is left as it was."""
-    of, twin = observer(kind), observer(kind)
-    state, _ = walk(of, samples())
+    estimator, twin = observer(kind), observer(kind)
+    state, _ = walk(estimator, samples())
     before = copy.deepcopy(state)
     y, u = Measurement(0.02, 0.1, 3.0), 1.5
-    first = of.step(state, y, u)
-    walk(of, samples(seed=1))
-    assert flat(of.step(state, y, u)) == flat(first)
+    first = estimator.step(state, y, u)
+    walk(estimator, samples(seed=1))
+    assert flat(estimator.step(state, y, u)) == flat(first)
     assert flat(twin.step(state, y, u)) == flat(first)
     assert flat(state) == flat(before)
 
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_two_runs_may_share_one_observer(kind: str) -> None:
-    of = observer(kind)
-    alone = [walk(of, samples(seed=seed))[1] for seed in (0, 1)]
-    states: list[Any] = [of.init(Measurement(*samples(seed=seed)[0][:3])) for seed in (0, 1)]
+    estimator = observer(kind)
+    alone = [walk(estimator, samples(seed=seed))[1] for seed in (0, 1)]
+    states: list[Any] = [estimator.init(Measurement(*samples(seed=seed)[0][:3])) for seed in (0, 1)]
     for k in range(1, 60):
         for seed in (0, 1):
             *y, u = samples(seed=seed)[k]
-            states[seed], estimate = of.step(states[seed], Measurement(*y), u)
+            states[seed], estimate = estimator.step(states[seed], Measurement(*y), u)
             assert estimate == alone[seed][k - 1]
 
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_estimate_uses_the_sample_it_is_given(kind: str) -> None:
     """A filter, not a one-step predictor: y1_k and (for y2's model) y2_k move the estimate of sample k."""
-    of = observer(kind)
-    state = of.init(Measurement(0.0, 0.1, 0.0))
-    _, estimate = of.step(state, Measurement(1e-5, 0.1, 0.0), 0.0)
-    _, moved = of.step(state, Measurement(5e-5, 0.1, 0.0), 0.0)
+    estimator = observer(kind)
+    state = estimator.init(Measurement(0.0, 0.1, 0.0))
+    _, estimate = estimator.step(state, Measurement(1e-5, 0.1, 0.0), 0.0)
+    _, moved = estimator.step(state, Measurement(5e-5, 0.1, 0.0), 0.0)
     assert abs(moved.x2 - estimate.x2) > 1e-6
-    _, turned = of.step(state, Measurement(1e-5, 0.3, 0.0), 0.0)
+    _, turned = estimator.step(state, Measurement(1e-5, 0.3, 0.0), 0.0)
     assert abs(turned.x3 - estimate.x3) > 1e-4
 
 
@@ -116,10 +116,10 @@ def test_every_observer_is_a_model_or_a_differentiator() -> None:
 @pytest.mark.parametrize("kind", MODELS)
 def test_models_use_the_command_held_since_the_sample_before(kind: str) -> None:
     """J_d omega_d/J1 u dt = 5.585 rad/s^2 a rad/s: what one period of u adds to the rate, but for the correction."""
-    of = observer(kind)
-    state = of.init(Measurement(0.0, 0.0))
-    _, still = of.step(state, Measurement(0.0, 0.0), 0.0)
-    _, driven = of.step(state, Measurement(0.0, 2.0 * DT), 2.0)  # and the gimbal has turned
+    estimator = observer(kind)
+    state = estimator.init(Measurement(0.0, 0.0))
+    _, still = estimator.step(state, Measurement(0.0, 0.0), 0.0)
+    _, driven = estimator.step(state, Measurement(0.0, 2.0 * DT), 2.0)  # and the gimbal has turned
     assert driven.x2 - still.x2 == pytest.approx(paper.J_d * paper.omega_d / paper.J1 * 2.0 * DT, rel=0.1)
 
 
@@ -129,7 +129,8 @@ def test_differentiators_use_no_model(kind: str) -> None:
     bent = dataclasses.replace(PAPER, J1=1.0, J2=0.3, J_d=0.1, omega_d=10.0, gravity_torque=9.0)
     still = [(y1, 0.0, acceleration, 0.0) for y1, _, acceleration, _ in samples()]
     rates = [
-        [e.x2 for e in walk(of, s)[1]] for of, s in ((observer(kind), samples()), (observer(kind, model=bent), still))
+        [e.x2 for e in walk(estimator, s)[1]]
+        for estimator, s in ((observer(kind), samples()), (observer(kind, model=bent), still))
     ]
     assert rates[0] == rates[1]
 
@@ -137,12 +138,12 @@ def test_differentiators_use_no_model(kind: str) -> None:
 @pytest.mark.parametrize("n_worlds", [1, 5, 8])
 @pytest.mark.parametrize("kind", EVERY)
 def test_arrays_equal_floats_bit_by_bit(kind: str, n_worlds: int) -> None:
-    of = observer(kind)
+    estimator = observer(kind)
     worlds = [samples(120, seed) for seed in range(n_worlds)]
     together = [tuple(np.array([world[k][i] for world in worlds]) for i in range(4)) for k in range(len(worlds[0]))]
-    _, many = walk(of, together)
+    _, many = walk(estimator, together)
     for i, world in enumerate(worlds):
-        _, single = walk(of, world)
+        _, single = walk(estimator, world)
         assert all(type(number) is float for number in single[-1])
         assert [tuple(float(part[i]) for part in estimate) for estimate in many] == single
 
@@ -156,13 +157,15 @@ def test_a_sample_period_that_is_none_is_refused(kind: str, dt: float) -> None:
 
 def positive_gains() -> list[tuple[str, str]]:
     """Observers, and the numbers among their parameters that are positive by default and must be."""
-    found = []
+    result = []
     for kind in EVERY:
-        of: Any = observer(kind)
-        names = [field.name for field in dataclasses.fields(of) if field.name not in BENCH_PARAMETERS]
-        found += [(kind, name) for name in names if isinstance(value := getattr(of, name), float) and value > 0.0]
+        estimator: Any = observer(kind)
+        names = [field.name for field in dataclasses.fields(estimator) if field.name not in BENCH_PARAMETERS]
+        result += [
+            (kind, name) for name in names if isinstance(value := getattr(estimator, name), float) and value > 0.0
+        ]
     may_be_zero = {("high_gain", "d_inf"), ("gyro_free", "bias_walk"), ("gyro_free", "jerk")}
-    return [gain for gain in found if gain not in may_be_zero]
+    return [gain for gain in result if gain not in may_be_zero]
 
 
 @pytest.mark.parametrize(("kind", "name"), positive_gains())

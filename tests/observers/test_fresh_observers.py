@@ -78,16 +78,16 @@ def test_the_resolved_scenario_has_the_defaults_and_reruns_to_the_same_numbers()
 
 @pytest.mark.usefixtures("elsewhere")
 def test_floats_and_arrays_are_not_mixed() -> None:
-    said = cmg_mj(
+    outcome = cmg_mj(
         "compare", "push_recovery", "--observers", f"{__name__}:Allocates", "--worlds", 2, *SHORT, "--out", "it"
     )
-    assert said.status == 0, said.err
+    assert outcome.status == 0, outcome.err
 
 
 @pytest.mark.usefixtures("elsewhere")
 def test_bench_says_what_it_can_of_an_observer_that_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("REPEATS", 1), ("ONE_WORLD_S", 0.1), ("MANY_WORLDS_S", 0.1), ("CONTROL_RATES_HZ", (200.0,))):
         monkeypatch.setattr(f"cmg_mj.studies.benchmark.{name}", value)
-    said = cmg_mj("bench", "loop", "--observers", f"{__name__}:RaisesLate", "--worlds", 2)
-    assert said.status == 0, said.err
-    assert said.out.splitlines()[-1].split()[-2:] == ["-", "-"]
+    outcome = cmg_mj("bench", "loop", "--observers", f"{__name__}:RaisesLate", "--worlds", 2)
+    assert outcome.status == 0, outcome.err
+    assert outcome.out.splitlines()[-1].split()[-2:] == ["-", "-"]

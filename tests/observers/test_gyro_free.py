@@ -34,16 +34,16 @@ def motion(n: int, rng: np.random.Generator, bias: float, rate: float = 0.0) -> 
     return x1, x2, alpha, x1 + C * noise + other, alpha + bias + noise
 
 
-def walk(of: GyroFree, y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, State]:
+def walk(estimator: GyroFree, y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, State]:
     """Estimates (x1, x2, x3) of the samples after the first, (n - 1, 3), and the last state."""
-    state, rows = of.init(Measurement(y1[0], 0.0, a[0])), []
+    state, rows = estimator.init(Measurement(y1[0], 0.0, a[0])), []
     for k in range(1, len(y1)):
-        state, estimate = of.step(state, Measurement(y1[k], 0.0, a[k]), 0.0)
+        state, estimate = estimator.step(state, Measurement(y1[k], 0.0, a[k]), 0.0)
         rows.append(estimate)
     return np.array(rows), state
 
 
-def least_squares(of: GyroFree, y1: np.ndarray, a: np.ndarray) -> tuple[float, float]:
+def least_squares(estimator: GyroFree, y1: np.ndarray, a: np.ndarray) -> tuple[float, float]:
     """x1 and x2 at the last sample that fit all samples and the start best, weighed by their standard deviations.
 
     Unknown are x1 and x2 at the first sample, b, and every sample's n; bias_walk and jerk are zero.
@@ -59,14 +59,14 @@ def least_squares(of: GyroFree, y1: np.ndarray, a: np.ndarray) -> tuple[float, f
         x2[k] = x2[k - 1] + 0.5 * DT * (alpha[k - 1] + alpha[k])
         x1[k] = x1[k - 1] + DT * x2[k - 1] + DT**2 * (alpha[k - 1] / 3.0 + alpha[k] / 6.0)
     n_rows = np.eye(n, unknown + 1, 3)
-    shown = x1 + C * n_rows
-    shown[:, -1] -= y1
-    shown /= NOISE.tilt * math.sqrt(1.0 - NOISE.correlation**2)
+    reading = x1 + C * n_rows
+    reading[:, -1] -= y1
+    reading /= NOISE.tilt * math.sqrt(1.0 - NOISE.correlation**2)
     start_p = x1[:1] - DT**2 / 6.0 * alpha[:1]
     start_p[:, -1] -= y1[0] - DT**2 / 6.0 * a[0]
-    start_z = (x2[:1] - 0.5 * DT * alpha[:1]) / of.rate_start
-    start_b = np.eye(1, unknown + 1, 2) / of.bias_start
-    rows = np.vstack([shown, n_rows / NOISE.acceleration, start_p, start_z, start_b])
+    start_z = (x2[:1] - 0.5 * DT * alpha[:1]) / estimator.rate_start
+    start_b = np.eye(1, unknown + 1, 2) / estimator.bias_start
+    rows = np.vstack([reading, n_rows / NOISE.acceleration, start_p, start_z, start_b])
     solution = np.linalg.lstsq(rows[:, :-1], -rows[:, -1], rcond=None)[0]
     known = np.append(solution, 1.0)
     return float(x1[-1] @ known), float(x2[-1] @ known)
@@ -75,17 +75,17 @@ def least_squares(of: GyroFree, y1: np.ndarray, a: np.ndarray) -> tuple[float, f
 @pytest.mark.parametrize("n", [2, 3, 10, 60])
 def test_it_is_least_squares_over_all_samples(n: int) -> None:
     """A Kalman filter is that, step by step: any wrong term in means or covariances shows."""
-    of = gyro_free(bias_walk=0.0, jerk=0.0)
+    estimator = gyro_free(bias_walk=0.0, jerk=0.0)
     *_, y1, a = motion(n, np.random.default_rng(n), bias=0.4)
-    estimates, _ = walk(of, y1, a)
-    np.testing.assert_allclose(estimates[-1, :2], least_squares(of, y1, a), rtol=1e-7, atol=1e-10)
+    estimates, _ = walk(estimator, y1, a)
+    np.testing.assert_allclose(estimates[-1, :2], least_squares(estimator, y1, a), rtol=1e-7, atol=1e-10)
 
 
 def test_its_steady_state_is_that_of_the_riccati_equation() -> None:
     """p and z with correlated process and measurement noise; without a bias to find."""
-    of = gyro_free(bias_start=1e-9, bias_walk=0.0, jerk=0.0)
+    estimator = gyro_free(bias_start=1e-9, bias_walk=0.0, jerk=0.0)
     zeros = np.zeros(3000)
-    _, state = walk(of, zeros, zeros)
+    _, state = walk(estimator, zeros, zeros)
     A = np.array([[1.0, DT], [0.0, 1.0]])
     G = np.array([[DT**2], [DT]])  # n drives p and z by -G n
     H = np.array([[1.0, 0.0]])
@@ -98,13 +98,13 @@ def test_its_steady_state_is_that_of_the_riccati_equation() -> None:
 
 def test_its_covariance_is_what_its_errors_are() -> None:
     """Normalised errors of p, z, b over worlds with rates and biases as the start assumes, by a chi-square bound."""
-    of = gyro_free(bias_walk=0.0, jerk=0.0)
+    estimator = gyro_free(bias_walk=0.0, jerk=0.0)
     rng = np.random.default_rng(5)
     worlds, n, total = 300, 200, 0.0
     for _ in range(worlds):
-        bias = rng.normal(0.0, of.bias_start)
-        x1, x2, alpha, y1, a = motion(n + 1, rng, bias, rng.normal(0.0, of.rate_start))
-        _, state = walk(of, y1[:-1], a[:-1])
+        bias = rng.normal(0.0, estimator.bias_start)
+        x1, x2, alpha, y1, a = motion(n + 1, rng, bias, rng.normal(0.0, estimator.rate_start))
+        _, state = walk(estimator, y1[:-1], a[:-1])
         truth = x1[-1] - DT**2 / 6.0 * alpha[-1], x2[-1] - 0.5 * DT * alpha[-1], bias
         errors = np.subtract(truth, state[:3])
         pp, pz, pb, zz, zb, bb = state[3:]
@@ -149,11 +149,11 @@ def test_the_trap_of_the_offset() -> None:
     # Best without an offset: no state for it.
     assert figures(0.0, **without) < figures(0.0) < 1.25 * figures(0.0, **without)
     # With one, that is the worst by far, and steady gains, quick or slow, are in between.
-    found = figures(5.0)
-    assert found < 1.1 * figures(0.0)
-    assert figures(5.0, **without) > 4.0 * found
+    result = figures(5.0)
+    assert result < 1.1 * figures(0.0)
+    assert figures(5.0, **without) > 4.0 * result
     for bias_walk in (0.03, 0.3):
-        assert 1.2 * found < figures(5.0, steady, bias_walk=bias_walk) < 0.5 * figures(5.0, **without)
+        assert 1.2 * result < figures(5.0, steady, bias_walk=bias_walk) < 0.5 * figures(5.0, **without)
 
 
 def test_without_a_measured_acceleration_it_is_refused() -> None:

@@ -20,9 +20,9 @@ DEFAULTS = {"l1": 29.5, "l2": 12.4, "d_inf": 0.6, "b": 0.333, "phi1": 0.03, "phi
 
 
 def high_gain(dt: float = DT, model: ReducedModel = PAPER, **parameters: Any) -> HighGain:
-    made = observer("high_gain", dt, model, **parameters)
-    assert isinstance(made, HighGain)
-    return made
+    result = observer("high_gain", dt, model, **parameters)
+    assert isinstance(result, HighGain)
+    return result
 
 
 def printed_slope(m: ReducedModel, **parameters: float) -> Slope:
@@ -49,11 +49,11 @@ def printed_slope(m: ReducedModel, **parameters: float) -> Slope:
 @pytest.mark.parametrize("L", [1.0, 2.5, 7.0])
 def test_correction_is_the_printed_one_at_any_gain(L: float) -> None:
     """What (7) takes from the copy of the model; b matters where L is not 1, which it hardly leaves on this rig."""
-    slope, of = printed_slope(PAPER), high_gain()
+    slope, estimator = printed_slope(PAPER), high_gain()
     for e in (-0.2, -0.01, 0.003, 0.1):
         copy = slope(np.array([0.0, 0.0, L]), 0.0, 0.0, 0.0)[:2]
         printed = copy - slope(np.array([e, 0.0, L]), 0.0, 0.0, 0.0)[:2]
-        assert of.correction(e, L) == pytest.approx(tuple(printed), rel=1e-12)
+        assert estimator.correction(e, L) == pytest.approx(tuple(printed), rel=1e-12)
 
 
 CASES = [
@@ -134,9 +134,9 @@ def test_a_larger_error_is_corrected_more_than_in_proportion() -> None:
     """What d_inf > 0 is for, and the opposite of `homogeneous`."""
 
     def pull(error: float, d_inf: float) -> float:
-        of = high_gain(d_inf=d_inf)
-        state = of.init(Measurement(0.0, 0.0))._replace(x1=error)
-        _, estimate = of.step(state, Measurement(0.0, 0.0), 0.0)
+        estimator = high_gain(d_inf=d_inf)
+        state = estimator.init(Measurement(0.0, 0.0))._replace(x1=error)
+        _, estimate = estimator.step(state, Measurement(0.0, 0.0), 0.0)
         return abs(estimate.x2) / error
 
     assert pull(0.1, 0.6) > 2.0 * pull(0.001, 0.6)
@@ -174,8 +174,8 @@ def test_the_fastest_gains_that_are_taken_are_stable() -> None:
             low = middle
         except InputError:
             high = middle
-    of = high_gain(l1=0.99 * low, d_inf=0.0)
-    state = of.init(Measurement(0.0, 0.0))._replace(x1=1e-6)
+    estimator = high_gain(l1=0.99 * low, d_inf=0.0)
+    state = estimator.init(Measurement(0.0, 0.0))._replace(x1=1e-6)
     for _ in range(3000):
-        state, _ = of.step(state, Measurement(0.0, 0.0), 0.0)
+        state, _ = estimator.step(state, Measurement(0.0, 0.0), 0.0)
     assert abs(state.x1) < 1e-9

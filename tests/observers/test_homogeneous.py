@@ -29,9 +29,9 @@ from tests.observers.reference import (
 )
 
 
-def started(of: Observer, x1: float, x2: float, y1: float = 0.0, y2: float = 0.0) -> Any:
+def started(estimator: Observer, x1: float, x2: float, y1: float = 0.0, y2: float = 0.0) -> Any:
     """A state with this estimate after this measurement."""
-    return of.init(Measurement(y1, y2))._replace(x1=x1, x2=x2)
+    return estimator.init(Measurement(y1, y2))._replace(x1=x1, x2=x2)
 
 
 CASES = [
@@ -57,8 +57,8 @@ def test_one_sample_is_the_printed_equation(parameters: dict, model: ReducedMode
         y1 = x1 + math.copysign(0.3, rng.normal())
         after = Measurement(y1 + 0.02 * rng.normal(), y2 + DT * u)
         expected = integrate(homogeneous_slope(model, **parameters), [x1, x2], [y1, after.y1], [y2, after.y2], [u])
-        of = observer("homogeneous", model=model, **parameters)
-        _, estimate = of.step(started(of, x1, x2, y1, y2), after, u)
+        estimator = observer("homogeneous", model=model, **parameters)
+        _, estimate = estimator.step(started(estimator, x1, x2, y1, y2), after, u)
         np.testing.assert_allclose(estimate[:2], expected[0], rtol=0.0, atol=1e-5)
         assert estimate.x3 == after.y2
 
@@ -123,10 +123,10 @@ def test_a_bias_leaves_a_rate_error_of_the_closed_form(alpha: float, e_deg: floa
 
 def free_errors(alpha: float, dt: float, n: int, x1: float, x2: float) -> np.ndarray:
     """The error dynamics alone: no drive (y1 = 0, u = 0), so the estimate is the error, (n, 2)."""
-    of = observer("homogeneous", dt, alpha=alpha)
-    state, rows = started(of, x1, x2), []
+    estimator = observer("homogeneous", dt, alpha=alpha)
+    state, rows = started(estimator, x1, x2), []
     for _ in range(n):
-        state, estimate = of.step(state, Measurement(0.0, 0.0), 0.0)
+        state, estimate = estimator.step(state, Measurement(0.0, 0.0), 0.0)
         rows.append(estimate[:2])
     return np.array(rows)
 
@@ -203,8 +203,8 @@ def test_friction_enters_as_a_torque_on_the_whole_rig(gimbals: int) -> None:
     dry, viscous, width = 0.3, 0.2, 0.05
     plain = homogeneous_slope(model)
     y1, y2, u = rough_signals(60)
-    of = observer("homogeneous", DT, model, friction_n_m=dry, damping_n_m_s=viscous, friction_width_rad_s=width)
-    _, states = run(of, y1, y2, u)
+    estimator = observer("homogeneous", DT, model, friction_n_m=dry, damping_n_m_s=viscous, friction_width_rad_s=width)
+    _, states = run(estimator, y1, y2, u)
     for k in range(1, len(states)):
         before = states[k - 1]
         D = model.J1 + model.J2 * math.sin(y2[k - 1]) ** 2
@@ -225,14 +225,14 @@ def test_friction_enters_as_a_torque_on_the_whole_rig(gimbals: int) -> None:
 def test_a_known_bias_is_where_gravity_pulls() -> None:
     """Without noise the observer that is told e has no rate error left; the one that is not has the closed form's."""
     e = math.radians(2.0)
-    of: Any = observer("homogeneous")
+    estimator: Any = observer("homogeneous")
     y = Measurement(-e, 0.0)  # at rest at the equilibrium, x1 = 0
-    told, untold = of.init(y), of.init(y)
+    biased_state, untold = estimator.init(y), estimator.init(y)
     with_bias: Any = None
     without: Any = None
     for _ in range(2000):
-        told, with_bias = of.step(told, y, 0.0, e)
-        untold, without = of.step(untold, y, 0.0)
+        biased_state, with_bias = estimator.step(biased_state, y, 0.0, e)
+        untold, without = estimator.step(untold, y, 0.0)
     assert abs(with_bias.x2) < 1e-8
     assert abs(without.x2) > 0.05
 
@@ -241,6 +241,6 @@ def test_friction_beyond_what_the_step_bears_is_refused() -> None:
     """c h = (friction/width + damping) h/(gimbals D) at most 2.5: up to 1.546 N m on one gimbal."""
     observer("homogeneous", friction_n_m=1.54)
     refused: list[dict[str, Any]] = [{"friction_n_m": 1.56}, {"damping_n_m_s": 31.5}, {"friction_n_m": 1e6}]
-    for given in refused:
+    for arguments in refused:
         with pytest.raises(InputError, match="friction_n_m, damping_n_m_s: too much for the sample period"):
-            observer("homogeneous", **given)
+            observer("homogeneous", **arguments)

@@ -24,9 +24,9 @@ def test_is_adaptive_and_then_the_homogeneous_one_told_its_bias() -> None:
     for k in range(1, 80):
         y = Measurement(y1[k], y2[k])
         state, estimate = both.step(state, y, u[k - 1])
-        a, found = adaptive.step(a, y, u[k - 1])
-        b, expected = homogeneous.step(b, y, u[k - 1], found.bias_rad)
-        assert tuple(estimate) == (*expected, found.bias_rad)
+        a, result = adaptive.step(a, y, u[k - 1])
+        b, expected = homogeneous.step(b, y, u[k - 1], result.bias_rad)
+        assert tuple(estimate) == (*expected, result.bias_rad)
     assert estimate.bias_rad != 0.0
 
 
@@ -36,11 +36,11 @@ def test_the_bias_leaves_no_rate_error() -> None:
     y = Measurement(-e, 0.0)
     rates = {}
     for kind in ("homogeneous", "homogeneous_adaptive"):
-        of = observer(kind)
-        state: Any = of.init(y)
+        estimator = observer(kind)
+        state: Any = estimator.init(y)
         estimate: Any = None
         for _ in range(round(30.0 / DT)):
-            state, estimate = of.step(state, y, 0.0)
+            state, estimate = estimator.step(state, y, 0.0)
         rates[kind] = estimate[1]
         if kind == "homogeneous_adaptive":
             assert estimate[3] == pytest.approx(math.tan(e), rel=1e-6)  # it is linear in e: sin y1 + e cos y1
@@ -50,7 +50,7 @@ def test_the_bias_leaves_no_rate_error() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("arguments", "message"),
     [
         ({"alpha": 0.5}, r"observer\.alpha"),
         ({"L": (1.0, -2.0)}, "Hurwitz"),
@@ -58,6 +58,6 @@ def test_the_bias_leaves_no_rate_error() -> None:
         ({"Sigma": np.nan}, r"observer\.Sigma"),
     ],
 )
-def test_what_either_part_refuses_is_refused(given: dict[str, Any], message: str) -> None:
+def test_what_either_part_refuses_is_refused(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        observer("homogeneous_adaptive", **given)
+        observer("homogeneous_adaptive", **arguments)

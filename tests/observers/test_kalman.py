@@ -31,44 +31,44 @@ DEFAULTS: Any = {
 
 
 def kalman(model: ReducedModel = PAIR, **parameters: float) -> Kalman:
-    of = observer("kalman", model=model, **parameters)
-    assert isinstance(of, Kalman)
-    return of
+    estimator = observer("kalman", model=model, **parameters)
+    assert isinstance(estimator, Kalman)
+    return estimator
 
 
-def slope(of: Kalman, x: np.ndarray, u: float) -> np.ndarray:
+def slope(estimator: Kalman, x: np.ndarray, u: float) -> np.ndarray:
     """x' of the state (x1, x2, x3, torque) without noise: (4), the torque shared by the gimbals."""
-    m, (x1, x2, x3, torque) = of.model, x
+    m, (x1, x2, x3, torque) = estimator.model, x
     D = m.J1 + m.J2 * math.sin(x3) ** 2
     gyroscopic = u * (m.J_d * m.omega_d * math.cos(x3) - m.J2 * x2 * math.sin(2.0 * x3))
     f2 = (gyroscopic + m.gravity_torque * math.sin(x1) + torque / m.gimbals) / D
     return np.array([x2, f2, u, 0.0])
 
 
-def jacobian(of: Kalman, x: np.ndarray, u: float) -> np.ndarray:
+def jacobian(estimator: Kalman, x: np.ndarray, u: float) -> np.ndarray:
     """By central differences, (4, 4)."""
     steps = 1e-5 * np.eye(4)
-    return np.array([(slope(of, x + d, u) - slope(of, x - d, u)) / 2e-5 for d in steps]).T
+    return np.array([(slope(estimator, x + d, u) - slope(estimator, x - d, u)) / 2e-5 for d in steps]).T
 
 
-def added_noise(of: Kalman, A: np.ndarray) -> np.ndarray:
+def added_noise(estimator: Kalman, A: np.ndarray) -> np.ndarray:
     """The covariance that a sample period adds, by quadrature, (4, 4)."""
-    m = of.model
+    m = estimator.model
     per_torque, gyroscopic = 1.0 / (m.gimbals * m.J1), m.J_d * m.omega_d / m.J1
     into = np.zeros((4, 3))
-    into[3, 0], into[1, 1] = of.torque_walk, per_torque * of.torque_white
-    into[1:3, 2] = gyroscopic * of.gimbal_white, of.gimbal_white
+    into[3, 0], into[1, 1] = estimator.torque_walk, per_torque * estimator.torque_white
+    into[1:3, 2] = gyroscopic * estimator.gimbal_white, estimator.gimbal_white
 
     def at(s: float) -> np.ndarray:
         grown = expm(A * s) @ into
         return grown @ grown.T
 
-    return quad_vec(at, 0.0, of.dt, epsabs=1e-16)[0]
+    return quad_vec(at, 0.0, estimator.dt, epsabs=1e-16)[0]
 
 
-def measured_noise(of: Kalman) -> np.ndarray:
+def measured_noise(estimator: Kalman) -> np.ndarray:
     """Covariance of (y1, y2), (2, 2)."""
-    return np.diag([of.noise.tilt**2, of.noise.gimbal**2])
+    return np.diag([estimator.noise.tilt**2, estimator.noise.gimbal**2])
 
 
 def matrix(P: Covariance) -> np.ndarray:
@@ -79,16 +79,21 @@ def matrix(P: Covariance) -> np.ndarray:
     return whole
 
 
-def reference(of: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def reference(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The textbook's extended Kalman filter: estimates (n - 1, 4), and the last covariance (4, 4)."""
-    R = measured_noise(of)
-    Q = added_noise(of, jacobian(of, np.zeros(4), 0.0))
-    x, P = np.array([y1[0], 0.0, y2[0], 0.0]), np.diag([R[0, 0], of.rate_start**2, R[1, 1], of.torque_start**2])
+    R = measured_noise(estimator)
+    Q = added_noise(estimator, jacobian(estimator, np.zeros(4), 0.0))
+    x, P = (
+        np.array([y1[0], 0.0, y2[0], 0.0]),
+        np.diag([R[0, 0], estimator.rate_start**2, R[1, 1], estimator.torque_start**2]),
+    )
     estimates = []
     for k in range(1, len(y1)):
         held = float(u[k - 1])
-        F = expm(jacobian(of, x, held) * of.dt)
-        x = solve_ivp(lambda t, x, held=held: slope(of, x, held), (0.0, of.dt), x, rtol=1e-11, atol=1e-12).y[:, -1]
+        F = expm(jacobian(estimator, x, held) * estimator.dt)
+        x = solve_ivp(
+            lambda t, x, held=held: slope(estimator, x, held), (0.0, estimator.dt), x, rtol=1e-11, atol=1e-12
+        ).y[:, -1]
         P = F @ P @ F.T + Q
         K = P @ C.T @ np.linalg.inv(C @ P @ C.T + R)
         x = x + K @ (np.array([y1[k], y2[k]]) - C @ x)
@@ -97,11 +102,11 @@ def reference(of: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tupl
     return np.array(estimates), P
 
 
-def walked(of: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, State]:
+def walked(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, State]:
     """Estimates (n - 1, 4), and the last state."""
-    state, estimates = of.init(Measurement(float(y1[0]), float(y2[0]))), []
+    state, estimates = estimator.init(Measurement(float(y1[0]), float(y2[0]))), []
     for k in range(1, len(y1)):
-        state, estimate = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        state, estimate = estimator.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
         estimates.append(estimate)
     return np.array(estimates), state
 
@@ -109,10 +114,10 @@ def walked(of: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[n
 @pytest.mark.parametrize("model", [PAIR, HEAVY], ids=["pair", "heavy"])
 def test_equals_the_textbooks_filter(model: ReducedModel) -> None:
     """But for the third order of a step with the command at its limit: 2 % of the estimate's own noise."""
-    of = kalman(model)
+    estimator = kalman(model)
     signals = rough_signals(200, seed=1)
-    expected, P = reference(of, *signals)
-    estimates, state = walked(of, *signals)
+    expected, P = reference(estimator, *signals)
+    estimates, state = walked(estimator, *signals)
     off = np.abs(estimates - expected).max(axis=0)
     assert (off < [2e-6, 2e-4, 1e-9, 1e-4]).all(), off
     np.testing.assert_allclose(matrix(state.P), P, rtol=2e-3, atol=1e-10)
@@ -133,35 +138,40 @@ def test_the_series_ends_where_it_says(pole_dt: float, most: float) -> None:
 
 def test_settles_at_the_linear_filter() -> None:
     """About the upright the gains become those of the algebraic Riccati equation."""
-    of = kalman()
-    F, Q = expm(jacobian(of, np.zeros(4), 0.0) * DT), added_noise(of, jacobian(of, np.zeros(4), 0.0))
-    R = measured_noise(of)
+    estimator = kalman()
+    F, Q = (
+        expm(jacobian(estimator, np.zeros(4), 0.0) * DT),
+        added_noise(estimator, jacobian(estimator, np.zeros(4), 0.0)),
+    )
+    R = measured_noise(estimator)
     before = solve_discrete_are(F.T, C.T, Q, R)
     after = before - before @ C.T @ np.linalg.solve(C @ before @ C.T + R, C @ before)
     still = np.zeros(8000)
-    _, state = walked(of, still, still, still)
+    _, state = walked(estimator, still, still, still)
     np.testing.assert_allclose(matrix(state.P), after, rtol=1e-6, atol=1e-14)
     gain = after @ C.T @ np.linalg.inv(R)
     for column, y in ((0, Measurement(1e-9, 0.0)), (1, Measurement(0.0, 1e-9))):
-        moved = np.array(of.step(state, y, 0.0)[1])
+        moved = np.array(estimator.step(state, y, 0.0)[1])
         np.testing.assert_allclose(moved, gain[:, column] * 1e-9, rtol=1e-5, atol=1e-16)
 
 
 @pytest.mark.parametrize("dt", [0.001, 0.005, 0.02])
 def test_covariance_stays_a_covariance(dt: float) -> None:
     """Over 20,000 samples of signals that no rig makes, from a start that knows next to nothing."""
-    of = kalman(dt=dt, rate_start=100.0, torque_start=100.0)
+    estimator = kalman(dt=dt, rate_start=100.0, torque_start=100.0)
     y1, y2, u = rough_signals(20_000, seed=2)
-    state = of.init(Measurement(float(y1[0]), float(y2[0])))
+    state = estimator.init(Measurement(float(y1[0]), float(y2[0])))
     for k in range(1, len(y1)):
-        state, _ = of.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        state, _ = estimator.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
         if k % 100 == 0 or k < 100:
             P = matrix(state.P)
             scale = np.sqrt(np.diag(P))
             assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > 1e-6, k
 
 
-def simulated(rig: Kalman, of: Kalman, runs: int, ticks: int, seed: int) -> tuple[np.ndarray, np.ndarray, list[State]]:
+def simulated(
+    rig: Kalman, estimator: Kalman, runs: int, ticks: int, seed: int
+) -> tuple[np.ndarray, np.ndarray, list[State]]:
     """The reduced model with just the noise that one filter expects, and another filter on it; many runs side by side.
 
     Returns:
@@ -170,11 +180,11 @@ def simulated(rig: Kalman, of: Kalman, runs: int, ticks: int, seed: int) -> tupl
     rng = np.random.default_rng(seed)
     m, parts = rig.model, 10
     h = rig.dt / parts
-    v1, v2 = rig.noise.tilt, math.sqrt(measured_noise(of)[1, 1])
+    v1, v2 = rig.noise.tilt, math.sqrt(measured_noise(estimator)[1, 1])
     x1, x3 = np.full(runs, 0.01), np.full(runs, 0.05)
     x2, torque = rig.rate_start * rng.standard_normal(runs), rig.torque_start * rng.standard_normal(runs)
     u = np.zeros(runs)
-    state = of.init(Measurement(x1 + v1 * rng.standard_normal(runs), x3 + v2 * rng.standard_normal(runs)))
+    state = estimator.init(Measurement(x1 + v1 * rng.standard_normal(runs), x3 + v2 * rng.standard_normal(runs)))
     errors, squares, states = [], [], []
     for _ in range(ticks):
         for _ in range(parts):
@@ -187,31 +197,31 @@ def simulated(rig: Kalman, of: Kalman, runs: int, ticks: int, seed: int) -> tupl
             x2 = x2 + (gyroscopic + h * m.gravity_torque * np.sin(x1) + pushed) / D
             x3, torque = x3 + rate, torque + rig.torque_walk * walk
         y = Measurement(x1 + v1 * rng.standard_normal(runs), x3 + v2 * rng.standard_normal(runs))
-        x, P = of._predicted(state, u)
-        (r1, _), (_, r2) = measured_noise(of)
+        x, P = estimator._predicted(state, u)
+        (r1, _), (_, r2) = measured_noise(estimator)
         S = np.array([[P.p11 + r1, P.p13], [P.p13, P.p33 + r2]])
         off = np.array([y.y1 - x[0], y.y2 - x[2]])
         squares.append(np.einsum("ir,rij,jr->r", off, np.linalg.inv(np.moveaxis(S, -1, 0)), off))
-        state, estimate = of.step(state, y, u)
+        state, estimate = estimator.step(state, y, u)
         errors.append(np.array([x1, x2, x3, torque]) - np.array(estimate))
         states.append(state)
         u = np.clip(-35.0 * x1 - 4.0 * x2 + x3, -4.7, 4.7)  # a law that holds it; it sees the truth
     return np.array(errors), np.array(squares), states
 
 
-def normalised(of: Kalman) -> list[tuple[str, float, float, float]]:
+def normalised(estimator: Kalman) -> list[tuple[str, float, float, float]]:
     """On a rig with the default's noise: mean of the squares, and between what they should be, 1 time in 10,000 not."""
     runs, ticks, ends = 300, 300, [5e-5, 1.0 - 5e-5]
-    errors, squares, states = simulated(kalman(), of, runs, ticks, seed=3)
+    errors, squares, states = simulated(kalman(), estimator, runs, ticks, seed=3)
     low, high = chi2.ppf(ends, 4 * runs) / runs
-    found = []
+    result = []
     for k in (0, 1, 5, 20, 100, ticks - 1):
         P = np.moveaxis(np.array([[states[k].P[place] for place in row] for row in COLUMNS]), -1, 0)
         e = errors[k]
-        found.append((f"errors at {k}", low, np.einsum("ir,rij,jr->r", e, np.linalg.inv(P), e).mean(), high))
+        result.append((f"errors at {k}", low, np.einsum("ir,rij,jr->r", e, np.linalg.inv(P), e).mean(), high))
     # Innovations of a filter that is right are independent from sample to sample.
     low, high = chi2.ppf(ends, 2 * runs * ticks) / (runs * ticks)
-    return [*found, ("innovations", low, squares.mean(), high)]
+    return [*result, ("innovations", low, squares.mean(), high)]
 
 
 def test_errors_are_as_large_as_the_covariance_says() -> None:
@@ -229,18 +239,18 @@ def test_a_filter_that_expects_another_noise_is_found_out(name: str, factor: flo
 
 def test_a_bias_is_found_as_a_torque() -> None:
     """At rest at y1 = -e gravity pulls as if upright: the torque that e makes is n M sin e."""
-    of = kalman()
+    estimator = kalman()
     e = math.radians(1.0)
     still = np.zeros(3000)
-    estimates, _ = walked(of, still - e, still, still)
+    estimates, _ = walked(estimator, still - e, still, still)
     expected = (0.0 - e, 0.0, 0.0, PAIR.gimbals * PAIR.gravity_torque * math.sin(e))
     np.testing.assert_allclose(estimates[-1], expected, atol=1e-4)
-    assert "bias_rad" not in of.extra_signals
+    assert "bias_rad" not in estimator.extra_signals
 
 
 @pytest.mark.parametrize("counts", [64, 4096])
 def test_is_told_the_scenarios_encoders(counts: int) -> None:
     """y2 is the mean of two, each rounded to whole counts."""
     changes = [f"sensors.encoder.counts_per_revolution={counts}"]
-    of: Any = prepare(load_scenario("push_recovery", changes, "kalman")).design.observer()
-    assert of.noise.gimbal**2 == pytest.approx((2.0 * math.pi / counts) ** 2 / 12.0 / 2.0)
+    setup: Any = prepare(load_scenario("push_recovery", changes, "kalman")).design.observer()
+    assert setup.noise.gimbal**2 == pytest.approx((2.0 * math.pi / counts) ** 2 / 12.0 / 2.0)

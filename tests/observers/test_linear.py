@@ -35,10 +35,10 @@ Denominator = tuple[float, float]
 cont2discrete: Any = signal.cont2discrete  # its annotations name every return at once
 
 
-def rates(of: Observer, y1: np.ndarray) -> np.ndarray:
+def rates(estimator: Observer, y1: np.ndarray) -> np.ndarray:
     """Estimates of x2 at every sample, the first one zero."""
     nothing = np.zeros(len(y1))
-    return np.concatenate([[0.0], run(of, y1, nothing, nothing)[0][:, 1]])
+    return np.concatenate([[0.0], run(estimator, y1, nothing, nothing)[0][:, 1]])
 
 
 @pytest.mark.parametrize(("kind", "parameters", "denominator"), FILTERS)

@@ -41,8 +41,8 @@ def riccati_matrix(state) -> np.ndarray:
 
 def relative_errors(ours: np.ndarray, reference: np.ndarray) -> float:
     """Largest relative error of the entries that are not zero by structure."""
-    kept = np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]], dtype=bool)
-    return float(np.abs(ours[..., kept] / reference[..., kept] - 1.0).max())
+    mask = np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]], dtype=bool)
+    return float(np.abs(ours[..., mask] / reference[..., mask] - 1.0).max())
 
 
 DURATIONS_S = slow_but([2.5, 4.0], 2.5)
@@ -301,10 +301,10 @@ def transient(method: Method, rate_hz: float, duration: float = 0.2) -> tuple[fl
 
 def ours(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
     """One sample of the package's observer at rest."""
-    of = observer("ltv", h)
+    estimator = observer("ltv", h)
     still = Measurement(0.0, 0.0)
-    state = of.init(still)._replace(h11=H[0, 0], h12=H[0, 1], h22=H[1, 1], h33=H[2, 2])
-    return riccati_matrix(of.step(state, still, 0.0)[0])
+    state = estimator.init(still)._replace(h11=H[0, 0], h12=H[0, 1], h22=H[1, 1], h33=H[2, 2])
+    return riccati_matrix(estimator.step(state, still, 0.0)[0])
 
 
 @pytest.mark.parametrize(

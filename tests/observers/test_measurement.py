@@ -26,20 +26,20 @@ def test_two_angles_unpack_and_the_acceleration_is_beside_them() -> None:
 def test_a_turning_body_shows_its_angular_acceleration() -> None:
     """Specific forces at radius r of a body that turns: r alpha - g sin(tilt), -r rate^2 + g cos(tilt)."""
     tilt, rate, alpha = 0.3, 1.7, -4.0
-    of = RadialTilt(0.07, 0.2)
-    inner, outer = (r * alpha - G * math.sin(tilt) for r in (of.r_inner, of.r_outer))
-    assert of.acceleration(inner, outer) == pytest.approx(alpha, rel=1e-12)
-    z = [-r * rate**2 + G * math.cos(tilt) for r in (of.r_inner, of.r_outer)]
-    assert of(inner, z[0], outer, z[1]) == pytest.approx(tilt, rel=1e-12)
+    tilt_estimate = RadialTilt(0.07, 0.2)
+    inner, outer = (r * alpha - G * math.sin(tilt) for r in (tilt_estimate.r_inner, tilt_estimate.r_outer))
+    assert tilt_estimate.acceleration(inner, outer) == pytest.approx(alpha, rel=1e-12)
+    z = [-r * rate**2 + G * math.cos(tilt) for r in (tilt_estimate.r_inner, tilt_estimate.r_outer)]
+    assert tilt_estimate(inner, z[0], outer, z[1]) == pytest.approx(tilt, rel=1e-12)
 
 
 def test_noise_and_correlation_are_those_of_random_readings() -> None:
-    of, sigma = RadialTilt(0.067, 0.201), 0.0392
+    tilt_estimate, sigma = RadialTilt(0.067, 0.201), 0.0392
     rng = np.random.default_rng(1)
     n = 200_000
     ix, iz, ox, oz = sigma * rng.standard_normal((4, n))
-    y1, alpha = of(ix, G + iz, ox, G + oz), of.acceleration(ix, ox)
-    noise = of.noise(sigma, G)
+    y1, alpha = tilt_estimate(ix, G + iz, ox, G + oz), tilt_estimate.acceleration(ix, ox)
+    noise = tilt_estimate.noise(sigma, G)
     assert y1.std() == pytest.approx(noise.tilt, rel=0.01)
     assert alpha.std() == pytest.approx(noise.acceleration, rel=0.01)
     assert np.corrcoef(y1, alpha)[0, 1] == pytest.approx(noise.correlation, abs=0.003)

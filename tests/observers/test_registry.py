@@ -49,15 +49,15 @@ MINE = f"{__name__}:Mine"
 
 @pytest.mark.parametrize("kind", sorted(OBSERVERS))
 def test_every_name_makes_its_observer(kind: str) -> None:
-    made = make_observer(kind, DT, PAPER, NOISE)
-    assert f"{type(made).__module__}:{type(made).__name__}" == OBSERVERS[kind]
-    assert observer_class(OBSERVERS[kind]) is type(made)
+    result = make_observer(kind, DT, PAPER, NOISE)
+    assert f"{type(result).__module__}:{type(result).__name__}" == OBSERVERS[kind]
+    assert observer_class(OBSERVERS[kind]) is type(result)
 
 
 def test_a_users_class_by_dotted_path() -> None:
-    made: Any = make_observer(MINE, DT, PAPER, gain=2.0)
-    assert isinstance(made, Mine)
-    assert (made.dt, made.model, made.gain) == (DT, PAPER, 2.0)
+    result: Any = make_observer(MINE, DT, PAPER, gain=2.0)
+    assert isinstance(result, Mine)
+    assert (result.dt, result.model, result.gain) == (DT, PAPER, 2.0)
     greedy: Any = make_observer(f"{__name__}:Greedy", DT, PAPER, anything=1)
     assert greedy.others == {"anything": 1}
 

@@ -29,12 +29,12 @@ def test_each_step_solves_its_inclusion(parameters: dict, values: tuple[float, f
     s + h l0 sqrt(L) |s|^(1/2) xi + h^2 l1 L xi = z0 + h z1 - y1 before it.
     """
     bound, l0, l1 = values
-    of, rng = observer("super_twisting", **parameters), np.random.default_rng(5)
+    estimator, rng = observer("super_twisting", **parameters), np.random.default_rng(5)
     reached = 0
     for _ in range(200):
         z0, z1, y1 = rng.normal(0.0, 10.0 ** rng.uniform(-6.0, -1.0)), rng.normal(), 0.0
         z1 = z1 * 10.0 ** rng.uniform(-6.0, 0.0)
-        state, estimate = of.step(State(z0, z1), Measurement(y1, 0.1), 0.0)
+        state, estimate = estimator.step(State(z0, z1), Measurement(y1, 0.1), 0.0)
         s = state.z0 - y1
         xi = (z1 - state.z1) / (DT * l1 * bound)
         if s == 0.0:
@@ -84,9 +84,9 @@ def test_explicit_steps_would_chatter() -> None:
         s = z0
         z0, z1 = z0 + DT * (z1 - L0 * math.sqrt(L * abs(s)) * np.sign(s)), z1 - DT * L1 * L * np.sign(s)
         swings.append(z1)
-    of, state = observer("super_twisting", L=L), State(0.001, 0.0)
+    estimator, state = observer("super_twisting", L=L), State(0.001, 0.0)
     for _ in range(2000):
-        state, _ = of.step(state, Measurement(0.0, 0.0), 0.0)
+        state, _ = estimator.step(state, Measurement(0.0, 0.0), 0.0)
     print(f"explicit: rate swings by {np.ptp(swings[-200:]):.3f} rad/s; implicit: {abs(state.z1):.1e}")
     assert np.ptp(swings[-200:]) == pytest.approx(2.0 * DT * L1 * L, rel=0.05)
     assert abs(state.z1) < 1e-12

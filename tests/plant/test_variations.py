@@ -70,12 +70,12 @@ def servo_torques(plant: Plant, error: float, rate: float) -> list[float]:
     return [float(data.qfrc_actuator[module.gimbal]) for module in plant.modules]
 
 
-@pytest.mark.parametrize("given", [{}, {"kp": KP}, {"kv": KV}, {"kp": KP, "kv": KV}])
-def test_a_servos_torque_is_stiffness_times_error_less_damping_times_rate(given: dict[str, Any]) -> None:
+@pytest.mark.parametrize("arguments", [{}, {"kp": KP}, {"kv": KV}, {"kp": KP, "kv": KV}])
+def test_a_servos_torque_is_stiffness_times_error_less_damping_times_rate(arguments: dict[str, Any]) -> None:
     names = {"kp": "servo_stiffness_n_m_rad", "kv": "servo_damping_n_m_s_rad"}
-    settings: dict[str, Any] = {names[name]: value for name, value in given.items()}
+    settings: dict[str, Any] = {names[name]: value for name, value in arguments.items()}
     plant = load_plant(PlantSettings(**settings))
-    kp, kv = given.get("kp", 85.6), given.get("kv", 0.731)
+    kp, kv = arguments.get("kp", 85.6), arguments.get("kv", 0.731)
     assert servo_torques(plant, 0.02, 0.3) == pytest.approx([kp * 0.02 - kv * 0.3] * 2, rel=1e-12)
 
 
@@ -226,7 +226,7 @@ def test_one_of_them_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "complaint"),
+    ("arguments", "complaint"),
     [
         ((0.2, 0.1), r"inner_m = 0\.2, plant\.accelerometer_outer_m = 0\.1: the inner .* 0\.2 and 0\.1 m away"),
         ((0.2, 0.2), "must lie nearer"),
@@ -234,9 +234,9 @@ def test_one_of_them_alone() -> None:
         ((None, 0.05), r"plant\.accelerometer_outer_m = 0\.05: .* 0\.0671751 and 0\.05 m away"),
     ],
 )
-def test_the_inner_one_is_the_inner_one(given: tuple, complaint: str) -> None:
+def test_the_inner_one_is_the_inner_one(arguments: tuple, complaint: str) -> None:
     with pytest.raises(InputError, match=complaint):
-        load_plant(accelerometer_inner_m=given[0], accelerometer_outer_m=given[1])
+        load_plant(accelerometer_inner_m=arguments[0], accelerometer_outer_m=arguments[1])
 
 
 # --- all of them ----------------------------------------------------------------------------------------------

@@ -49,9 +49,9 @@ def test_nothing_differs() -> None:
     ],
 )
 def test_one_field(setting: str, field: str, value: object, name: str) -> None:
-    found = differing(setting.replace("[ltv]", '["ltv"]'))
-    assert found == {field: value}
-    assert folder_suffix(found) == f"-{name}"
+    result = differing(setting.replace("[ltv]", '["ltv"]'))
+    assert result == {field: value}
+    assert folder_suffix(result) == f"-{name}"
 
 
 def test_names_that_need_their_section() -> None:
@@ -93,9 +93,9 @@ def test_a_users_version_of_a_bundled_one() -> None:
 @pytest.mark.parametrize("command", [["run"], ["compare", "--observers", "linear,homogeneous", "--worlds", 1]])
 def test_folder_title_and_summary_tell(command: list[Any]) -> None:
     settings = [*SHORT, "--set", "plant.equilibrium_bias_deg=1.0"]
-    said = cmg_mj(command[0], "push_recovery", *command[1:], *settings)
-    assert said.status == 0, said
-    assert said.out.splitlines()[0].endswith(", seed 0, duration_s=0.1, equilibrium_bias_deg=1, push=none")
+    outcome = cmg_mj(command[0], "push_recovery", *command[1:], *settings)
+    assert outcome.status == 0, outcome
+    assert outcome.out.splitlines()[0].endswith(", seed 0, duration_s=0.1, equilibrium_bias_deg=1, push=none")
     what = {"run": "homogeneous"}.get(command[0], command[0])
     (folder,) = os.listdir("runs")
     assert folder == f"push_recovery-{what}-0-duration_s=0.1-equilibrium_bias_deg=1-push=none"
@@ -108,8 +108,8 @@ def test_folder_title_and_summary_tell(command: list[Any]) -> None:
 
 def test_an_observer_that_the_bundled_scenario_does_not_suit() -> None:
     """No trimming without an estimate of the bias."""
-    found = prepare(load_scenario("bias_estimation", ["controller.bias_trim_s=0"], "linear")).differences
-    assert found == {"controller.bias_trim_s": 0.0}
+    result = prepare(load_scenario("bias_estimation", ["controller.bias_trim_s=0"], "linear")).differences
+    assert result == {"controller.bias_trim_s": 0.0}
 
 
 def test_a_long_name_of_a_users_file() -> None:

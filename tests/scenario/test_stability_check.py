@@ -55,7 +55,7 @@ def test_an_lqr_keeps_its_distance() -> None:
 @pytest.mark.parametrize("latency", [0.04, 0.06])
 def test_stable_is_what_the_loop_step_by_step_is(latency: float) -> None:
     """The linearisation stepped finely, with the command held and the signals late."""
-    said = loop(f"sensors.accelerometer.latency_s={latency}")
+    outcome = loop(f"sensors.accelerometer.latency_s={latency}")
     model, K, h = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3]), 1e-4
     steps, period, late = int(6.0 / h), round(0.005 / h), round(latency / h)
     x = np.zeros((steps + 1, 4))
@@ -65,7 +65,7 @@ def test_stable_is_what_the_loop_step_by_step_is(latency: float) -> None:
             u = -K @ x[max(k - late, 0)]
         x[k + 1] = x[k] + h * (model.A_e @ x[k] + model.B_e[:, 0] * u)
     fades = abs(x[-1, 0]) < 0.01
-    assert (said.words == "stable") == fades == (latency < 0.05)
+    assert (outcome.words == "stable") == fades == (latency < 0.05)
 
 
 @pytest.mark.parametrize(
@@ -93,12 +93,12 @@ def test_a_latency_of_a_sensor_that_is_not_used_does_not_count() -> None:
 
 def test_half_the_flywheel_is_hinted_at_and_solved_for(half: str) -> None:
     """With Table 2's gains it falls soon after the push; with gains made for it, it stands."""
-    said = cmg_mj("run", "push_recovery", "--set", half, "--set", "duration_s=4", "--out", "it", "--json")
-    assert "cmg-mj: hint: controller: the closed loop has little margin" in said.err
-    assert '"outcome": "fell"' in said.out
+    outcome = cmg_mj("run", "push_recovery", "--set", half, "--set", "duration_s=4", "--out", "it", "--json")
+    assert "cmg-mj: hint: controller: the closed loop has little margin" in outcome.err
+    assert '"outcome": "fell"' in outcome.out
     solved = ["--set", "controller.lqr.state_cost=[1, 1, 1, 1]", "--set", "duration_s=4"]
-    said = cmg_mj("run", "push_recovery", "--set", half, *solved, "--out", "it", "--json")
-    assert (said.err, '"outcome": "done"' in said.out) == ("", True)
+    outcome = cmg_mj("run", "push_recovery", "--set", half, *solved, "--out", "it", "--json")
+    assert (outcome.err, '"outcome": "done"' in outcome.out) == ("", True)
     assert "hint" in cmg_mj("check", "half.xml").out
 
 

@@ -52,12 +52,12 @@ def delivered(
 ) -> np.ndarray:
     """The first n samples that a pair delivers of forces over time, as the controller has it work, (n, 4, ...)."""
     pair = sampled_sensors(Sensors(accelerometer=sensor), timestep, 7, worlds)[0]
-    found = []
+    result = []
     for step in range(0, n * pair.period, pair.steps_per_sample):
         pair.sample(step, ideal(forces(step * timestep)))
         if step % pair.period == 0:
-            found.append(np.array(pair.read(step)))
-    return np.array(found)
+            result.append(np.array(pair.read(step)))
+    return np.array(result)
 
 
 # --- mounting and scale ------------------------------------------------------------------------------------
@@ -106,12 +106,12 @@ EVERYTHING: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("given", [{}, *({name: value} for name, value in EVERYTHING.items()), EVERYTHING], ids=str)
-def test_floats_and_arrays_show_the_same_bits(given: dict[str, Any]) -> None:
+@pytest.mark.parametrize("arguments", [{}, *({name: value} for name, value in EVERYTHING.items()), EVERYTHING], ids=str)
+def test_floats_and_arrays_show_the_same_bits(arguments: dict[str, Any]) -> None:
     """Worlds 4, 0, 7 together and each alone."""
     numbers = [4, 0, 7]
     motion = np.random.default_rng(0).normal(size=(500, 4, 3)) + np.array(STILL)[:, None]
-    sensor = Accelerometer(**given)
+    sensor = Accelerometer(**arguments)
     batch = delivered(sensor, 40, lambda t: motion[round(t / MS)], worlds=numbers)
     for i, number in enumerate(numbers):
         alone = delivered(sensor, 40, lambda t, i=i: tuple(motion[round(t / MS), :, i].tolist()), worlds=number)
@@ -131,10 +131,10 @@ def test_what_is_off_draws_nothing() -> None:
 def test_the_outers_sample_is_older_by_the_skew(skew_s: float) -> None:
     """Forces that grow with time; before the start they were what they are at the start."""
     times = np.arange(30) * 0.005
-    found = delivered(Accelerometer(skew_s=skew_s, **QUIET), 30, lambda t: (t, 2.0 * t, 3.0 * t, 4.0 * t), 0.0005)
-    np.testing.assert_allclose(found[:, :2], np.outer(times, (1.0, 2.0)), atol=1e-14)
+    result = delivered(Accelerometer(skew_s=skew_s, **QUIET), 30, lambda t: (t, 2.0 * t, 3.0 * t, 4.0 * t), 0.0005)
+    np.testing.assert_allclose(result[:, :2], np.outer(times, (1.0, 2.0)), atol=1e-14)
     older = np.maximum(times - skew_s, 0.0)
-    np.testing.assert_allclose(found[:, 2:], np.outer(older, (3.0, 4.0)), atol=1e-14)
+    np.testing.assert_allclose(result[:, 2:], np.outer(older, (3.0, 4.0)), atol=1e-14)
 
 
 @pytest.mark.parametrize("driver", ["native", "callback"])
@@ -206,10 +206,10 @@ def test_a_vibration_is_filtered_before_it_aliases(frequency_hz: float, alias_hz
     """At 200 Hz, 180 Hz look like 20 Hz turned round; with a low-pass, by |H(180 Hz)| less."""
     w = 2.0 * math.pi * frequency_hz
     sensor = Accelerometer(bandwidth_hz=bandwidth_hz, **QUIET)
-    found = delivered(sensor, 500, lambda t: (math.sin(w * t),) * 4)[100:, 0]
+    result = delivered(sensor, 500, lambda t: (math.sin(w * t),) * 4)[100:, 0]
     times = np.arange(100, 500) * 0.005
     waves = np.column_stack([f(2.0 * math.pi * alias_hz * times) for f in (np.sin, np.cos)])
-    parts, residual, *_ = np.linalg.lstsq(waves, found)
+    parts, residual, *_ = np.linalg.lstsq(waves, result)
     ratio = math.tan(math.pi * frequency_hz / 1e3) / math.tan(math.pi * bandwidth_hz / 1e3) if bandwidth_hz else 0.0
     assert np.hypot(*parts) == pytest.approx(1.0 / math.sqrt(1.0 + ratio**4), rel=1e-6)
     assert residual.sum() < 1e-12
@@ -238,8 +238,8 @@ def test_a_reading_out_of_range_is_cut_before_the_low_pass() -> None:
 
 
 def test_the_low_pass_starts_settled() -> None:
-    found = delivered(Accelerometer(bandwidth_hz=5.0, **QUIET), 20, lambda _: (1.0, 2.0, 3.0, 4.0))
-    np.testing.assert_allclose(found, np.tile((1.0, 2.0, 3.0, 4.0), (20, 1)), rtol=1e-12)
+    result = delivered(Accelerometer(bandwidth_hz=5.0, **QUIET), 20, lambda _: (1.0, 2.0, 3.0, 4.0))
+    np.testing.assert_allclose(result, np.tile((1.0, 2.0, 3.0, 4.0), (20, 1)), rtol=1e-12)
 
 
 # --- 1/f noise ---------------------------------------------------------------------------------------------
@@ -263,8 +263,8 @@ def test_the_drift_is_the_same_for_a_part_that_filters() -> None:
     def density(bandwidth_hz: float) -> float:
         sensor = Accelerometer(bias_instability_ug=36.0, bandwidth_hz=bandwidth_hz, **QUIET)
         noise = delivered(sensor, 4000, lambda _: np.zeros((4, 4)), worlds=list(range(4)))
-        frequency, found = welch(noise, 200.0, nperseg=400, axis=0)
-        return float(found[(frequency > 20.0) & (frequency < 40.0)].mean())
+        frequency, result = welch(noise, 200.0, nperseg=400, axis=0)
+        return float(result[(frequency > 20.0) & (frequency < 40.0)].mean())
 
     assert density(184.0) == pytest.approx(density(0.0), rel=0.2)  # the slower rate folds a little more into the band
 

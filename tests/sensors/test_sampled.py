@@ -89,11 +89,11 @@ def test_accelerometer_counts() -> None:
     assert_sigma(coarse, math.sqrt(sigma**2 + step**2 / 12.0))
 
 
-@pytest.mark.parametrize(("force", "shown"), [(5.0, 2.0), (-5.0, -2.0), (1.5, 1.5)])
-def test_accelerometer_saturates_at_its_range(force: float, shown: float) -> None:
+@pytest.mark.parametrize(("force", "reading"), [(5.0, 2.0), (-5.0, -2.0), (1.5, 1.5)])
+def test_accelerometer_saturates_at_its_range(force: float, reading: float) -> None:
     ideal = IdealReading([force * G] * 4, [0.0, 0.0], 0.0, 0.0)
     for sensor in (Accelerometer(noise_density_ug_rthz=0.0), Accelerometer(range_g=2.0, **QUIET)):
-        np.testing.assert_allclose(readings(sensor, 1, ideal=ideal)[0], shown * G, rtol=1e-12)
+        np.testing.assert_allclose(readings(sensor, 1, ideal=ideal)[0], reading * G, rtol=1e-12)
     noisy = readings(Accelerometer(), 500, ideal=ideal)
     assert np.abs(noisy).max() <= 2.0 * G * (1.0 + 1e-12)
 
@@ -101,8 +101,8 @@ def test_accelerometer_saturates_at_its_range(force: float, shown: float) -> Non
 @pytest.mark.parametrize("bias_mg", [(8.0, 0.0), (0.0, 8.0), (-15.0, 20.0)])
 def test_accelerometer_bias_shifts_the_tilt_as_e_does(bias_mg: tuple[float, float]) -> None:
     """Weights of sites at 1/4 and 3/4: y1 = -atan((1.5 b_inner - 0.5 b_outer)/g) where the tilt is 0."""
-    shown = readings(Accelerometer(bias_mg=bias_mg, **QUIET), 1)[0]
-    tilt = RadialTilt(0.06717514421272202, 0.20152543263816603)(*shown.tolist())
+    reading = readings(Accelerometer(bias_mg=bias_mg, **QUIET), 1)[0]
+    tilt = RadialTilt(0.06717514421272202, 0.20152543263816603)(*reading.tolist())
     assert tilt == pytest.approx(-math.atan(1.5e-3 * bias_mg[0] - 0.5e-3 * bias_mg[1]), rel=1e-12)
 
 
@@ -133,8 +133,8 @@ def test_encoder_shows_the_nearest_count(encoder: Encoder, counts: int) -> None:
     step = 2.0 * math.pi / counts
     measure = encoder.make_reading_function()
     for angle in np.linspace(-2.0, 2.0, 1001).tolist():
-        shown = measure(IdealReading((), [angle, 0.5 * angle], 0.0, 0.0), ())
-        for ideal, reading in zip((angle, 0.5 * angle), shown, strict=True):
+        readings = measure(IdealReading((), [angle, 0.5 * angle], 0.0, 0.0), ())
+        for ideal, reading in zip((angle, 0.5 * angle), readings, strict=True):
             assert abs(reading - ideal) <= step / 2.0 * (1.0 + 1e-9)
             assert reading / step == pytest.approx(round(reading / step), abs=1e-9)
 
@@ -171,25 +171,25 @@ def test_fog_bias_and_range() -> None:
     assert readings(Fog(bias_deg_h=30.0, **quiet), 1)[0, 0] == pytest.approx(math.radians(30.0 / 3600.0), rel=1e-12)
     for rate in (20.0, -20.0):
         fast = IdealReading((), [], rate, rate)
-        shown = readings(Fog(**quiet), 1, ideal=fast)[0, 0]
-        assert shown == pytest.approx(math.copysign(math.radians(490.0), rate), rel=1e-12)
+        reading = readings(Fog(**quiet), 1, ideal=fast)[0, 0]
+        assert reading == pytest.approx(math.copysign(math.radians(490.0), rate), rel=1e-12)
         assert readings(Fog(range_deg_s=2000.0, **quiet), 1, ideal=fast)[0, 0] == pytest.approx(rate)
 
 
 @pytest.mark.parametrize(
-    ("given", "bandwidth_hz", "rate_hz"),
+    ("arguments", "bandwidth_hz", "rate_hz"),
     [
         ({"rate_hz": 1000.0}, 440.0, 1000.0),  # DSP-1750
         ({"bandwidth_hz": 10.0}, 10.0, 200.0),
         ({"bandwidth_hz": 10.0, "rate_hz": 1000.0}, 10.0, 1000.0),
     ],
 )
-def test_fog_step_response(given: dict[str, Any], bandwidth_hz: float, rate_hz: float) -> None:
+def test_fog_step_response(arguments: dict[str, Any], bandwidth_hz: float, rate_hz: float) -> None:
     """A first-order low-pass: 1 - exp(-2 pi f t), the step coming right after the sample at t = 0."""
-    measure = Fog(angle_random_walk_deg_rth=0.0, **given).make_reading_function()
-    shown = [measure(IdealReading((), [], 0.0 if k == 0 else 1.0, 0.0), (0.0,)) for k in range(30)]
+    measure = Fog(angle_random_walk_deg_rth=0.0, **arguments).make_reading_function()
+    reading = [measure(IdealReading((), [], 0.0 if k == 0 else 1.0, 0.0), (0.0,)) for k in range(30)]
     t = np.arange(30) / rate_hz
-    np.testing.assert_allclose(shown, 1.0 - np.exp(-2.0 * math.pi * bandwidth_hz * t), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(reading, 1.0 - np.exp(-2.0 * math.pi * bandwidth_hz * t), rtol=1e-12, atol=1e-14)
 
 
 def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> None:
@@ -204,13 +204,13 @@ def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> No
 def shown_by(sensor: Fog, timestep: float, steps: int, read_every: int) -> list[float]:
     """Readings of a gyro, at control ticks, of a rate that is the number of the physics step."""
     sampled = SampledSensor(sensor, timestep, normals(0, 0, 2, 1), "sensors.fog", sensor.make_reading_function())
-    shown = []
+    reading = []
     for step in range(steps):
         if step % sampled.period == 0:
             sampled.sample(step, IdealReading((), [], float(step), 0.0))
         if step % read_every == 0:
-            shown.append(sampled.read(step))
-    return shown
+            reading.append(sampled.read(step))
+    return reading
 
 
 COUNTING = {"angle_random_walk_deg_rth": 0.0, "bandwidth_hz": 0.0, "range_deg_s": 1e6}

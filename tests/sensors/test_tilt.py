@@ -101,6 +101,6 @@ def test_apparent_bias_is_what_the_tilt_at_rest_lacks(errors: dict[str, Any]) ->
     accelerometer = Accelerometer(noise_density_ug_rthz=0.0, counts_per_g=0.0, **errors)
     data = plant.new_data()
     ideal = plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist())
-    shown = plant.radial_tilt(*accelerometer.make_reading_function()(ideal, (0.0, 0.0, 0.0, 0.0)))
+    reading = plant.radial_tilt(*accelerometer.make_reading_function()(ideal, (0.0, 0.0, 0.0, 0.0)))
 
-    assert plant.apparent_bias(accelerometer) == pytest.approx(-shown, abs=1e-9)
+    assert plant.apparent_bias(accelerometer) == pytest.approx(-reading, abs=1e-9)

@@ -63,8 +63,8 @@ def assert_same_numbers(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("kind", sorted(OBSERVERS))
 def test_batch_equals_single_runs(kind: str) -> None:
-    of = experiment(f"observer.kind={kind}")
-    assert_same(of.run_many(3), [of.run(world=i) for i in range(3)])
+    setup = experiment(f"observer.kind={kind}")
+    assert_same(setup.run_many(3), [setup.run(world=i) for i in range(3)])
 
 
 @pytest.mark.parametrize(
@@ -81,20 +81,20 @@ def test_batch_equals_single_runs(kind: str) -> None:
     ],
 )
 def test_batch_equals_single_runs_in_every_setting(settings: tuple[str, ...]) -> None:
-    of = experiment(*settings)
-    assert_same(of.run_many(3), [of.run(world=i) for i in range(3)])
+    setup = experiment(*settings)
+    assert_same(setup.run_many(3), [setup.run(world=i) for i in range(3)])
 
 
 @pytest.mark.parametrize(("kind", "fall_angle_deg"), [("homogeneous", 21.2), ("ltv", 7.85), ("linear", 7.2)])
 def test_worlds_that_fall_midway_leave_the_others_alone(kind: str, fall_angle_deg: float) -> None:
     """A push that ends near the angle that counts as a fall: the noise decides which worlds fall, and when."""
     settings = ("push.0.torque_n_m=2.5", f"metrics.fall_angle_deg={fall_angle_deg}")
-    of = experiment(f"observer.kind={kind}", *settings)
-    batch = of.run_many(12)
+    setup = experiment(f"observer.kind={kind}", *settings)
+    batch = setup.run_many(12)
     fallen = [outcome.fell for outcome in batch.outcomes]
     print(f"{kind}: {sum(fallen)} of 12 fell, at {sorted({o.time_s for o in batch.outcomes if o.fell})}")
     assert 0 < sum(fallen) < 12
-    assert_same(batch, [of.run(world=i) for i in range(12)])
+    assert_same(batch, [setup.run(world=i) for i in range(12)])
     for outcome, summary in zip(batch.outcomes, batch.summaries, strict=True):
         assert outcome.kind == ("fell" if outcome.fell else "done")
         assert (outcome.time_s < 0.8) == outcome.fell
@@ -104,19 +104,19 @@ def test_worlds_that_fall_midway_leave_the_others_alone(kind: str, fall_angle_de
 BIASES = (-10.0, -1.0, 0.0, 0.5, 1.5, 8.0)
 
 
-def with_bias(of: Experiment, bias_deg: float) -> Experiment:
-    plant = of.scenario.plant
+def with_bias(setup: Experiment, bias_deg: float) -> Experiment:
+    plant = setup.scenario.plant
     fields = {name: getattr(plant, name) for name in plant.__dataclass_fields__}  # type: ignore[attr-defined]
-    return replace(of, plant=load_plant(**{**fields, "equilibrium_bias_deg": bias_deg}))
+    return replace(setup, plant=load_plant(**{**fields, "equilibrium_bias_deg": bias_deg}))
 
 
 @pytest.mark.parametrize("kind", ["homogeneous", "ltv"])
 def test_each_world_may_have_its_own_rig(kind: str) -> None:
     """Large biases fall at once and at different times; in the batch each world keeps its own model."""
-    of = experiment(f"observer.kind={kind}", "metrics.fall_angle_deg=12")
-    each = [with_bias(of, bias) for bias in BIASES]
-    batch = of.run_many(len(BIASES), [one.plant for one in each])
-    singles = [one.run(world=i) for i, one in enumerate(each)]
+    setup = experiment(f"observer.kind={kind}", "metrics.fall_angle_deg=12")
+    world_experiments = [with_bias(setup, bias) for bias in BIASES]
+    batch = setup.run_many(len(BIASES), [one.plant for one in world_experiments])
+    singles = [one.run(world=i) for i, one in enumerate(world_experiments)]
     assert_same(batch, singles)
     ends = [outcome.time_s for outcome in batch.outcomes]
     assert [outcome.fell for outcome in batch.outcomes] == [True, False, False, False, False, True]
@@ -129,12 +129,12 @@ def test_each_world_may_have_its_own_rig(kind: str) -> None:
 
 
 def test_when_all_worlds_have_fallen_the_batch_ends() -> None:
-    of = experiment("metrics.fall_angle_deg=1.5", "push.0.torque_n_m=9.0")
-    batch = of.run_many(4)
+    setup = experiment("metrics.fall_angle_deg=1.5", "push.0.torque_n_m=9.0")
+    batch = setup.run_many(4)
     assert all(outcome.fell for outcome in batch.outcomes)
     assert batch.trajectory is not None
     assert len(batch.trajectory) < 100
-    assert_same(batch, [of.run(world=i) for i in range(4)])
+    assert_same(batch, [setup.run(world=i) for i in range(4)])
 
 
 # --- randomness ----------------------------------------------------------------------------------------
@@ -178,9 +178,9 @@ def test_seeds_and_worlds_differ() -> None:
 
 def peak_bytes(duration_s: float, n_worlds: int | None, keep: bool) -> int:
     settings = ["push=[]", "controller.feedback=truth", "observer.kind=finite_difference"]
-    of = prepare(load_scenario("push_recovery", [*settings, f"duration_s={duration_s}"]))
+    setup = prepare(load_scenario("push_recovery", [*settings, f"duration_s={duration_s}"]))
     tracemalloc.start()
-    result = of.run(keep_trajectory=keep) if n_worlds is None else of.run_many(n_worlds, keep_trajectory=keep)
+    result = setup.run(keep_trajectory=keep) if n_worlds is None else setup.run_many(n_worlds, keep_trajectory=keep)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert result.outcomes[0].kind == "done"
@@ -191,13 +191,13 @@ def peak_bytes(duration_s: float, n_worlds: int | None, keep: bool) -> int:
 @pytest.mark.parametrize("n_worlds", slow_but([None, 4], None))
 def test_memory_does_not_grow_with_the_duration_unless_the_trajectory_is_kept(n_worlds: int | None) -> None:
     """Once the first 256 ticks have become a piece. The first run fills caches."""
-    _, short, long, kept = (
+    _, short, long, full = (
         peak_bytes(duration, n_worlds, keep)
         for duration, keep in ((0.1, False), (1.4, False), (3.0, False), (3.0, True))
     )
-    print(f"{n_worlds} worlds: {short / 1e3:.0f} kB for 1.4 s, {long / 1e3:.0f} for 3 s, {kept / 1e3:.0f} if kept")
+    print(f"{n_worlds} worlds: {short / 1e3:.0f} kB for 1.4 s, {long / 1e3:.0f} for 3 s, {full / 1e3:.0f} if kept")
     assert long < 1.05 * short + 20_000
-    assert kept > long + 40_000  # 320 ticks more, of 26 columns
+    assert full > long + 40_000  # 320 ticks more, of 26 columns
 
 
 def test_without_trajectory_the_numbers_are_the_same() -> None:
@@ -228,16 +228,16 @@ class FailsInWorld:
 
 
 def test_a_world_whose_observer_returns_nan_ends_as_it_does_alone() -> None:
-    of = experiment(f"observer.kind={__name__}:FailsInWorld")
-    singles = [of.run(world=i) for i in range(6)]
+    setup = experiment(f"observer.kind={__name__}:FailsInWorld")
+    singles = [setup.run(world=i) for i in range(6)]
     assert len({single.outcomes[0].kind for single in singles}) == 2  # some stop, some do not
-    batch = of.run_many(6)
+    batch = setup.run_many(6)
     for outcome, single in zip(batch.outcomes, singles, strict=True):
         outcome.reason = single.outcomes[0].reason  # in other words
     assert_same(batch, singles)
 
 
 def test_plants_are_those_of_the_scenario_by_default() -> None:
-    of = experiment()
-    assert isinstance(of.plant, Plant)
-    assert_equal(columns(of.run_many(2)), columns(of.run_many(2, [of.plant, of.plant])))
+    setup = experiment()
+    assert isinstance(setup.plant, Plant)
+    assert_equal(columns(setup.run_many(2)), columns(setup.run_many(2, [setup.plant, setup.plant])))

@@ -66,12 +66,12 @@ def test_these_are_all_fields_that_may_differ() -> None:
     ],
 )
 def test_each_world_is_its_own_experiments(observer: str, more: tuple[str, ...]) -> None:
-    of = experiment(observer, *more)
+    setup = experiment(observer, *more)
     worlds = [5, 5, 0, 1, 2, 9]
-    pool = of.run_many(worlds, vary=values())
+    pool = setup.run_many(worlds, vary=values())
     assert pool.trajectory is not None
-    for i, (own, world) in enumerate(zip(of.with_varied(values()), worlds, strict=True)):
-        alone = own.run(world=world)
+    for i, (world_experiment, world) in enumerate(zip(setup.with_varied(values()), worlds, strict=True)):
+        alone = world_experiment.run(world=world)
         assert alone.trajectory is not None
         assert pool.summaries[i] == alone.summaries[0]
         for name in alone.trajectory.columns:
@@ -93,9 +93,9 @@ def test_an_observer_that_is_told_the_noise_keeps_worlds_of_other_places_apart()
 
 def test_gains_by_other_weights_run_together() -> None:
     weights = [[100.0, 1.0, 1.0, 0.1], [10.0, 1.0, 1.0, 0.1]]
-    of = experiment("homogeneous", "controller.lqr.state_cost=[100.0, 1.0, 1.0, 0.1]")
-    result = of.run_many([1, 1], vary={"controller.lqr.state_cost": weights}, keep_trajectory=False)
-    assert result.summaries[0] == of.run(world=1).summaries[0] != result.summaries[1]
+    setup = experiment("homogeneous", "controller.lqr.state_cost=[100.0, 1.0, 1.0, 0.1]")
+    result = setup.run_many([1, 1], vary={"controller.lqr.state_cost": weights}, keep_trajectory=False)
+    assert result.summaries[0] == setup.run(world=1).summaries[0] != result.summaries[1]
 
 
 def test_as_many_experiments_as_worlds() -> None:

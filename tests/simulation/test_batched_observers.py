@@ -107,10 +107,10 @@ class Raises:
 
 def test_an_observer_that_raises_stops_its_own_run_alone() -> None:
     runs = [run_of(experiment(name), 2) for name in ("linear", f"{__name__}:Raises", "ltv")]
-    found = run_side_by_side(runs)
-    assert [[outcome.kind for outcome in result.outcomes] for result in found] == [
+    actual = run_side_by_side(runs)
+    assert [[outcome.kind for outcome in result.outcomes] for result in actual] == [
         ["done"] * 2,
         ["stopped"] * 2,
         ["done"] * 2,
     ]
-    assert "raised ValueError: enough" in found[1].outcomes[0].reason
+    assert "raised ValueError: enough" in actual[1].outcomes[0].reason

@@ -61,9 +61,9 @@ def native(settings: tuple[str, ...] = ()) -> Trajectory:
 class Loop:
     """A user's own loop: physics steps, pushes by hand, and a record at the ticks."""
 
-    def __init__(self, of: Experiment, *, cold: bool = False) -> None:
-        self.of, self.plant = of, of.plant
-        self.controller = of.axis_controller()
+    def __init__(self, setup: Experiment, *, cold: bool = False) -> None:
+        self.of, self.plant = setup, setup.plant
+        self.controller = setup.axis_controller()
         self.data = mujoco.MjData(self.plant.model) if cold else self.plant.new_data()
         if cold:
             self.start()
@@ -152,9 +152,9 @@ def test_a_users_loop_starts_cold_as_well() -> None:
 
 
 def test_the_callback_drives_one_world_only() -> None:
-    of = experiment()
+    setup = experiment()
     with pytest.raises(InputError, match="drives one world, not a batch"):
-        of.simulate([of.plant] * 2, of.controller([0, 1]), driver="callback")
+        setup.simulate([setup.plant] * 2, setup.controller([0, 1]), driver="callback")
 
 
 # --- what a user may do in between ---------------------------------------------------------------------
@@ -208,10 +208,10 @@ def assert_restarts(integrator: str, steps: int) -> None:
             loop.step()
     # After a single call, the tick at t = 0 still stands: it is the one a restarted controller would take again.
     whole = native(settings)
-    taken = len(loop.rows)
-    assert taken >= len(whole) - 1
+    n_rows = len(loop.rows)
+    assert n_rows >= len(whole) - 1
     assert_same_run(
-        loop.rows, replace(whole, columns={name: values[-taken:] for name, values in whole.columns.items()})
+        loop.rows, replace(whole, columns={name: values[-n_rows:] for name, values in whole.columns.items()})
     )
 
 
@@ -237,10 +237,10 @@ class Counted:
 
 
 def counting(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
-    of = experiment((f"observer.kind={__name__}:Counted", *settings))
-    controller = of.axis_controller()
+    setup = experiment((f"observer.kind={__name__}:Counted", *settings))
+    controller = setup.axis_controller()
     observer: Any = controller.observer
-    return of, controller, observer.calls
+    return setup, controller, observer.calls
 
 
 @pytest.mark.parametrize("rate_hz", [1000, 200, 40])
@@ -248,8 +248,8 @@ def counting(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
 def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) -> None:
     """RK4 calls back four times a step, the others once."""
     settings = (f"plant.integrator={integrator}", f"controller.rate_hz={rate_hz}", "plant.timestep_s=0.001")
-    of, controller, calls = counting(*settings)
-    plant, data = of.plant, of.plant.new_data()
+    setup, controller, calls = counting(*settings)
+    plant, data = setup.plant, setup.plant.new_data()
     seen: Counter[str] = Counter()
     with control_callback(plant, controller) as callback:
 
@@ -265,8 +265,8 @@ def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) 
 
 def test_half_steps_of_the_user_advance_it_once_too() -> None:
     """mj_step1 and mj_step2, which step RK4 models by Euler's method."""
-    of, controller, calls = counting("plant.timestep_s=0.001")
-    plant, data = of.plant, of.plant.new_data()
+    setup, controller, calls = counting("plant.timestep_s=0.001")
+    plant, data = setup.plant, setup.plant.new_data()
     with control_callback(plant, controller):
         for _ in range(200):
             mujoco.mj_step1(plant.model, data)
@@ -291,22 +291,22 @@ def somebody_elses() -> Iterator[None]:
 
 
 def test_it_takes_itself_out() -> None:
-    of = experiment()
+    setup = experiment()
     assert mujoco.get_mjcb_control() is None
-    with control_callback(of.plant, of.axis_controller()) as callback:
+    with control_callback(setup.plant, setup.axis_controller()) as callback:
         assert mujoco.get_mjcb_control() is callback
     assert mujoco.get_mjcb_control() is None
 
 
 def test_it_restores_what_was_there() -> None:
-    of = experiment()
+    setup = experiment()
     with somebody_elses():
-        with control_callback(of.plant, of.axis_controller()) as outer:
-            with control_callback(of.plant, of.axis_controller()) as inner:
+        with control_callback(setup.plant, setup.axis_controller()) as outer:
+            with control_callback(setup.plant, setup.axis_controller()) as inner:
                 assert mujoco.get_mjcb_control() is inner
             assert mujoco.get_mjcb_control() is outer
         assert mujoco.get_mjcb_control() is other_callback
-        of.run(driver="callback")
+        setup.run(driver="callback")
         assert mujoco.get_mjcb_control() is other_callback
 
 
@@ -316,8 +316,8 @@ def test_a_rig_loads_while_a_callback_is_installed() -> None:
 
 
 def test_an_exception_comes_out_of_mj_step_and_takes_the_callback_out() -> None:
-    of, controller, calls = counting("observer.fail_at=7")
-    plant, data = of.plant, of.plant.new_data()
+    setup, controller, calls = counting("observer.fail_at=7")
+    plant, data = setup.plant, setup.plant.new_data()
     message = r"Counted raised KeyError: 'lost' at t = 0\.035 s"
     with somebody_elses():
         with pytest.raises(RunStopped, match=message) as caught, control_callback(plant, controller):
@@ -329,8 +329,8 @@ def test_an_exception_comes_out_of_mj_step_and_takes_the_callback_out() -> None:
 
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_the_runner_keeps_what_was_recorded_until_an_exception(driver: Any) -> None:
-    of, _, _ = counting("observer.fail_at=7")
-    result = of.run(driver=driver)
+    setup, _, _ = counting("observer.fail_at=7")
+    result = setup.run(driver=driver)
     (outcome,) = result.outcomes
     assert (outcome.kind, outcome.time_s) == ("stopped", pytest.approx(0.035))
     assert "KeyError: 'lost'" in outcome.reason
@@ -341,11 +341,11 @@ def test_the_runner_keeps_what_was_recorded_until_an_exception(driver: Any) -> N
 
 
 def test_a_plant_can_be_stepped_without_the_callback_afterwards() -> None:
-    of = experiment()
-    of.run(driver="callback")
-    data = of.plant.new_data()
-    mujoco.mj_step(of.plant.model, data, 10)
-    assert data.ctrl[of.plant.axis.servos].tolist() == [0.0, 0.0]
+    setup = experiment()
+    setup.run(driver="callback")
+    data = setup.plant.new_data()
+    mujoco.mj_step(setup.plant.model, data, 10)
+    assert data.ctrl[setup.plant.axis.servos].tolist() == [0.0, 0.0]
 
 
 def test_commands_reach_the_servos_in_their_directions() -> None:

@@ -119,8 +119,8 @@ def test_an_observation_is_what_the_sensors_show() -> None:
     for _ in range(60):
         observation, *_, info = env.step(np.zeros(1))
         rates.append((observation[2], info["x2_rad_s"]))
-    shown, true = np.array(rates).T
-    assert 1e-4 < np.std(shown - 1.03 * true) < 0.01
+    reading, true = np.array(rates).T
+    assert 1e-4 < np.std(reading - 1.03 * true) < 0.01
     assert ScissoredPairEnv("push_recovery", SHORT).reset(seed=2)[0].tolist() == observation_at(2, ())
 
 
@@ -148,12 +148,12 @@ def test_settings_of_an_episode() -> None:
 @pytest.mark.parametrize("options", [{}, {"readings": READINGS}, {"scenario": "bias_estimation"}], ids=str)
 def test_gymnasiums_checker_has_nothing_to_say(options: dict[str, Any]) -> None:
     """Warnings are errors here. The passive checker is on in what `make` gives."""
-    made = gymnasium.make(ID, **options)
-    check_env(made.unwrapped, skip_render_check=True)
-    made.reset(seed=0)
+    env = gymnasium.make(ID, **options)
+    check_env(env.unwrapped, skip_render_check=True)
+    env.reset(seed=0)
     for _ in range(3):
-        made.step(made.action_space.sample())
-    made.close()
+        env.step(env.action_space.sample())
+    env.close()
 
 
 @pytest.mark.slow

@@ -41,12 +41,12 @@ def _listed(signal: np.ndarray) -> list:
     return signal.tolist() if signal.ndim == 1 else list(signal)
 
 
-def commands(of: Law, given: list[tuple[Measurement, FeedbackState]]) -> np.ndarray:
-    state, u, found = of.init(given[0][0]), 0.0 * given[0][0].y1, []
-    for y, x in given:
-        state, u = of.step(state, y, x, u)
-        found.append(u)
-    return np.array(found)
+def commands(control_law: Law, arguments: list[tuple[Measurement, FeedbackState]]) -> np.ndarray:
+    state, u, result = control_law.init(arguments[0][0]), 0.0 * arguments[0][0].y1, []
+    for y, x in arguments:
+        state, u = control_law.step(state, y, x, u)
+        result.append(u)
+    return np.array(result)
 
 
 @pytest.mark.parametrize("kind", EVERY)
@@ -58,11 +58,11 @@ def test_every_parameter_is_documented(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_is_a_frozen_value(kind: str) -> None:
-    of = law(kind)
-    assert dataclasses.is_dataclass(of)
-    assert of == law(kind)
+    control_law = law(kind)
+    assert dataclasses.is_dataclass(control_law)
+    assert control_law == law(kind)
     with pytest.raises(dataclasses.FrozenInstanceError):
-        object.__getattribute__(of, "__setattr__")("dt", 0.1)
+        object.__getattribute__(control_law, "__setattr__")("dt", 0.1)
 
 
 @pytest.mark.parametrize("kind", EVERY)
@@ -73,31 +73,31 @@ def test_says_nothing_at_the_equilibrium(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_step_has_no_memory_but_the_state(kind: str) -> None:
-    of, given = law(kind), samples(40)
-    first = commands(of, given)
-    commands(of, samples(40, seed=1))
-    np.testing.assert_array_equal(commands(of, given), first)
+    control_law, arguments = law(kind), samples(40)
+    first = commands(control_law, arguments)
+    commands(control_law, samples(40, seed=1))
+    np.testing.assert_array_equal(commands(control_law, arguments), first)
 
 
 @pytest.mark.parametrize("kind", EVERY)
 @pytest.mark.parametrize("rate_limit", [4.7, 0.5])
 def test_many_worlds_are_single_ones(kind: str, rate_limit: float) -> None:
     """Bit for bit, the limit reached or not."""
-    of, worlds = law(kind, rate_limit), 7
+    control_law, worlds = law(kind, rate_limit), 7
     many = samples(60, (worlds,))
-    together = commands(of, many)
+    together = commands(control_law, many)
     assert np.abs(together).max() == rate_limit
     assert np.abs(together).min() < rate_limit
     for i in range(worlds):
         one = [(Measurement(*(float(p[i]) for p in y)), FeedbackState(*(float(p[i]) for p in x))) for y, x in many]
-        np.testing.assert_array_equal(commands(of, one), together[:, i])
+        np.testing.assert_array_equal(commands(control_law, one), together[:, i])
 
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_a_law_that_needs_no_estimate_takes_none(kind: str) -> None:
-    of, given = law(kind), samples(40)
-    other = [(y, feedback_state(7.0, 7.0, 7.0, (7.0,))) for y, _ in given]
-    assert (commands(of, given) == commands(of, other)).all() == (needs(of) == ())
+    control_law, arguments = law(kind), samples(40)
+    other = [(y, feedback_state(7.0, 7.0, 7.0, (7.0,))) for y, _ in arguments]
+    assert (commands(control_law, arguments) == commands(control_law, other)).all() == (needs(control_law) == ())
 
 
 @pytest.mark.parametrize("kind", EVERY)
@@ -123,8 +123,10 @@ def test_worlds_of_other_limits_share_a_batch(kind: str) -> None:
     many = experiment.run_many(3, vary={"controller.rate_limit_rad_s": limits}).trajectory
     assert many is not None
     for i, limit in enumerate(limits):
-        own = prepare(load_scenario("push_recovery", [*SHORT, *settings, f"controller.rate_limit_rad_s={limit}"]))
-        one = own.run(world=i).trajectory
+        single_experiment = prepare(
+            load_scenario("push_recovery", [*SHORT, *settings, f"controller.rate_limit_rad_s={limit}"])
+        )
+        one = single_experiment.run(world=i).trajectory
         assert one is not None
         np.testing.assert_array_equal(many["u_rad_s"][:, i], one["u_rad_s"])
         assert np.abs(one["u_rad_s"]).max() == limit
@@ -132,8 +134,8 @@ def test_worlds_of_other_limits_share_a_batch(kind: str) -> None:
 
 def test_what_the_bench_gives_is_no_parameter() -> None:
     for kind in EVERY:
-        given: dict[str, Any] = dict.fromkeys(BENCH_PARAMETERS)
-        assert {"dt", "rate_limit"} <= given.keys() & inspect.signature(law_class(kind)).parameters.keys()
+        arguments: dict[str, Any] = dict.fromkeys(BENCH_PARAMETERS)
+        assert {"dt", "rate_limit"} <= arguments.keys() & inspect.signature(law_class(kind)).parameters.keys()
 
 
 def test_a_law_that_is_told_the_noise_keeps_worlds_of_other_noise_apart() -> None:
@@ -181,12 +183,12 @@ def test_observers_are_tuned_in_a_loop_that_takes_nothing_of_them() -> None:
 
 @pytest.mark.slow
 def test_a_run_says_which_law_and_reruns(elsewhere: None) -> None:
-    said = cmg_mj(
+    outcome = cmg_mj(
         "run", "push_recovery", "--set", "controller.kind=lqg", "--set", "controller.torque_walk=0.1", "--plot"
     )
-    assert said.status == 0
+    assert outcome.status == 0
     name = "runs/push_recovery-homogeneous-0-kind=lqg-torque_walk=0.1"
-    assert name in said.err
+    assert name in outcome.err
     again = cmg_mj("run", f"{name}/scenario.toml", "--out", "again")
     assert again.status == 0
     one, other = Trajectory.load(Path(name, "trajectory.parquet")), Trajectory.load(Path("again/trajectory.parquet"))
@@ -196,11 +198,11 @@ def test_a_run_says_which_law_and_reruns(elsewhere: None) -> None:
 
 @pytest.mark.slow
 def test_a_law_without_an_integrator_is_recorded_and_plotted(elsewhere: None) -> None:
-    said = cmg_mj("run", "push_recovery", "--set", f"controller.kind={__name__}:NoMemory", "--plot", "--out", "it")
-    assert said.status == 0
+    outcome = cmg_mj("run", "push_recovery", "--set", f"controller.kind={__name__}:NoMemory", "--plot", "--out", "it")
+    assert outcome.status == 0
     assert np.isnan(Trajectory.load(Path("it/trajectory.parquet"))["x_e_rad_times_s"]).all()
-    said = cmg_mj("compare", "push_recovery", "--set", "controller.kind=lqg", "--observers", "linear", "--worlds", 1)
-    assert "lqg takes nothing of the observer: every loop is the same" in said.err
+    outcome = cmg_mj("compare", "push_recovery", "--set", "controller.kind=lqg", "--observers", "linear", "--worlds", 1)
+    assert "lqg takes nothing of the observer: every loop is the same" in outcome.err
 
 
 class NoMemory(RaisesLate):

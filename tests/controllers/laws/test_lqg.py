@@ -31,9 +31,9 @@ EVERY = pytest.mark.parametrize(("dt", "parameters"), CASES)
 
 
 def law(dt: float = 0.005, rate_limit: float = UNLIMITED, noise: TiltNoise = NOISE, **parameters: Any) -> Lqg:
-    made = make_law("lqg", dt, rate_limit, PAIR, noise, **parameters)
-    assert isinstance(made, Lqg)
-    return made
+    result = make_law("lqg", dt, rate_limit, PAIR, noise, **parameters)
+    assert isinstance(result, Lqg)
+    return result
 
 
 def rig() -> tuple[np.ndarray, np.ndarray]:
@@ -83,15 +83,15 @@ def estimator(dt: float, walk: float, white: float, gimbal: float) -> tuple[np.n
     return P, P @ C.T @ np.linalg.inv(C @ P @ C.T + R), Q
 
 
-def told(of: Lqg) -> tuple[float, float, float]:
-    return of.torque_walk, of.torque_white, of.gimbal_white
+def told(control_law: Lqg) -> tuple[float, float, float]:
+    return control_law.torque_walk, control_law.torque_white, control_law.gimbal_white
 
 
 @EVERY
 def test_gains_are_those_of_the_riccati_equation(dt: float, parameters: dict[str, Any]) -> None:
-    of = law(dt, **parameters)
-    K, _, _ = regulator(dt, of.state_cost, of.input_cost)
-    np.testing.assert_allclose([of.gains], K, rtol=1e-7)
+    control_law = law(dt, **parameters)
+    K, _, _ = regulator(dt, control_law.state_cost, control_law.input_cost)
+    np.testing.assert_allclose([control_law.gains], K, rtol=1e-7)
 
 
 def test_fast_control_has_table_2s_gains_to_their_printed_digits() -> None:
@@ -101,20 +101,20 @@ def test_fast_control_has_table_2s_gains_to_their_printed_digits() -> None:
 
 @EVERY
 def test_the_filter_is_that_of_the_riccati_equation(dt: float, parameters: dict[str, Any]) -> None:
-    of = law(dt, **parameters)
-    P, M, Q = estimator(dt, *told(of))
-    np.testing.assert_allclose(of.process_noise, Q, rtol=1e-9, atol=1e-24)
-    np.testing.assert_allclose(of.expected_covariance, P, rtol=1e-6, atol=1e-12)
-    np.testing.assert_allclose(of.innovation_gain, M, rtol=1e-6, atol=1e-9)
+    control_law = law(dt, **parameters)
+    P, M, Q = estimator(dt, *told(control_law))
+    np.testing.assert_allclose(control_law.process_noise, Q, rtol=1e-9, atol=1e-24)
+    np.testing.assert_allclose(control_law.expected_covariance, P, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(control_law.innovation_gain, M, rtol=1e-6, atol=1e-9)
 
 
-def joint(of: Lqg) -> np.ndarray:
+def joint(control_law: Lqg) -> np.ndarray:
     """One period of the linear rig and the law, (9, 9): made by running the law itself on unit vectors."""
-    F, G = held(*rig(), of.dt)
+    F, G = held(*rig(), control_law.dt)
     columns = []
     for unit in np.eye(9).tolist():
-        x, state = np.array(unit[:4]), type(of.init(Measurement(0.0, 0.0)))(*unit[4:])
-        state, u = of.step(state, Measurement(float(x[0]), float(x[2])), feedback_state(0.0, 0.0, 0.0), 0.0)
+        x, state = np.array(unit[:4]), type(control_law.init(Measurement(0.0, 0.0)))(*unit[4:])
+        state, u = control_law.step(state, Measurement(float(x[0]), float(x[2])), feedback_state(0.0, 0.0, 0.0), 0.0)
         columns.append([*(F @ x + G[:, 0] * u), *state])
     return np.array(columns).T
 
@@ -122,12 +122,12 @@ def joint(of: Lqg) -> np.ndarray:
 @EVERY
 def test_the_closed_loops_poles_are_the_regulators_and_the_filters(dt: float, parameters: dict[str, Any]) -> None:
     """The separation principle, and a 1 for the torque, which nothing in the loop can change."""
-    of = law(dt, **parameters)
-    K, F, G = regulator(dt, of.state_cost, of.input_cost)
-    _, M, _ = estimator(dt, *told(of))
+    control_law = law(dt, **parameters)
+    K, F, G = regulator(dt, control_law.state_cost, control_law.input_cost)
+    _, M, _ = estimator(dt, *told(control_law))
     moved = expm(rig()[0] * dt)
     apart = [*np.linalg.eigvals(F - G @ K), *np.linalg.eigvals(moved - moved @ M @ np.eye(4)[[0, 2]]), 1.0]
-    together = np.linalg.eigvals(joint(of))
+    together = np.linalg.eigvals(joint(control_law))
     np.testing.assert_allclose(np.poly(together), np.poly(apart), rtol=1e-6, atol=1e-9)
     assert np.sort(np.abs(together))[-2] < 1.0 - 1e-4
 
@@ -135,32 +135,32 @@ def test_the_closed_loops_poles_are_the_regulators_and_the_filters(dt: float, pa
 @cache
 def errors(worlds: int = 3000, seconds: float = 16.0) -> tuple[Lqg, np.ndarray]:
     """Of what the law expects at a sample, on the linear rig with all its noises, (n_times * worlds, 4)."""
-    of = law()
+    control_law = law()
     rng = np.random.default_rng(5)
-    _, _, Q = estimator(of.dt, *told(of))
-    F, G = held(*rig(), of.dt)
+    _, _, Q = estimator(control_law.dt, *told(control_law))
+    F, G = held(*rig(), control_law.dt)
     root = np.linalg.cholesky(Q + 1e-24 * np.eye(4))
     x = np.zeros((4, worlds))
-    state, u, found = of.init(Measurement(x[0], x[2])), np.zeros(worlds), []
-    for k in range(round(seconds / of.dt)):
-        if k * of.dt >= 12.0 and k % 100 == 0:  # the filter's slowest pole is at -0.37 1/s
-            found.append((x - np.array(state[:4])).T)
+    state, u, result = control_law.init(Measurement(x[0], x[2])), np.zeros(worlds), []
+    for k in range(round(seconds / control_law.dt)):
+        if k * control_law.dt >= 12.0 and k % 100 == 0:  # the filter's slowest pole is at -0.37 1/s
+            result.append((x - np.array(state[:4])).T)
         y = Measurement(x[0] + NOISE.tilt * rng.normal(size=worlds), x[2] + NOISE.gimbal * rng.normal(size=worlds))
-        state, u = of.step(state, y, feedback_state(0.0, 0.0, 0.0), u)
+        state, u = control_law.step(state, y, feedback_state(0.0, 0.0, 0.0), u)
         x = F @ x + G * u + root @ rng.normal(size=(4, worlds))
-    return of, np.concatenate(found)
+    return control_law, np.concatenate(result)
 
 
 @pytest.mark.slow
 def test_the_error_is_what_the_filter_says() -> None:
     """Its covariance over seeds, entry by entry, in units of the standard deviations."""
-    of, found = errors()
-    P, _, _ = estimator(of.dt, *told(of))
+    control_law, result = errors()
+    P, _, _ = estimator(control_law.dt, *told(control_law))
     sigma = np.sqrt(np.diag(P))
     np.testing.assert_allclose(
-        found.T @ found / len(found) / np.outer(sigma, sigma), P / np.outer(sigma, sigma), atol=0.04
+        result.T @ result / len(result) / np.outer(sigma, sigma), P / np.outer(sigma, sigma), atol=0.04
     )
-    assert np.abs(found.mean(axis=0) / sigma).max() < 0.04
+    assert np.abs(result.mean(axis=0) / sigma).max() < 0.04
 
 
 def test_its_noises_are_those_of_the_observer_kalman() -> None:
@@ -170,10 +170,10 @@ def test_its_noises_are_those_of_the_observer_kalman() -> None:
 
 def test_it_rests_where_gravity_bears_the_torque() -> None:
     """A torque on the rig, which both gimbals' shares of gravity hold: nothing to be done."""
-    of, torque = law(), 0.1
+    control_law, torque = law(), 0.1
     x1 = -torque / (2.0 * paper.gravity_torque)
-    state = of.init(Measurement(x1, 0.0))._replace(torque=torque)
-    state, u = of.step(state, Measurement(x1, 0.0), feedback_state(0.0, 0.0, 0.0), 0.0)
+    state = control_law.init(Measurement(x1, 0.0))._replace(torque=torque)
+    state, u = control_law.step(state, Measurement(x1, 0.0), feedback_state(0.0, 0.0, 0.0), 0.0)
     assert u == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(state, (x1, 0.0, 0.0, torque, 0.0), atol=1e-12)
 
@@ -181,21 +181,21 @@ def test_it_rests_where_gravity_bears_the_torque() -> None:
 @pytest.mark.parametrize("tilt", [-0.1, 0.1])
 @pytest.mark.parametrize("gimbal", [-0.2, 0.2])
 def test_at_the_limit_it_expects_what_was_commanded_and_does_not_wind_up(tilt: float, gimbal: float) -> None:
-    of = law(rate_limit=0.5)
-    state, u = of.step(
-        of.init(Measurement(tilt, gimbal)), Measurement(tilt, gimbal), feedback_state(0.0, 0.0, 0.0), 0.0
+    control_law = law(rate_limit=0.5)
+    state, u = control_law.step(
+        control_law.init(Measurement(tilt, gimbal)), Measurement(tilt, gimbal), feedback_state(0.0, 0.0, 0.0), 0.0
     )
     assert u == -math.copysign(0.5, tilt)
-    F, G = held(*rig(), of.dt)
+    F, G = held(*rig(), control_law.dt)
     np.testing.assert_allclose(state[:4], F @ [tilt, 0.0, gimbal, 0.0] + G[:, 0] * u, rtol=1e-9)
     # The integrator's next step would add k4 x3 to the demand, whose sign is that of u.
-    winds = of.gains[3] * gimbal * u > 0.0
-    assert state.x_e == (0.0 if winds else pytest.approx(-of.dt * (gimbal + 0.5 * of.dt * u)))
+    winds = control_law.gains[3] * gimbal * u > 0.0
+    assert state.x_e == (0.0 if winds else pytest.approx(-control_law.dt * (gimbal + 0.5 * control_law.dt * u)))
 
 
 def test_a_sensor_without_noise_is_taken() -> None:
-    of = law(noise=TiltNoise(0.0, 0.0, 0.0, 0.0))
-    np.testing.assert_allclose(np.diag(of.innovation_gain[[0, 2]]), 1.0, atol=0.01)
+    control_law = law(noise=TiltNoise(0.0, 0.0, 0.0, 0.0))
+    np.testing.assert_allclose(np.diag(control_law.innovation_gain[[0, 2]]), 1.0, atol=0.01)
 
 
 @pytest.mark.slow
@@ -218,20 +218,20 @@ def test_either_integral_action_alone_falls_at_a_large_bias(without: str) -> Non
     settings = ["controller.kind=lqg", "plant.equilibrium_bias_deg=2.0"]
     experiment = prepare(load_scenario("push_recovery", settings))
     assert experiment.run_many(4).stood.all()
-    of = experiment.law
-    assert isinstance(of, Lqg)
+    control_law = experiment.law
+    assert isinstance(control_law, Lqg)
     if without == "integrator":
         A, B = rig()
-        K = solve_without_integrator(A[:3, :3], B[:3], of)
-        of.__dict__["gains"] = (*K, 0.0)
+        K = solve_without_integrator(A[:3, :3], B[:3], control_law)
+        control_law.__dict__["gains"] = (*K, 0.0)
     else:
-        of.__dict__["innovation_gain"] = np.vstack([of.innovation_gain[:3], [[0.0, 0.0]]])
-    of.__dict__.pop("_numbers", None)
+        control_law.__dict__["innovation_gain"] = np.vstack([control_law.innovation_gain[:3], [[0.0, 0.0]]])
+    control_law.__dict__.pop("_numbers", None)
     assert not experiment.run_many(4).stood.any()
 
 
-def solve_without_integrator(A: np.ndarray, B: np.ndarray, of: Lqg) -> list[float]:
-    F, G = held(A, B, of.dt)
-    Q, R = of.dt * np.diag(of.state_cost[:3]), np.array([[of.dt * of.input_cost]])
+def solve_without_integrator(A: np.ndarray, B: np.ndarray, control_law: Lqg) -> list[float]:
+    F, G = held(A, B, control_law.dt)
+    Q, R = control_law.dt * np.diag(control_law.state_cost[:3]), np.array([[control_law.dt * control_law.input_cost]])
     S = solve_discrete_are(F, G, Q, R)
     return np.ravel(np.linalg.solve(G.T @ S @ G + R, G.T @ S @ F)).tolist()

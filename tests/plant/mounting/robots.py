@@ -11,10 +11,10 @@ EXAMPLES = Path(__file__).parents[3] / "examples" / "robots"
 
 def gymnasium_asset(name: str) -> Path:
     """One of the robots that Gymnasium brings."""
-    found = find_spec("gymnasium")
-    assert found is not None
-    assert found.origin is not None
-    return Path(found.origin).parent / "envs" / "mujoco" / "assets" / name
+    package = find_spec("gymnasium")
+    assert package is not None
+    assert package.origin is not None
+    return Path(package.origin).parent / "envs" / "mujoco" / "assets" / name
 
 
 def _spaced(point: tuple[float, ...]) -> str:

@@ -80,8 +80,8 @@ def test_the_environment_gives_it_too(scenario: str) -> None:
 
 
 def test_a_sweep(scenario: str) -> None:
-    found = sweep(load_scenario(scenario, PUSHED), {"push.0.torque_n_m": [1.0, 200.0]}, ["homogeneous"], worlds=2)
-    stood = {row["push.0.torque_n_m"]: row["stood"] for row in found.trials.to_pylist()}
+    result = sweep(load_scenario(scenario, PUSHED), {"push.0.torque_n_m": [1.0, 200.0]}, ["homogeneous"], worlds=2)
+    stood = {row["push.0.torque_n_m"]: row["stood"] for row in result.trials.to_pylist()}
     assert stood == {1.0: True, 200.0: False}
 
 

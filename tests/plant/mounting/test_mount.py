@@ -61,14 +61,14 @@ def everything(model: mujoco.MjModel) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("name", ["bicycle", "walker2d, freed", "humanoid"])
 def test_the_file_is_the_spec(name: str) -> None:
     """MuJoCo writes six digits."""
-    made = mount(ROBOTS[name].path, **ROBOTS[name].options)
-    of_file, of_spec = mujoco.MjModel.from_xml_path(str(made.save("rig.xml"))), made.spec.compile()
+    result = mount(ROBOTS[name].path, **ROBOTS[name].options)
+    of_file, of_spec = mujoco.MjModel.from_xml_path(str(result.save("rig.xml"))), result.spec.compile()
     saved, spec = everything(of_file), everything(of_spec)
     for field in ("body_mass", "body_inertia", "body_pos", "jnt_axis", "eq_solimp", "site_pos"):
         np.testing.assert_allclose(saved[field], spec[field], rtol=1e-4, atol=1e-5, err_msg=field)
     for field in ("qpos", "qvel", "act", "ctrl"):
-        found, expected = (getattr(model.key("equilibrium"), field) for model in (of_file, of_spec))
-        np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5, err_msg=field)
+        actual, expected = (getattr(model.key("equilibrium"), field) for model in (of_file, of_spec))
+        np.testing.assert_allclose(actual, expected, rtol=1e-4, atol=1e-5, err_msg=field)
     np.testing.assert_allclose(saved["eq_data"][:, :5], spec["eq_data"][:, :5], atol=1e-5)
     assert {k: v.shape for k, v in saved.items()} == {k: v.shape for k, v in spec.items()}
 
@@ -76,17 +76,17 @@ def test_the_file_is_the_spec(name: str) -> None:
 def test_a_spec_is_taken_and_not_changed() -> None:
     spec = mujoco.MjSpec.from_string(BALL)
     before = spec.to_xml()
-    made = mount(spec, "pole")
+    result = mount(spec, "pole")
     assert spec.to_xml() == before
-    assert made.spec.body("cube1/half") is not None
+    assert result.spec.body("cube1/half") is not None
 
 
 @pytest.mark.slow
 def test_every_joint_is_held_where_it_stands() -> None:
     """A ball, too, and in any pose of its reference: a run with pushes moves them by less than 0.1 deg."""
-    made = mount(mujoco.MjSpec.from_string(BALL), "pole")
-    assert made.held == ("shoulder", "gripper")
-    model = made.save("rig.xml")
+    instance = mount(mujoco.MjSpec.from_string(BALL), "pole")
+    assert instance.held == ("shoulder", "gripper")
+    model = instance.save("rig.xml")
     can = prospects(write_scenario(model, model, "homogeneous"))
     assert not can.hints
     result = write_scenario(model, model, "homogeneous", can).run()
@@ -119,14 +119,14 @@ def test_a_larger_module_has_more_momentum() -> None:
 
 def test_the_line_on_the_floor_is_a_hinge_in_its_place() -> None:
     """The bicycle with a hinge along the line that mount has found, for its free joint: the same reduced model."""
-    made = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options)
-    model = made.spec.compile()
+    result = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options)
+    model = result.spec.compile()
     key = model.key("equilibrium").id
     free = find_axis(model, key, "", axes_of(model)[""])
     assert isinstance(free.line, SupportLine)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)
-    qpos, qvel, spec = data.qpos.copy(), data.qvel.copy(), made.spec
+    qpos, qvel, spec = data.qpos.copy(), data.qvel.copy(), result.spec
     frame = spec.body("frame")
     spec.delete(spec.joint("root"))
     frame.pos, frame.quat = qpos[:3], qpos[3:7]
@@ -187,8 +187,8 @@ def test_keyframes_of_its_own_are_kept() -> None:
         "</mujoco>",
         '<keyframe><key name="home" qpos="0.1 1 0 0 0 0.05"/><key name="up" qpos="0 1 0 0 0 0"/></keyframe></mujoco>',
     )
-    made = mount(mujoco.MjSpec.from_string(text), "pole", keyframe="home")
-    model = made.spec.compile()
+    result = mount(mujoco.MjSpec.from_string(text), "pole", keyframe="home")
+    model = result.spec.compile()
     assert [model.key(i).name for i in range(model.nkey)] == ["equilibrium", "home", "up"]
     home, stands = model.key("home"), model.key("equilibrium")
     assert home.qpos[0] == pytest.approx(0.1)
@@ -199,10 +199,10 @@ def test_keyframes_of_its_own_are_kept() -> None:
 
 @pytest.mark.slow
 def test_the_command_prints_what_the_pair_can_do() -> None:
-    given = ("mount", EXAMPLES / "torso.xml", "--body", "torso", "--axis", "x")
-    said = cmg_mj(*given, "-o", "a.xml", "--json")
-    assert said.status == 0, said.err
-    figures = json.loads(said.out)
+    arguments = ("mount", EXAMPLES / "torso.xml", "--body", "torso", "--axis", "x")
+    outcome = cmg_mj(*arguments, "-o", "a.xml", "--json")
+    assert outcome.status == 0, outcome.err
+    figures = json.loads(outcome.out)
     assert figures["held"] == ["front_hip", "rear_hip"]
     assert figures["limit_tilt_deg"] < 2.0
     assert figures["scale_that_suffices"] == 1.21
@@ -212,21 +212,21 @@ def test_the_command_prints_what_the_pair_can_do() -> None:
         <= figures["push_margin_impulse_n_m_s"]
         < figures["limit_push_impulse_n_m_s"]
     )
-    words = cmg_mj(*given, "-o", "b.xml")
+    words = cmg_mj(*arguments, "-o", "b.xml")
     assert (words.status, "--scale 1.21 suffices" in words.out) == (0, True)
     assert sorted(path.name for path in Path().iterdir()) == ["a.toml", "a.xml", "b.toml", "b.xml"]
 
 
 def test_what_it_changes_it_says() -> None:
     text = BALL.replace('timestep="0.001" integrator="RK4"', 'timestep="0.02" solver="PGS" gravity="0.001 0 -9.8"')
-    made = mount(mujoco.MjSpec.from_string(text), "pole")
-    assert [note.split(" now ")[-1] for note in made.notes] == [
+    result = mount(mujoco.MjSpec.from_string(text), "pole")
+    assert [note.split(" now ")[-1] for note in result.notes] == [
         "straight down",
         "RK4, which fast flywheels need",
         "Newton: another does not hold joints stiffly",
         "5 ms",
     ]
-    option = made.spec.compile().opt
+    option = result.spec.compile().opt
     assert (option.timestep, option.gravity.tolist()) == (0.005, [0.0, 0.0, pytest.approx(-9.8)])
     assert int(option.solver) == int(mujoco.mjtSolver.mjSOL_NEWTON)
     assert int(option.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4)

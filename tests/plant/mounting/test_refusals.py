@@ -149,18 +149,18 @@ def test_a_file_that_is_no_robot() -> None:
 
 def test_nobodys_file_is_overwritten() -> None:
     Path("robot.xml").write_text(TORSO.read_text(encoding="utf-8"), encoding="utf-8")
-    given = ("mount", "robot.xml", "--body", "torso", "--axis", "x", "--scale", "1.3")
-    assert "is the robot's own file" in cmg_mj(*given, "-o", "robot.xml", "--overwrite").complaint
+    arguments = ("mount", "robot.xml", "--body", "torso", "--axis", "x", "--scale", "1.3")
+    assert "is the robot's own file" in cmg_mj(*arguments, "-o", "robot.xml", "--overwrite").complaint
     assert Path("robot.xml").read_bytes() == TORSO.read_bytes()
     Path("mine.toml").write_text("mine", encoding="utf-8")
-    assert "mine.toml exists; give another name" in cmg_mj(*given, "-o", "mine.xml").complaint
+    assert "mine.toml exists; give another name" in cmg_mj(*arguments, "-o", "mine.xml").complaint
     assert (Path("mine.toml").read_text(encoding="utf-8"), Path("mine.xml").exists()) == ("mine", False)
-    assert cmg_mj(*given, "-o", "there/is/none.xml").complaint
+    assert cmg_mj(*arguments, "-o", "there/is/none.xml").complaint
 
 
 @pytest.mark.slow
 def test_a_file_is_overwritten_if_it_is_asked_for() -> None:
-    given = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3", "-o", "mine.xml")
+    arguments = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3", "-o", "mine.xml")
     Path("mine.toml").write_text("mine", encoding="utf-8")
-    assert cmg_mj(*given, "--overwrite").status == 0
+    assert cmg_mj(*arguments, "--overwrite").status == 0
     assert Path("mine.toml").read_text(encoding="utf-8") != "mine"

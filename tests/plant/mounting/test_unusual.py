@@ -70,25 +70,25 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Plant:
     return load_plant(model=str(mounted().save(tmp_path_factory.mktemp("plain") / "plain.xml")))
 
 
-def same(found: Plant, expected: Plant) -> None:
+def same(result: Plant, expected: Plant) -> None:
     for name in ("J1", "J_d", "gravity_torque"):
-        assert getattr(found.reduced, name) == pytest.approx(getattr(expected.reduced, name), rel=1e-4), name
+        assert getattr(result.reduced, name) == pytest.approx(getattr(expected.reduced, name), rel=1e-4), name
 
 
 @pytest.mark.parametrize("name", ['name="head"', ""], ids=["named", "unnamed"])
 @pytest.mark.parametrize("option", ["", 'jacobian="sparse"'], ids=["dense", "sparse"])
 def test_a_ball_that_is_held_is_rigid(plain: Plant, name: str, option: str) -> None:
     """The weld that holds it holds its inertia too, and is one with its own trunk, not with the world."""
-    made = rig(name=name, joint='<joint type="ball"/>', option=option)
-    same(made, plain)
-    pole = math.sqrt(made.reduced.gravity_torque / made.reduced.J1)
-    assert simulated_pole(made.model, made.key, made.axis.line, made.axis.bias) == pytest.approx(pole, rel=0.01)
-    assert 0 not in (int(made.model.eq_obj1id[0]), int(made.model.eq_obj2id[0]))
+    result = rig(name=name, joint='<joint type="ball"/>', option=option)
+    same(result, plain)
+    pole = math.sqrt(result.reduced.gravity_torque / result.reduced.J1)
+    assert simulated_pole(result.model, result.key, result.axis.line, result.axis.bias) == pytest.approx(pole, rel=0.01)
+    assert 0 not in (int(result.model.eq_obj1id[0]), int(result.model.eq_obj2id[0]))
 
 
 def test_a_ball_is_held_by_an_earlier_mount() -> None:
     """A closed chain is refused; the weld of an earlier mount is none, and stays."""
-    made = mount(
+    result = mount(
         mujoco.MjSpec.from_string(
             '<mujoco><worldbody><body name="cross" pos="0 0 0.1"><joint name="roll" axis="1 0 0"/>'
             '<inertial pos="0 0 0" mass="0.05" diaginertia="1e-5 1e-5 1e-5"/><body name="trunk">'
@@ -101,8 +101,8 @@ def test_a_ball_is_held_by_an_earlier_mount() -> None:
         name="roll",
         position=(0.0, 0.0, 0.15),
     )
-    assert made.held == ("pitch", "body3_joint")
-    twice = mount(made.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.35))
+    assert result.held == ("pitch", "body3_joint")
+    twice = mount(result.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.35))
     assert [equality.name for equality in twice.spec.equalities] == ["body3_joint_held"]
     with pytest.raises(InputError, match="the hinge 'pitch' has an axis already: another one needs another hinge"):
         mount(twice.spec, "trunk", axis="pitch", name="third", position=(0.0, 0.0, 0.55))
@@ -121,14 +121,14 @@ def test_a_ball_is_held_by_an_earlier_mount() -> None:
     ],
 )
 def test_a_compilers_setting_leaves_modules_as_they_are(plain: Plant, head: str) -> None:
-    made = rig(head=head, joint=NECK)
-    same(made, plain)
+    result = rig(head=head, joint=NECK)
+    same(result, plain)
     for body in ("gimbal", "flywheel", "half"):
         for field in ("body_mass", "body_inertia"):
-            found, expected = (
-                getattr(plant.model, field)[plant.model.body(f"cube1/{body}").id] for plant in (made, plain)
+            actual, expected = (
+                getattr(plant.model, field)[plant.model.body(f"cube1/{body}").id] for plant in (result, plain)
             )
-            np.testing.assert_allclose(found, expected, rtol=1e-4)
+            np.testing.assert_allclose(actual, expected, rtol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -141,14 +141,14 @@ def test_a_compilers_setting_leaves_modules_as_they_are(plain: Plant, head: str)
 )
 def test_a_joint_is_held_already_by_what_holds_it(plain: Plant, tie: str, held: tuple[str, ...]) -> None:
     """Not by a name; nor do names collide."""
-    made = mounted(joint=NECK, after=f"<equality>{tie}</equality>")
-    assert made.held == held
-    same(load_plant(model=str(made.save("rig.xml"))), plain)
+    result = mounted(joint=NECK, after=f"<equality>{tie}</equality>")
+    assert result.held == held
+    same(load_plant(model=str(result.save("rig.xml"))), plain)
 
 
 @pytest.mark.parametrize("hold", ["servos", "constraints"])
 @pytest.mark.parametrize(
-    ("servo", "told", "state"),
+    ("servo", "setpoint", "state"),
     [
         ('<position name="s" joint="neck" kp="2000" kv="20"/>', 0.3, None),
         ('<position name="s" joint="neck" kp="2000" kv="20" gear="2"/>', 0.6, None),
@@ -158,19 +158,21 @@ def test_a_joint_is_held_already_by_what_holds_it(plain: Plant, tie: str, held: 
         ('<general name="s" joint="neck" biastype="affine" gainprm="1000" biasprm="20 -2000 -20"/>', 0.58, None),
     ],
 )
-def test_a_servo_is_told_what_holds_it_where_it_stands(servo: str, told: float, state: float | None, hold: str) -> None:
+def test_a_servo_is_told_what_holds_it_where_it_stands(
+    servo: str, setpoint: float, state: float | None, hold: str
+) -> None:
     """It exerts no force there; what it is told is not its joint's position, with a gear or an offset."""
     after = f"<actuator>{servo}</actuator>{BENT}"
-    made = mounted(joint=NECK, after=after, keyframe="bent", hold=hold)
-    assert made.held == (() if hold == "servos" else ("neck",))
-    plant = load_plant(model=str(made.save("rig.xml")))
+    result = mounted(joint=NECK, after=after, keyframe="bent", hold=hold)
+    assert result.held == (() if hold == "servos" else ("neck",))
+    plant = load_plant(model=str(result.save("rig.xml")))
     data = mujoco.MjData(plant.model)
     mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
     mujoco.mj_forward(plant.model, data)
     servo_id = plant.model.actuator("s").id
     assert data.qpos[plant.model.joint("neck").qposadr[0]] == pytest.approx(0.3)
     assert data.actuator_force[servo_id] == pytest.approx(0.0, abs=1e-2)
-    assert data.ctrl[servo_id] == pytest.approx(told, abs=1e-5)
+    assert data.ctrl[servo_id] == pytest.approx(setpoint, abs=1e-5)
     if state is not None:
         assert data.act[plant.model.actuator_actadr[servo_id]] == pytest.approx(state, abs=1e-5)
     pole = math.sqrt(plant.reduced.gravity_torque / plant.reduced.J1)
@@ -184,8 +186,8 @@ def test_what_only_drives_a_joint_does_not_hold_it(drive: str) -> None:
 
 
 def test_joints_without_a_name_get_one_that_is_free() -> None:
-    made = mounted(joint="<joint/>", more='<body><joint name="head_joint"/><geom size="0.01" mass="0.01"/></body>')
-    assert sorted(made.held) == ["head_joint", "head_joint_2"]
+    result = mounted(joint="<joint/>", more='<body><joint name="head_joint"/><geom size="0.01" mass="0.01"/></body>')
+    assert sorted(result.held) == ["head_joint", "head_joint_2"]
 
 
 @pytest.mark.parametrize(
@@ -227,8 +229,8 @@ def test_a_free_base_within_a_frame_stands_where_it_stood(frame: str, turned: st
     reference = mujoco.MjModel.from_xml_string(text)
     before = mujoco.MjData(reference)
     mujoco.mj_forward(reference, before)
-    made = mount(mujoco.MjSpec.from_string(text), "t", base="free", position=(0.0, 0.0, 0.1))
-    model = made.spec.compile()
+    result = mount(mujoco.MjSpec.from_string(text), "t", base="free", position=(0.0, 0.0, 0.1))
+    model = result.spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
     mujoco.mj_forward(model, data)
@@ -238,11 +240,11 @@ def test_a_free_base_within_a_frame_stands_where_it_stood(frame: str, turned: st
 
 def test_a_free_base_finds_a_name() -> None:
     more = '<body name="u"><joint name="t_free"/><geom size="0.01"/></body>'
-    made = mount(
+    result = mount(
         mujoco.MjSpec.from_string(UPRIGHT.format(before="", turned="", more=more, after="")),
         "t",
         base="free",
         position=(0.0, 0.0, 0.1),
     )
-    assert made.spec.joint("t_free_2") is not None
-    assert made.held == ("t_free",)
+    assert result.spec.joint("t_free_2") is not None
+    assert result.held == ("t_free",)

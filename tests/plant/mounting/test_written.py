@@ -27,7 +27,7 @@ def there() -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("out", "said"),
+    ("out", "message"),
     [
         ("b.toml", f"-o b.toml: {NO_XML}"),
         ("noext", f"-o noext: {NO_XML}"),
@@ -37,9 +37,9 @@ def there() -> list[str]:
         ("folder.xml", "-o folder.xml: folder.xml is a folder"),
     ],
 )
-def test_the_place_is_looked_at_before_anything_is_made(out: str, said: str) -> None:
+def test_the_place_is_looked_at_before_anything_is_made(out: str, message: str) -> None:
     Path("folder.xml").mkdir()
-    assert said in cmg_mj(*GIVEN, "-o", out, "--overwrite").complaint
+    assert message in cmg_mj(*GIVEN, "-o", out, "--overwrite").complaint
     assert there() == ["folder.xml"]
     spec = mujoco.MjSpec.from_file(str(TORSO))
     with pytest.raises(InputError):
@@ -70,9 +70,9 @@ def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.Monke
 def test_a_file_that_the_robot_includes_is_never_overwritten() -> None:
     Path("part.xml").write_bytes(TORSO.read_bytes())
     Path("robot.xml").write_text('<mujoco><include file="part.xml"/></mujoco>', encoding="utf-8")
-    given = ("mount", "robot.xml", *GIVEN[2:])
-    said = cmg_mj(*given, "-o", "part.xml", "--overwrite").complaint
-    assert "-o part.xml: part.xml is the robot's own file, or one that it names" in said
+    arguments = ("mount", "robot.xml", *GIVEN[2:])
+    message = cmg_mj(*arguments, "-o", "part.xml", "--overwrite").complaint
+    assert "-o part.xml: part.xml is the robot's own file, or one that it names" in message
     assert Path("part.xml").read_bytes() == TORSO.read_bytes()
     assert there() == ["part.xml", "robot.xml"]
     with pytest.raises(InputError, match=r"part\.xml is the robot's own file"):
@@ -93,8 +93,8 @@ def test_what_mujoco_cannot_do_is_one_line(monkeypatch: pytest.MonkeyPatch) -> N
         raise ValueError("Error: repeated name 'x'\nin frame")
 
     monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.mount_on_request", fails)
-    said = cmg_mj(*GIVEN, "-o", "a.xml").complaint
-    assert f"{TORSO}: MuJoCo cannot put a pair on it: repeated name 'x' in frame" in said
+    message = cmg_mj(*GIVEN, "-o", "a.xml").complaint
+    assert f"{TORSO}: MuJoCo cannot put a pair on it: repeated name 'x' in frame" in message
     assert there() == []
 
 
@@ -107,8 +107,8 @@ def test_the_document_has_the_commands_of_its_robots() -> None:
 def test_a_command_of_the_document() -> None:
     words = shlex.split(ROBOTS["bicycle"].command)
     assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml").status == 0
-    made = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options).save("b.xml")
-    assert made.read_bytes() == Path("a.xml").read_bytes()
+    result = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options).save("b.xml")
+    assert result.read_bytes() == Path("a.xml").read_bytes()
 
 
 def test_a_larger_pair_that_has_no_room_is_none_that_suffices() -> None:

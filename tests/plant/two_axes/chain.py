@@ -76,7 +76,7 @@ class Chain:
         yaw, roll, pitch = (0, up), (1, bearing[..., :, 0]), (2, cross[..., :, 1])
         three = [yaw, roll, pitch]
         nowhere = 0.0 * up
-        found = [
+        result = [
             Part(*self.of["thrust_bearing"], bearing, nowhere, [yaw]),  # its centre is on the vertical
             Part(*self.of["cross"], cross, nowhere, [yaw, roll]),
             Part(*self.of["frame"], frame, FRAME_HEIGHT * frame[..., :, 2], three),
@@ -88,12 +88,12 @@ class Chain:
             wheel = gimbal @ _about("y", q[..., 4 + 2 * i])
             to_gimbal = [*three, (3 + 2 * i, half[..., :, 0])]
             to_wheel = [*to_gimbal, (4 + 2 * i, gimbal[..., :, 1])]
-            found += [
+            result += [
                 Part(*self.of[f"{name}/half"], half, place, three),
                 Part(*self.of[f"{name}/gimbal"], gimbal, place, to_gimbal),
                 Part(*self.of[f"{name}/flywheel"], wheel, place, to_wheel),
             ]
-        return found
+        return result
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """M = sum of m Jv' Jv + Jw' I Jw, (..., 11, 11)."""
@@ -104,9 +104,9 @@ class Chain:
                 turns[..., :, k] = axis
                 if k < 3:  # gimbals and wheels turn about their own centres
                     moves[..., :, k] = np.cross(axis, part.place)
-            own = np.swapaxes(part.turn, -1, -2) @ turns
+            local_turns = np.swapaxes(part.turn, -1, -2) @ turns
             total += part.mass * np.swapaxes(moves, -1, -2) @ moves
-            total += np.swapaxes(own, -1, -2) @ (part.inertia[:, None] * own)
+            total += np.swapaxes(local_turns, -1, -2) @ (part.inertia[:, None] * local_turns)
         return total
 
     def potential(self, q: np.ndarray) -> np.ndarray:

@@ -21,13 +21,13 @@ MODELS = ["two_axes.xml", "two_axes_free_base.xml"]
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize(("locked", "left", "of"), [("pitch", "roll", 0), ("roll", "pitch", 1)])
-def test_the_other_axis_is_what_it_was(model: str, locked: str, left: str, of: int) -> None:
+@pytest.mark.parametrize(("locked", "left", "axis_index"), [("pitch", "roll", 0), ("roll", "pitch", 1)])
+def test_the_other_axis_is_what_it_was(model: str, locked: str, left: str, axis_index: int) -> None:
     whole, plant = load_plant(model=model), load_plant(model=model, locked_axes=[locked])
     assert plant.axis_names == [left]
     assert plant.joint_names == [name for name in whole.joint_names if name != locked]
-    np.testing.assert_allclose(astuple(plant.reduced), astuple(whole.axes[of].reduced), rtol=1e-9)
-    np.testing.assert_allclose(astuple(plant.radial_tilt), astuple(whole.axes[of].radial_tilt))
+    np.testing.assert_allclose(astuple(plant.reduced), astuple(whole.axes[axis_index].reduced), rtol=1e-9)
+    np.testing.assert_allclose(astuple(plant.radial_tilt), astuple(whole.axes[axis_index].radial_tilt))
     assert plant.drawn_model.nv == plant.model.nv
 
 

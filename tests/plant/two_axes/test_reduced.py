@@ -40,9 +40,9 @@ def test_what_grows_is_what_the_reduced_models_say(plant: Plant) -> None:
     k is the servo's stiffness at the pole's own pace. Nothing else is left out: with a base that gave way the pole
     would be 12.8/s.
     """
-    found = unstable_poles(plant)
+    result = unstable_poles(plant)
     kp, kv, gimbal = 85.6, 0.731, 1.56e-3
-    for axis, pole in zip(plant.axes, found, strict=True):
+    for axis, pole in zip(plant.axes, result, strict=True):
         momentum = axis.reduced.J_d * axis.reduced.omega_d
         stiffness = kp + kv * pole + gimbal * pole**2
         expected = math.sqrt(axis.reduced.gravity_torque / (axis.reduced.J1 + momentum**2 / stiffness))

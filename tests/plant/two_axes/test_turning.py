@@ -67,8 +67,8 @@ def asked_of(
 def against(plant: Plant, w: float, angles: list[float]) -> list[float]:
     """u_i = w sum_j c_ij sin(x3_j)/cos(x3_i)."""
     return [
-        w * float(row @ np.sin(angles)) / math.cos(own)
-        for row, own in zip(plant.turning.flywheels, angles, strict=True)
+        w * float(row @ np.sin(angles)) / math.cos(angle)
+        for row, angle in zip(plant.turning.flywheels, angles, strict=True)
     ]
 
 
@@ -228,8 +228,8 @@ def test_what_accelerometers_show_of_a_tilt_that_is_swept_round(plant: Plant) ->
         mujoco.mj_forward(plant.model, data)
         axis = plant.axes[i]
         forces = axis.ideal(data.sensordata, data.qvel).accelerations
-        shown = axis.radial_tilt.acceleration(forces[0], forces[2])
+        reading = axis.radial_tilt.acceleration(forces[0], forces[2])
         true = axis.line.rate(data.qacc)
-        assert shown - true == pytest.approx(
+        assert reading - true == pytest.approx(
             w * plant.turning.coriolis[i, j] * rate, rel=1e-2
         )  # the free base gives a little
