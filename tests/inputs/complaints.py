@@ -18,7 +18,8 @@ GRID = "not a whole number of physics steps of 0.001 s"
 def table(*rows: tuple) -> pytest.MarkDecorator:
     """Parametrise with rows (what, input, expected fragments...)."""
     return pytest.mark.parametrize(
-        ("given", "fragments"), [pytest.param(given, fragments, id=what) for what, given, *fragments in rows]
+        ("wrong_input", "fragments"),
+        [pytest.param(wrong_input, fragments, id=what) for what, wrong_input, *fragments in rows],
     )
 
 

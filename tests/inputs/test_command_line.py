@@ -32,8 +32,8 @@ from tests.inputs.complaints import OVER_0, WHOLE, assert_in_order, table
     ("no folder's name", ["--out", ""], "--out '': name a folder"),
 )
 @pytest.mark.parametrize("command", ["run", "compare"])
-def test_options(command: str, given: list[str], fragments: list[str]) -> None:
-    assert_in_order(fragments, cmg_mj(command, "push_recovery", *given).complaint)
+def test_options(command: str, wrong_input: list[str], fragments: list[str]) -> None:
+    assert_in_order(fragments, cmg_mj(command, "push_recovery", *wrong_input).complaint)
     assert list(Path().iterdir()) == []
 
 
@@ -71,11 +71,11 @@ def test_options(command: str, given: list[str], fragments: list[str]) -> None:
     ("command", ["rnu", "push_recovery"], "No such command 'rnu'"),
     ("list", ["list", "observer"], "'observer' is not one of 'scenarios', 'observers'"),
 )
-def test_commands(given: list[str], fragments: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commands(wrong_input: list[str], fragments: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "cmg_mj.simulation.experiment.simulate", pytest.fail
     )  # all this is found before anything is run
-    assert_in_order(fragments, cmg_mj(*given).complaint)
+    assert_in_order(fragments, cmg_mj(*wrong_input).complaint)
     assert list(Path().iterdir()) == []
 
 
@@ -87,9 +87,9 @@ def test_commands(given: list[str], fragments: list[str], monkeypatch: pytest.Mo
 )
 @pytest.mark.parametrize("command", ["run", "compare"])
 def test_an_output_folder_that_cannot_be_written(
-    command: str, given: str, fragments: list[str], monkeypatch: pytest.MonkeyPatch
+    command: str, wrong_input: str, fragments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("cmg_mj.simulation.experiment.simulate", pytest.fail)
     Path("taken").write_text("mine")
-    assert_in_order(fragments, cmg_mj(command, "push_recovery", "--out", given).complaint)
+    assert_in_order(fragments, cmg_mj(command, "push_recovery", "--out", wrong_input).complaint)
     assert Path("taken").read_text() == "mine"

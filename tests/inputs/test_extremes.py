@@ -38,11 +38,11 @@ QUOTED = '"a" . '
     ],
 )
 def test_extreme_numbers(field: str, size: str) -> None:
-    said = cmg_mj("run", "push_recovery", "--set", f"{field}={size}")
-    if said.status == 0 or said.out:  # such a rate limit limits nothing, such a push throws the rig over
-        assert "Traceback" not in said.err
+    outcome = cmg_mj("run", "push_recovery", "--set", f"{field}={size}")
+    if outcome.status == 0 or outcome.out:  # such a rate limit limits nothing, such a push throws the rig over
+        assert "Traceback" not in outcome.err
     else:
-        assert f"{field}" in said.complaint or "plant" in said.complaint
+        assert f"{field}" in outcome.complaint or "plant" in outcome.complaint
 
 
 @table(
@@ -77,9 +77,9 @@ def test_extreme_numbers(field: str, size: str) -> None:
         "duration_s = 5000: 5e+09 physics steps of 1e-06 s; at most 1e+09 are taken, 1000 s",
     ),
 )
-def test_what_is_no_scenario(given: str, fragments: list[str]) -> None:
+def test_what_is_no_scenario(wrong_input: str, fragments: list[str]) -> None:
     began = time.monotonic()
-    assert_in_order(["my.toml: ", *fragments], check(given).complaint)
+    assert_in_order(["my.toml: ", *fragments], check(wrong_input).complaint)
     assert_in_order(["my.toml: ", *fragments], cmg_mj("run", "my.toml").complaint)
     assert time.monotonic() - began < 5.0
 
@@ -91,8 +91,8 @@ def test_what_is_no_scenario(given: str, fragments: list[str]) -> None:
     ("bytes in a name", ["\udcff=1"], r"'\udcff': not UTF-8 text"),
     ("bytes in a file's name", ["plant.model=a\udcff"], r"plant.model = 'a\udcff': not UTF-8 text"),
 )
-def test_settings(given: list[str], fragments: list[str]) -> None:
-    assert_in_order(fragments, cmg_mj("run", "push_recovery", "--set", *given).complaint)
+def test_settings(wrong_input: list[str], fragments: list[str]) -> None:
+    assert_in_order(fragments, cmg_mj("run", "push_recovery", "--set", *wrong_input).complaint)
 
 
 @table(
@@ -106,8 +106,8 @@ def test_settings(given: list[str], fragments: list[str]) -> None:
     ("a paper", ["reproduce", "\udcff"], r"'\udcff': no such paper"),
     ("a list", ["list", "\udcff"], r"'\udcff' is not one of"),
 )
-def test_bytes_that_are_no_text(given: list[str], fragments: list[str]) -> None:
-    assert_in_order(fragments, cmg_mj(*given).complaint)
+def test_bytes_that_are_no_text(wrong_input: list[str], fragments: list[str]) -> None:
+    assert_in_order(fragments, cmg_mj(*wrong_input).complaint)
     assert list(Path().iterdir()) == []
 
 
@@ -145,5 +145,5 @@ def test_more_worlds_than_memory(command: tuple[str, str]) -> None:
 
 
 def test_letters_where_python_takes_the_terminal_for_one_of_ascii() -> None:
-    said = cmg_mj("run", "push_recovery", "--set", os.fsdecode("title='Stoß'".encode()), "--set", "duration_s=x")
-    assert "Stoß" in said.complaint or "duration_s = 'x'" in said.complaint
+    outcome = cmg_mj("run", "push_recovery", "--set", os.fsdecode("title='Stoß'".encode()), "--set", "duration_s=x")
+    assert "Stoß" in outcome.complaint or "duration_s = 'x'" in outcome.complaint

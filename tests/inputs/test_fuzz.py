@@ -246,12 +246,12 @@ def start(name: str) -> None:
     experiment.resolved()
 
 
-def case(said: Said) -> bool:
+def case(outcome: Said) -> bool:
     """Judge what `check` says of a file, and start it if that is valid; whether it is."""
-    if said.status == 0:
+    if outcome.status == 0:
         start("my.toml")
         return True
-    assert said.complaint
+    assert outcome.complaint
     return False
 
 

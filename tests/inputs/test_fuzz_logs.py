@@ -25,43 +25,43 @@ ROLES = {"time": "t_s", "tilt": "tilt_rad", "rate": "gyro_rad_s", "gimbal": "g_d
 def columns(rng: np.random.Generator) -> dict[str, list]:
     n = int(rng.choice([0, 1, 5, 30, 200, 200, 200]))
     t = 0.01 * np.arange(n)
-    found = {name: list(values) for name, values in sine(t).items()}
-    found |= {"g_deg": list(tilt(t)), "u_dps": list(np.cos(t))}
+    signals = {name: list(values) for name, values in sine(t).items()}
+    signals |= {"g_deg": list(tilt(t)), "u_dps": list(np.cos(t))}
     for _ in range(rng.integers(0, 4)):
-        name = str(rng.choice(list(found)))
-        values, kind = found[name], rng.random()
+        name = str(rng.choice(list(signals)))
+        values, kind = signals[name], rng.random()
         if kind < 0.3 and values:
             values[rng.integers(len(values))] = CELLS[rng.integers(len(CELLS))]
         elif kind < 0.4:
-            found[name] = values[::-1]
+            signals[name] = values[::-1]
         elif kind < 0.5:
-            found[name] = [values[0]] * len(values) if values else []
+            signals[name] = [values[0]] * len(values) if values else []
         elif kind < 0.6 and len(values) > 2:
             at, end = sorted(rng.integers(0, len(values), 2))
-            for column in found.values():
+            for column in signals.values():
                 del column[at:end]
         elif kind < 0.7 and len(values) > 2:
             at = int(rng.integers(len(values)))
-            found[name] = values[:at] + [None] * (len(values) - at)
+            signals[name] = values[:at] + [None] * (len(values) - at)
         elif kind < 0.8:
-            found[name] = [v * float(10.0 ** rng.uniform(-300, 300)) if isinstance(v, float) else v for v in values]
+            signals[name] = [v * float(10.0 ** rng.uniform(-300, 300)) if isinstance(v, float) else v for v in values]
         elif kind < 0.9:
-            found[name] = list(rng.permutation(np.array(values, dtype=object)))
+            signals[name] = list(rng.permutation(np.array(values, dtype=object)))
         else:
-            found.pop(name)
-            if not found:
-                found = {"t_s": list(t)}
-    return found
+            signals.pop(name)
+            if not signals:
+                signals = {"t_s": list(t)}
+    return signals
 
 
 def write(rng: np.random.Generator) -> Path:
-    found = columns(rng)
+    signals = columns(rng)
     if rng.random() < 0.3:
-        kept = {n: [v if isinstance(v, float) else None for v in values] for n, values in found.items()}
-        pq.write_table(pa.table(kept), "log.parquet")
+        values_or_none = {n: [v if isinstance(v, float) else None for v in values] for n, values in signals.items()}
+        pq.write_table(pa.table(values_or_none), "log.parquet")
         path = Path("log.parquet")
     else:
-        path = write_csv("log.csv", found, delimiter=str(rng.choice([",", ";", "\t"])))
+        path = write_csv("log.csv", signals, delimiter=str(rng.choice([",", ";", "\t"])))
     if rng.random() < 0.3:
         path.write_bytes(broken(path.read_bytes(), rng))
     return path

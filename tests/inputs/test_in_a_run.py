@@ -23,12 +23,12 @@ from tests.run_folders import FILES, assert_whole, names
     ("a huge push", "[[push]]\nstart_s = 0.1\ntorque_n_m = 1e9", "the plant diverged at t = 0.105 s", "smaller"),
 )
 @pytest.mark.parametrize("command", ["run", "compare"])
-def test_a_plant_that_diverges(command: str, given: str, fragments: list[str]) -> None:
-    Path("my.toml").write_text(f"duration_s = 0.5\n{given}")
+def test_a_plant_that_diverges(command: str, wrong_input: str, fragments: list[str]) -> None:
+    Path("my.toml").write_text(f"duration_s = 0.5\n{wrong_input}")
     options = ["--observers", "linear", "--worlds", "2"] if command == "compare" else ["--json"]
-    said = cmg_mj(command, "my.toml", "--out", "it", *options)
-    assert said.status == 2
-    assert_in_order(["cmg-mj: ", *fragments], said.err.splitlines()[-1])
+    outcome = cmg_mj(command, "my.toml", "--out", "it", *options)
+    assert outcome.status == 2
+    assert_in_order(["cmg-mj: ", *fragments], outcome.err.splitlines()[-1])
     assert (Path("it") / "recording.rrd").exists()
 
 
@@ -42,10 +42,10 @@ class PutsInTheWay(Mine):
 
 
 def test_what_comes_in_the_way_of_a_file(quick: str) -> None:
-    said = cmg_mj("run", quick, "--out", "it", "--json", "--plot", "--observer", f"{__name__}:PutsInTheWay")
-    assert said.status == 0
-    assert said.err.startswith("Written to it/incomplete; what it has held stays as it was. Open")
-    assert said.out.startswith("{")  # the summary is not lost
+    outcome = cmg_mj("run", quick, "--out", "it", "--json", "--plot", "--observer", f"{__name__}:PutsInTheWay")
+    assert outcome.status == 0
+    assert outcome.err.startswith("Written to it/incomplete; what it has held stays as it was. Open")
+    assert outcome.out.startswith("{")  # the summary is not lost
     assert names("it") == ["incomplete", "plot.png"]
     assert names("it/plot.png") == ["mine"]
     assert names("it/incomplete") == sorted([*FILES, "plot.png"])
@@ -66,10 +66,10 @@ def test_a_file_that_cannot_be_written_keeps_no_other_from_being(
         "recording.rrd": (runs, "_record"),
     }[name]
     monkeypatch.setattr(owner, writer, fails if isinstance(owner, ModuleType) else lambda _, path, *more: fails(path))
-    said = cmg_mj("run", quick, "--out", "it", "--json")
-    assert said.status == 2
-    assert said.err == f"cmg-mj: it/{name}: cannot be written: Is a directory\n"
-    assert said.out.startswith("{")  # the summary is not lost
+    outcome = cmg_mj("run", quick, "--out", "it", "--json")
+    assert outcome.status == 2
+    assert outcome.err == f"cmg-mj: it/{name}: cannot be written: Is a directory\n"
+    assert outcome.out.startswith("{")  # the summary is not lost
     assert names("it") == [file for file in FILES if file != name]
 
 
@@ -83,6 +83,6 @@ class Removes(Mine):
 
 
 def test_a_folder_that_disappears_is_made_again(quick: str) -> None:
-    said = cmg_mj("run", quick, "--out", "it", "--observer", f"{__name__}:Removes")
-    assert said.status == 0
+    outcome = cmg_mj("run", quick, "--out", "it", "--observer", f"{__name__}:Removes")
+    assert outcome.status == 0
     assert_whole("it")

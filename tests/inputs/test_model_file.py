@@ -65,8 +65,8 @@ BODY = '<body name="more" pos="1 0 0">{}<inertial pos="0 0 0" mass="1" diaginert
     ("cubes", {"rig": ('<frame name="cube..mount.*?</frame>', "")}, "the model has no joint 'cube1/gimbal'"),
     ("the cube's file", {"rig": ('file="cube.xml"', 'file="cub.xml"')}, "not a model MuJoCo can read: ", "cub.xml"),
 )
-def test_a_model_that_lacks(given: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**given).complaint)
+def test_a_model_that_lacks(wrong_input: dict[str, Any], fragments: list[str]) -> None:
+    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**wrong_input).complaint)
 
 
 @table(
@@ -120,8 +120,8 @@ def test_a_model_that_lacks(given: dict[str, Any], fragments: list[str]) -> None
     ),
     ("no mass", {"cube": ('mass="0.61"', 'mass="0"')}, "does not compile: mass and inertia", "'cube1/flywheel'"),
 )
-def test_a_model_that_has(given: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**given).complaint)
+def test_a_model_that_has(wrong_input: dict[str, Any], fragments: list[str]) -> None:
+    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**wrong_input).complaint)
 
 
 def test_the_unedited_copy_is_a_model() -> None:
@@ -207,8 +207,8 @@ AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
     ),
     ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml is not UTF-8 text (at byte "),
 )
-def test_a_model_that_is_set_wrongly(given: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**given).complaint)
+def test_a_model_that_is_set_wrongly(wrong_input: dict[str, Any], fragments: list[str]) -> None:
+    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**wrong_input).complaint)
 
 
 def test_all_that_is_missing_and_wrong_is_said_at_once() -> None:
@@ -236,11 +236,11 @@ def test_all_that_is_missing_and_wrong_is_said_at_once() -> None:
 
 def test_check_of_a_model_by_itself() -> None:
     edited()
-    said = cmg_mj("check", "rig.xml")
-    assert (said.status, said.err) == (0, "")
+    outcome = cmg_mj("check", "rig.xml")
+    assert (outcome.status, outcome.err) == (0, "")
     for fragment in ("rig.xml: a rig", "cube1, cube2", "J_d = 0.0011 kg m^2", "--set plant.model=rig.xml"):
-        assert fragment in said.out
-    assert "hint" not in said.out
+        assert fragment in outcome.out
+    assert "hint" not in outcome.out
     assert "scissored_pair.xml: a rig" in cmg_mj("check", "scissored_pair.xml").out
     assert "the model has no joint 'tilt', 'cube1/gimbal', 'cube1/flywheel'" in cmg_mj("check", "cube.xml").complaint
 
@@ -275,13 +275,13 @@ def test_a_hint_for_momenta_that_do_not_cancel() -> None:
     ("itself", '<asset><model name="a" file="my.xml"/></asset>', "my.xml: contains itself: my.xml in my.xml"),
     ("itself further in", '<asset><model file="outer.xml"/></asset>', "contains itself: my.xml in outer.xml in my.xml"),
 )
-def test_files_that_never_end(given: str, fragments: list[str]) -> None:
+def test_files_that_never_end(wrong_input: str, fragments: list[str]) -> None:
     Path("meshes").mkdir()
     for pipe in ("pipe", "meshes/pipe"):
         os.mkfifo(pipe)
     Path("inner.xml").write_text('<mujoco><!-- <include file="my.xml"/> --><include file="pipe"/></mujoco>')
     Path("outer.xml").write_text('<mujoco><asset><model file="my.xml"/></asset></mujoco>')
-    Path("my.xml").write_text(f"<mujoco>{given}</mujoco>")
+    Path("my.xml").write_text(f"<mujoco>{wrong_input}</mujoco>")
     assert_in_order(fragments, cmg_mj("check", "my.xml").complaint)
 
 
@@ -295,7 +295,7 @@ def test_files_that_never_end(given: str, fragments: list[str]) -> None:
     ("a huge damper", "gimbal_damping_n_m_s=1e30", "plant.gimbal_damping_n_m_s = 1e+30: "),
 )
 @pytest.mark.parametrize("step", [[], ["--set", "plant.timestep_s=0.005"]])
-def test_settings_that_no_physics_stands(given: str, fragments: list[str], step: list[str]) -> None:
-    said = cmg_mj("run", "push_recovery", "--set", f"plant.{given}", *step)
-    assert_in_order(fragments, said.complaint)
+def test_settings_that_no_physics_stands(wrong_input: str, fragments: list[str], step: list[str]) -> None:
+    outcome = cmg_mj("run", "push_recovery", "--set", f"plant.{wrong_input}", *step)
+    assert_in_order(fragments, outcome.complaint)
     assert not Path("runs").exists()

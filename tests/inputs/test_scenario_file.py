@@ -41,8 +41,8 @@ from tests.inputs.complaints import FROM_0, GRID, OVER_0, RATE, WHOLE, assert_in
     ("a section that is a list", "[[plant]]\nmodel = 'x'", "plant = [{...}]: must be a section, written under [plant]"),
     ("a wrong version", "versions = {mujoco = 4}", "versions.mujoco = 4: must be text in quotes"),
 )
-def test_top_level(given: str, fragments: list[str]) -> None:
-    assert_in_order(["my.toml: ", *fragments], check(given).complaint)
+def test_top_level(wrong_input: str, fragments: list[str]) -> None:
+    assert_in_order(["my.toml: ", *fragments], check(wrong_input).complaint)
 
 
 @table(
@@ -88,8 +88,8 @@ def test_top_level(given: str, fragments: list[str]) -> None:
     ("true for an optional number", "tilt_damping_n_m_s = true", f"plant.tilt_damping_n_m_s = true: {FROM_0}"),
     ("nan without bounds", "flywheel_imbalance_kg_m = nan", "flywheel_imbalance_kg_m = nan: must be a finite number"),
 )
-def test_plant(given: str, fragments: list[str]) -> None:
-    assert_in_order(["my.toml: ", *fragments], check(f"[plant]\n{given}").complaint)
+def test_plant(wrong_input: str, fragments: list[str]) -> None:
+    assert_in_order(["my.toml: ", *fragments], check(f"[plant]\n{wrong_input}").complaint)
 
 
 @table(
@@ -166,12 +166,12 @@ def test_plant(given: str, fragments: list[str]) -> None:
         "'measure': must be one of 'measured', 'estimated'; did you mean 'measured'?",
     ),
 )
-def test_controller(given: str, fragments: list[str]) -> None:
-    assert_in_order(["my.toml: ", *fragments], check(f"[controller]\n{given}").complaint)
+def test_controller(wrong_input: str, fragments: list[str]) -> None:
+    assert_in_order(["my.toml: ", *fragments], check(f"[controller]\n{wrong_input}").complaint)
 
 
 @pytest.mark.parametrize(
-    ("given", "complaint"),
+    ("wrong_input", "complaint"),
     [
         (
             "kind = 'adaptive'\ntorque = true",
@@ -189,16 +189,18 @@ def test_controller(given: str, fragments: list[str]) -> None:
         ("kind = 'homogeneous'\nfriction_n_m = 8.0", "friction_n_m, damping_n_m_s: too much for the sample period"),
     ],
 )
-def test_conditions_of_the_theorems(given: str, complaint: str) -> None:
-    kind = given.split("'")[1]
-    said = check(f"[observer]\n{given}").complaint
-    assert said.startswith(f"my.toml: observer.{complaint}"), said
-    assert said.endswith(f"(observer {kind})"), said
+def test_conditions_of_the_theorems(wrong_input: str, complaint: str) -> None:
+    kind = wrong_input.split("'")[1]
+    message = check(f"[observer]\n{wrong_input}").complaint
+    assert message.startswith(f"my.toml: observer.{complaint}"), message
+    assert message.endswith(f"(observer {kind})"), message
 
 
 def test_trimming_without_a_bias_estimate() -> None:
-    said = check("[controller]\nbias_trim_s = 1.0").complaint
-    assert said.startswith("my.toml: controller.bias_trim_s = 1: needs an observer in the loop that estimates the bias")
+    message = check("[controller]\nbias_trim_s = 1.0").complaint
+    assert message.startswith(
+        "my.toml: controller.bias_trim_s = 1: needs an observer in the loop that estimates the bias"
+    )
 
 
 @table(
@@ -236,8 +238,8 @@ def test_trimming_without_a_bias_estimate() -> None:
     ),
     ("no class", "kind = 'math:sqrt'", "'math:sqrt': must be a class with the methods init(y) and step(state, y, u)"),
 )
-def test_observer(given: str, fragments: list[str]) -> None:
-    assert_in_order(["my.toml: ", *fragments], check(f"[observer]\n{given}").complaint)
+def test_observer(wrong_input: str, fragments: list[str]) -> None:
+    assert_in_order(["my.toml: ", *fragments], check(f"[observer]\n{wrong_input}").complaint)
 
 
 @table(
@@ -327,8 +329,8 @@ def test_observer(given: str, fragments: list[str]) -> None:
         "metrics.settle_band: no such field; did you mean 'settle_band_deg'?",
     ),
 )
-def test_open_loop_observers_sensors_metrics(given: str, fragments: list[str]) -> None:
-    assert_in_order(["my.toml: ", *fragments], check(given).complaint)
+def test_open_loop_observers_sensors_metrics(wrong_input: str, fragments: list[str]) -> None:
+    assert_in_order(["my.toml: ", *fragments], check(wrong_input).complaint)
 
 
 @table(
@@ -356,8 +358,8 @@ def test_open_loop_observers_sensors_metrics(given: str, fragments: list[str]) -
     ("start on no grid", "[[push]]\nstart_s = 1.00001", "push.0.start_s = 1.00001 s: does not fit the other rates"),
     ("infinite", "[[push]]\nstart_s = 1\ntorque_n_m = inf", "push.0.torque_n_m = inf: must be a finite number"),
 )
-def test_pushes(given: str, fragments: list[str]) -> None:
-    assert_in_order(["my.toml: ", *fragments], check(given).complaint)
+def test_pushes(wrong_input: str, fragments: list[str]) -> None:
+    assert_in_order(["my.toml: ", *fragments], check(wrong_input).complaint)
 
 
 @table(
@@ -367,8 +369,8 @@ def test_pushes(given: str, fragments: list[str]) -> None:
     ("a bare word", "title = a", "not valid TOML: ", "(at line 1, column 9)"),
     ("another encoding", "title = 'Stoß'".encode("latin-1"), "not valid TOML: not UTF-8 text (at byte 12)"),
 )
-def test_what_is_no_toml(given: str | bytes, fragments: list[str]) -> None:
-    assert_in_order(["my.toml: ", *fragments], check(given).complaint)
+def test_what_is_no_toml(wrong_input: str | bytes, fragments: list[str]) -> None:
+    assert_in_order(["my.toml: ", *fragments], check(wrong_input).complaint)
 
 
 @table(
@@ -387,8 +389,8 @@ def test_what_is_no_toml(given: str | bytes, fragments: list[str]) -> None:
     ("what cannot be read", "/proc/self/mem", "/proc/self/mem: cannot be read: "),
 )
 @pytest.mark.parametrize("command", ["check", "run", "compare"])
-def test_a_scenario_that_cannot_be_had(command: str, given: str, fragments: list[str]) -> None:
-    assert_in_order(fragments, cmg_mj(command, given).complaint)
+def test_a_scenario_that_cannot_be_had(command: str, wrong_input: str, fragments: list[str]) -> None:
+    assert_in_order(fragments, cmg_mj(command, wrong_input).complaint)
     assert list(Path().iterdir()) == []
 
 

@@ -87,8 +87,8 @@ class Prints(Mine):
         return Estimate(y.y1, rate, y.y2)
 
 
-def kind(of: type) -> str:
-    return f"{__name__}:{of.__name__}"
+def kind(cls: type) -> str:
+    return f"{__name__}:{cls.__name__}"
 
 
 @pytest.mark.parametrize("open_loop_observer", [ChangesTheTilt, ChangesTheCommand])
@@ -107,17 +107,17 @@ def test_an_open_loop_observer_cannot_change_what_others_see(open_loop_observer:
 
 
 def test_in_the_loop_it_is_told(quick: str) -> None:
-    said = cmg_mj("compare", quick, "--observers", kind(ChangesTheTilt), "--worlds", 2)
-    assert said.status == 2
-    assert "read-only" in said.err
+    outcome = cmg_mj("compare", quick, "--observers", kind(ChangesTheTilt), "--worlds", 2)
+    assert outcome.status == 2
+    assert "read-only" in outcome.err
 
 
-@pytest.mark.parametrize("of", [ExitsWhenMade, ExitsAtFirst, ExitsAtTheFirstStep])
+@pytest.mark.parametrize("cls", [ExitsWhenMade, ExitsAtFirst, ExitsAtTheFirstStep])
 @pytest.mark.parametrize("command", ["run", "check"])
-def test_leaving_is_no_success(quick: str, of: type, command: str) -> None:
-    Path(quick).write_text(f"duration_s = 0.3\n[observer]\nkind = '{kind(of)}'")
-    said = cmg_mj(command, quick)
-    assert "SystemExit" in said.complaint
+def test_leaving_is_no_success(quick: str, cls: type, command: str) -> None:
+    Path(quick).write_text(f"duration_s = 0.3\n[observer]\nkind = '{kind(cls)}'")
+    outcome = cmg_mj(command, quick)
+    assert "SystemExit" in outcome.complaint
 
 
 def test_leaving_while_imported_is_no_success(quick: str) -> None:
@@ -126,9 +126,9 @@ def test_leaving_while_imported_is_no_success(quick: str) -> None:
 
 
 def test_an_exception_without_words(quick: str) -> None:
-    said = cmg_mj("run", quick, "--observer", kind(RaisesUnspeakably))
-    assert said.status == 2
-    assert "raised Unspeakable: its message cannot be shown at t = " in said.err
+    outcome = cmg_mj("run", quick, "--observer", kind(RaisesUnspeakably))
+    assert outcome.status == 2
+    assert "raised Unspeakable: its message cannot be shown at t = " in outcome.err
     assert raised(ValueError()) == "ValueError"
 
 
@@ -137,12 +137,12 @@ def test_a_generator_is_no_estimate(quick: str) -> None:
     assert "step(state, y, u) must return (state, (x1, x2, x3))" in complaint
 
 
-@pytest.mark.parametrize("of", [TurnsComplex, TurnsNumpyComplex])
-def test_complex_numbers_stop_a_run_and_what_was_recorded_is_kept(quick: str, of: type) -> None:
-    said = cmg_mj("run", quick, "--observer", kind(of))
-    assert said.status == 2
-    assert "complex128, not real numbers" in said.err
-    assert json.loads(Path(f"runs/quick-{of.__name__}-0/summary.json").read_text())["outcome"] == "stopped"
+@pytest.mark.parametrize("cls", [TurnsComplex, TurnsNumpyComplex])
+def test_complex_numbers_stop_a_run_and_what_was_recorded_is_kept(quick: str, cls: type) -> None:
+    outcome = cmg_mj("run", quick, "--observer", kind(cls))
+    assert outcome.status == 2
+    assert "complex128, not real numbers" in outcome.err
+    assert json.loads(Path(f"runs/quick-{cls.__name__}-0/summary.json").read_text())["outcome"] == "stopped"
 
 
 def test_complex_numbers_in_many_worlds() -> None:
@@ -156,9 +156,9 @@ def test_complex_numbers_in_many_worlds() -> None:
 
 
 def test_what_it_prints_is_no_output_of_the_command(quick: str) -> None:
-    said = cmg_mj("run", quick, "--observer", kind(Prints), "--json")
-    assert json.loads(said.out)["observer"] == kind(Prints)
-    assert {"made", "step"} <= set(said.err.split())
+    outcome = cmg_mj("run", quick, "--observer", kind(Prints), "--json")
+    assert json.loads(outcome.out)["observer"] == kind(Prints)
+    assert {"made", "step"} <= set(outcome.err.split())
     Path("mine.toml").write_text(f"duration_s = 0.3\n[observer]\nkind = '{kind(Prints)}'")
     checked = cmg_mj("check", "mine.toml")
     assert "made" not in checked.out

@@ -196,15 +196,15 @@ def set_to(law: type) -> list[str]:
     ("trimmed", TrimsNothing, "has a trim_gain, so its state must be a NamedTuple with x_e, not "),
 )
 @pytest.mark.parametrize("command", ["run", "compare", "check"])
-def test_a_law_that_cannot_work(given: type, fragments: list[str], command: str) -> None:
+def test_a_law_that_cannot_work(wrong_input: type, fragments: list[str], command: str) -> None:
     """It is found before the run, so that not even a folder is made."""
     if command == "check":
-        Path("mine.toml").write_text(f"[controller]\nkind = '{named(given)}'")
-        said = cmg_mj("check", "mine.toml")
+        Path("mine.toml").write_text(f"[controller]\nkind = '{named(wrong_input)}'")
+        outcome = cmg_mj("check", "mine.toml")
         Path("mine.toml").unlink()
     else:
-        said = cmg_mj(command, "push_recovery", *set_to(given))
-    assert_in_order(fragments, said.complaint)
+        outcome = cmg_mj(command, "push_recovery", *set_to(wrong_input))
+    assert_in_order(fragments, outcome.complaint)
     assert list(Path().iterdir()) == []
 
 
@@ -268,9 +268,11 @@ def test_a_law_that_cannot_work(given: type, fragments: list[str], command: str)
         "controller.bias_trim_s = 1: Lqg has no integrator to be trimmed; leave it out",
     ),
 )
-def test_fields_that_do_not_fit_the_law(given: list[str], fragments: list[str]) -> None:
-    said = cmg_mj("run", "push_recovery", *(part for each in given for part in ("--set", f"controller.{each}")))
-    assert_in_order(["push_recovery with ", *fragments], said.complaint)
+def test_fields_that_do_not_fit_the_law(wrong_input: list[str], fragments: list[str]) -> None:
+    outcome = cmg_mj(
+        "run", "push_recovery", *(part for setting in wrong_input for part in ("--set", f"controller.{setting}"))
+    )
+    assert_in_order(["push_recovery with ", *fragments], outcome.complaint)
     assert list(Path().iterdir()) == []
 
 
@@ -294,10 +296,10 @@ def test_gains_reach_a_law_of_ones_own_that_takes_them() -> None:
         "step(state, y, x, u) raised ValueError: output array is read-only; many worlds",
     ),
 )
-def test_a_law_for_one_world_among_many(quick: str, given: type, fragments: list[str]) -> None:
-    assert cmg_mj("run", quick, *set_to(given)).status == 0
-    said = cmg_mj("compare", quick, *set_to(given), "--out", "compared")
-    assert_in_order([f"controller.kind = '{named(given)}': ", *fragments], said.complaint)
+def test_a_law_for_one_world_among_many(quick: str, wrong_input: type, fragments: list[str]) -> None:
+    assert cmg_mj("run", quick, *set_to(wrong_input)).status == 0
+    outcome = cmg_mj("compare", quick, *set_to(wrong_input), "--out", "compared")
+    assert_in_order([f"controller.kind = '{named(wrong_input)}': ", *fragments], outcome.complaint)
     assert not Path("compared").exists()
 
 
@@ -316,12 +318,12 @@ def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
     ("text", ReturnsTextLater, "law ReturnsTextLater raised TypeError: the law returned <U3 of shape (), not a real "),
 )
 @pytest.mark.parametrize("driver", ["native", "callback"])
-def test_a_law_that_fails_in_a_run(given: type, fragments: list[str], driver: str) -> None:
+def test_a_law_that_fails_in_a_run(wrong_input: type, fragments: list[str], driver: str) -> None:
     """What was recorded until then is kept."""
-    said = cmg_mj("run", "push_recovery", *set_to(given), "--driver", driver, "--out", "it")
-    assert said.status == 2
-    assert "stopped at 0.15 s" in said.out
-    written, complaint = said.err.splitlines()
+    outcome = cmg_mj("run", "push_recovery", *set_to(wrong_input), "--driver", driver, "--out", "it")
+    assert outcome.status == 2
+    assert "stopped at 0.15 s" in outcome.out
+    written, complaint = outcome.err.splitlines()
     assert written.startswith("Written to it. ")
     assert_in_order(["cmg-mj: ", *fragments, "what was recorded until then is in it"], complaint)
     assert len(assert_whole("it")) == 30

@@ -144,22 +144,22 @@ RETURN = "step(state, y, u) must return"
     ("a signal too few", OwesASignal, f"{RETURN} (state, (x1, x2, x3, bias_rad)), not (state, "),
 )
 @pytest.mark.parametrize("place", ["in the loop", "riding along", "compared"])
-def test_an_observer_that_cannot_work(given: type, fragments: list[str], place: str) -> None:
+def test_an_observer_that_cannot_work(wrong_input: type, fragments: list[str], place: str) -> None:
     """It is found before the run, so that not even a folder is made."""
-    kind = f"{__name__}:{given.__name__}"
+    kind = f"{__name__}:{wrong_input.__name__}"
     if place == "compared":
-        said = cmg_mj("compare", "push_recovery", "--observers", f"linear,{kind}", "--worlds", 1)
+        outcome = cmg_mj("compare", "push_recovery", "--observers", f"linear,{kind}", "--worlds", 1)
     elif place == "in the loop":
-        said = cmg_mj("run", "push_recovery", "--observer", kind)
+        outcome = cmg_mj("run", "push_recovery", "--observer", kind)
     else:
-        said = cmg_mj("run", "push_recovery", "--set", f"open_loop_observers=['{kind}']")
+        outcome = cmg_mj("run", "push_recovery", "--set", f"open_loop_observers=['{kind}']")
         assert (
             "FailsWhenMade" in kind
             or "TakesNo" in kind
             or "NamesNo" in kind
-            or "open_loop_observers: 'tests.inputs.test_users_observer:" in said.complaint
+            or "open_loop_observers: 'tests.inputs.test_users_observer:" in outcome.complaint
         )
-    assert_in_order(["push_recovery", *fragments], said.complaint)
+    assert_in_order(["push_recovery", *fragments], outcome.complaint)
     assert list(Path().iterdir()) == []
 
 
@@ -167,11 +167,11 @@ def test_an_observer_that_cannot_work(given: type, fragments: list[str], place: 
     ("a function for floats", ForOneWorld, "step(state, y, u) raised TypeError: only", "use operators and cmg_mj.elem"),
     ("a number for all", ForgetsWorlds, f"{RETURN} an array of 2 numbers for x2, not 0.0; many worlds come at once"),
 )
-def test_an_observer_for_one_world_among_many(quick: str, given: type, fragments: list[str]) -> None:
-    kind = f"{__name__}:{given.__name__}"
+def test_an_observer_for_one_world_among_many(quick: str, wrong_input: type, fragments: list[str]) -> None:
+    kind = f"{__name__}:{wrong_input.__name__}"
     assert cmg_mj("run", quick, "--observer", kind).status == 0
-    said = cmg_mj("compare", quick, "--observers", kind, "--out", "compared")
-    assert_in_order([f"observer.kind = '{kind}': ", *fragments], said.complaint)
+    outcome = cmg_mj("compare", quick, "--observers", kind, "--out", "compared")
+    assert_in_order([f"observer.kind = '{kind}': ", *fragments], outcome.complaint)
     assert not Path("compared").exists()
 
 
@@ -181,13 +181,13 @@ def test_an_observer_for_one_world_among_many(quick: str, given: type, fragments
     ("infinity", GivesInfinity, "observer GivesInfinity returned ", "inf", " at t = 0.15 s; "),
 )
 @pytest.mark.parametrize("driver", ["native", "callback"])
-def test_an_observer_that_fails_in_a_run(given: type, fragments: list[str], driver: str) -> None:
+def test_an_observer_that_fails_in_a_run(wrong_input: type, fragments: list[str], driver: str) -> None:
     """What was recorded until then is kept."""
-    kind = f"{__name__}:{given.__name__}"
-    said = cmg_mj("run", "push_recovery", "--observer", kind, "--driver", driver, "--out", "it")
-    assert said.status == 2
-    assert "stopped at 0.15 s" in said.out
-    written, complaint = said.err.splitlines()
+    kind = f"{__name__}:{wrong_input.__name__}"
+    outcome = cmg_mj("run", "push_recovery", "--observer", kind, "--driver", driver, "--out", "it")
+    assert outcome.status == 2
+    assert "stopped at 0.15 s" in outcome.out
+    written, complaint = outcome.err.splitlines()
     assert written.startswith("Written to it. ")
     assert_in_order(["cmg-mj: ", *fragments, "what was recorded until then is in it"], complaint)
     assert len(assert_whole("it")) == 30
@@ -196,20 +196,20 @@ def test_an_observer_that_fails_in_a_run(given: type, fragments: list[str], driv
 def test_an_observer_that_fails_among_others(quick: str) -> None:
     """The others are run, all is written, and the exit status tells."""
     kind = f"{__name__}:GivesNan"
-    said = cmg_mj("compare", quick, "--observers", f"{kind},linear", "--worlds", 2)
-    assert said.status == 2
-    assert re.search(r"linear .* 0%\s+0%", said.out)
-    assert re.search(r"GivesNan .* 0%\s+100%", said.out)
-    complaint = said.err.splitlines()[1]
+    outcome = cmg_mj("compare", quick, "--observers", f"{kind},linear", "--worlds", 2)
+    assert outcome.status == 2
+    assert re.search(r"linear .* 0%\s+0%", outcome.out)
+    assert re.search(r"GivesNan .* 0%\s+100%", outcome.out)
+    complaint = outcome.err.splitlines()[1]
     assert complaint.startswith(f"cmg-mj: {kind}: 2 of 2 worlds stopped: ")
     assert Path("runs/quick-compare-0/trajectory-linear.parquet").exists()
 
 
 def test_an_open_loop_observer_that_gives_nan_harms_nobody(quick: str) -> None:
     kind = f"{__name__}:GivesNan"
-    said = cmg_mj("run", quick, "--set", f"open_loop_observers=['{kind}']")
-    assert said.status == 0
-    assert re.search(rf"{kind}\s+-\s+-", said.out)
+    outcome = cmg_mj("run", quick, "--set", f"open_loop_observers=['{kind}']")
+    assert outcome.status == 0
+    assert re.search(rf"{kind}\s+-\s+-", outcome.out)
 
 
 def test_an_observer_that_changes_its_own_arrays_is_judged_as_in_one_world(quick: str) -> None:

@@ -58,15 +58,15 @@ def accelerated(noise: TiltNoise, runs: int, ticks: int, seed: int) -> tuple[np.
     return tilt + noise.tilt * (r * n + math.sqrt(1.0 - r * r) * other), a + noise.acceleration * n, rate
 
 
-def squared_errors(told: TiltNoise) -> np.ndarray:
+def squared_errors(noise: TiltNoise) -> np.ndarray:
     """Mean square, once settled, of a filter that is told some noise, on any motion and NOISE, (runs,)."""
     known = {"rate_start": 1.0, "bias_start": 1e-9, "bias_walk": 0.0, "jerk": 0.0}
-    of = make_observer("gyro_free", DT, PAPER, told, **known)
+    estimator = make_observer("gyro_free", DT, PAPER, noise, **known)
     y1, a, rate = accelerated(NOISE, 800, 1500, seed=4)
     zero = 0.0 * y1[0]
-    state, errors = of.init(Measurement(y1[0], zero, a[0])), []
+    state, errors = estimator.init(Measurement(y1[0], zero, a[0])), []
     for k in range(1, len(y1)):
-        state, estimate = of.step(state, Measurement(y1[k], zero, a[k]), zero)
+        state, estimate = estimator.step(state, Measurement(y1[k], zero, a[k]), zero)
         errors.append(estimate.x2 - rate[k])
     return np.square(errors[500:]).mean(axis=0)
 
@@ -82,10 +82,10 @@ def test_the_matched_filter_reaches_the_floor_with_acceleration() -> None:
 
 
 @pytest.mark.parametrize(
-    "told", [TiltNoise(NOISE.tilt, NOISE.acceleration, 0.0), TiltNoise(NOISE.tilt, 2.0 * NOISE.acceleration, 0.89)]
+    "noise", [TiltNoise(NOISE.tilt, NOISE.acceleration, 0.0), TiltNoise(NOISE.tilt, 2.0 * NOISE.acceleration, 0.89)]
 )
-def test_another_filter_does_not(told: TiltNoise) -> None:
-    worse = squared_errors(told) - squared_errors(NOISE)
+def test_another_filter_does_not(noise: TiltNoise) -> None:
+    worse = squared_errors(noise) - squared_errors(NOISE)
     assert worse.mean() > 4.0 * standard_error(worse)
 
 
@@ -113,11 +113,11 @@ def test_floor_of_y1_is_the_least_squares_fit() -> None:
         floor.add(*(signal[k : k + 256] for signal in (y1, x2, counted, pushed)))
     seen = inputs(y1, floor.edges)
     for world in range(2):
-        for found, mask in zip(floor.errors(world), (counted, pushed), strict=True):
+        for result, mask in zip(floor.errors(world), (counted, pushed), strict=True):
             rows = mask[:, world]
             taps = np.linalg.lstsq(seen[rows, world], x2[rows, world], rcond=None)[0]
             left = seen[rows, world] @ taps - x2[rows, world]
-            assert found == pytest.approx(math.sqrt(np.mean(left**2)), rel=1e-6)
+            assert result == pytest.approx(math.sqrt(np.mean(left**2)), rel=1e-6)
 
 
 def floors_of(y1: np.ndarray, rate: np.ndarray) -> np.ndarray:
@@ -150,8 +150,8 @@ def swinging(runs: int, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
 def test_the_matched_filter_reaches_the_floor_of_y1() -> None:
     """Of a linear system with white noise no filter is better than Kalman's, and the fit comes to within a per cent."""
     y1, rate, best = swinging(40, seed=6)
-    found = math.sqrt(np.mean(floors_of(y1, rate) ** 2))
-    assert 0.98 * best < found < 1.01 * best < 0.6 * rate.std()
+    result = math.sqrt(np.mean(floors_of(y1, rate) ** 2))
+    assert 0.98 * best < result < 1.01 * best < 0.6 * rate.std()
 
 
 def test_no_differentiator_is_below_the_floor_of_y1() -> None:
@@ -160,10 +160,10 @@ def test_no_differentiator_is_below_the_floor_of_y1() -> None:
     least, zero = floors_of(y1, rate), 0.0 * y1[0]
     for kind, name in (("linear", "tau"), ("linear_high_gain", "epsilon")):
         for value in np.geomspace(0.01, 0.08, 4):
-            of = make_observer(kind, DT, PAPER, NOISE, **{name: float(value)})
-            state, squares = of.init(Measurement(y1[0], zero)), [rate[0] ** 2]
+            estimator = make_observer(kind, DT, PAPER, NOISE, **{name: float(value)})
+            state, squares = estimator.init(Measurement(y1[0], zero)), [rate[0] ** 2]
             for k in range(1, len(y1)):
-                state, estimate = of.step(state, Measurement(y1[k], zero), zero)
+                state, estimate = estimator.step(state, Measurement(y1[k], zero), zero)
                 squares.append((estimate.x2 - rate[k]) ** 2)
             assert (np.sqrt(np.mean(squares, axis=0)) > least).all(), (kind, value)
 

@@ -29,8 +29,8 @@ TIMES = 10_000
 
 def share_that_holds(mean: float, samples: np.ndarray) -> float:
     """Of the samples, (n_samples, n_worlds), how many have the mean in their interval."""
-    found = [known_interval(values) for values in samples]
-    return float(np.mean([interval is not None and interval.low <= mean <= interval.high for interval in found]))
+    result = [known_interval(values) for values in samples]
+    return float(np.mean([interval is not None and interval.low <= mean <= interval.high for interval in result]))
 
 
 @pytest.mark.parametrize("kind", ["normal", "uniform", "chi-squared", "with falls"])

@@ -41,15 +41,15 @@ ERROR = "velocity_rms_error_rad_s"
 
 
 def test_worlds_vary_and_those_that_fell_do_not_count() -> None:
-    found = result()
-    assert found.stood.tolist() == [True, True, False, False]
-    assert found.fell.tolist() == [False, False, True, True]
-    values = found.values(ERROR)
+    actual = result()
+    assert actual.stood.tolist() == [True, True, False, False]
+    assert actual.fell.tolist() == [False, False, True, True]
+    values = actual.values(ERROR)
     assert np.isnan(values).tolist() == [False, False, True, True]
-    assert values[0] == found.summaries[0][ERROR]
-    assert found.mean(ERROR) == pytest.approx((values[0] + values[1]) / 2.0)
-    open_loop_observer = found.values(ERROR, "linear")
-    assert open_loop_observer[1] == open_loop_figures(found.summaries[1])["linear"][ERROR]
+    assert values[0] == actual.summaries[0][ERROR]
+    assert actual.mean(ERROR) == pytest.approx((values[0] + values[1]) / 2.0)
+    open_loop_observer = actual.values(ERROR, "linear")
+    assert open_loop_observer[1] == open_loop_figures(actual.summaries[1])["linear"][ERROR]
 
 
 def test_the_table_has_a_row_per_observer_and_world() -> None:
@@ -105,7 +105,7 @@ def test_varied_rigs_are_those_of_their_own_scenarios() -> None:
 
 
 def test_equal_settings_share_one_rig() -> None:
-    rigs = [each.plant for each in experiment().with_varied({"equilibrium_bias_deg": BIASES})]
+    rigs = [setup.plant for setup in experiment().with_varied({"equilibrium_bias_deg": BIASES})]
     assert rigs[0] is rigs[1]
     assert rigs[2] is rigs[3] is not rigs[0]
 

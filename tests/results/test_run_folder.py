@@ -66,8 +66,8 @@ def test_a_users_files_survive_every_command(either_way: str, with_folders: bool
     os.symlink("nowhere", "it/dangling")
     inode = Path("it/notes.txt").stat().st_ino
     for command in (["run"], ["compare", "--observers", "linear,ltv", "--worlds", "1"], ["run", "--observer", "ltv"]):
-        said = cmg_mj(command[0], quick(), *command[1:], "--out", "it")
-        assert said.status == 0, said
+        outcome = cmg_mj(command[0], quick(), *command[1:], "--out", "it")
+        assert outcome.status == 0, outcome
         assert mine.items() <= {name: (Path("it") / name).read_text() for name in mine}.items()
         assert os.readlink("it/dangling") == "nowhere"
     assert Path("it/notes.txt").stat().st_ino == inode
@@ -81,8 +81,8 @@ def test_a_users_file_is_not_written_over(name: str, monkeypatch: pytest.MonkeyP
     """It is found before anything is run."""
     monkeypatch.setattr("cmg_mj.simulation.experiment.simulate", pytest.fail)
     write("mine", f"it/{name}")
-    said = cmg_mj("run", quick(), "--plot", "--out", "it")
-    assert said.complaint == (
+    outcome = cmg_mj("run", quick(), "--plot", "--out", "it")
+    assert outcome.complaint == (
         f"--out it: {name} there is not as cmg-mj wrote it, and would be lost: move it, or name another folder"
     )
     assert everything("it") == [name]

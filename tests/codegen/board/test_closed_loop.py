@@ -65,8 +65,8 @@ DOUBLE = re.compile(
 
 
 def in_double_precision(image: Path) -> list[str]:
-    told = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
-    names = [line.split()[-1] for line in told.splitlines()]
+    listing = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
+    names = [line.split()[-1] for line in listing.splitlines()]
     assert "main" in names
     return [name for name in names if DOUBLE.fullmatch(name)]
 
@@ -93,7 +93,7 @@ def test_lockstep_on_the_same_inputs(observer: str) -> None:
         board = Board(image)
     with board:
         board.start()
-        decided = [board.update(*shown) for shown in host.shown]
+        decided = [board.update(*reading) for reading in host.shown]
     for signal in (lambda decision: decision.estimate[1], lambda decision: decision.x_e):
         ours, its = (np.array([signal(decision) for decision in those]) for those in (host.decided, decided))
         assert np.sqrt(np.mean((its - ours) ** 2)) < 1e-5
@@ -173,10 +173,10 @@ def test_what_is_would_be_seen(tmp_path: Path, update: str) -> None:
 @pytest.mark.slow
 def test_the_commands(tmp_path: Path) -> None:
     out = tmp_path / "on_board"
-    said = cmg_mj(*f"run push_recovery --driver board --observer gyro_free --json --out {out}".split(), *sets(SHORT))
-    assert (said.status, said.err) == (0, "")
-    assert json.loads(said.out) == json.loads((out / "summary.json").read_text())
-    assert json.loads(said.out)["outcome"] == "done"
+    outcome = cmg_mj(*f"run push_recovery --driver board --observer gyro_free --json --out {out}".split(), *sets(SHORT))
+    assert (outcome.status, outcome.err) == (0, "")
+    assert json.loads(outcome.out) == json.loads((out / "summary.json").read_text())
+    assert json.loads(outcome.out)["outcome"] == "done"
     assert cmg_mj("bench", "loop", "--markdown").complaint.startswith("No such option")
 
 
@@ -199,9 +199,9 @@ def test_a_run_on_the_board_says_so_and_reruns_to_the_same_numbers() -> None:
     assert summaries[0] == summaries[1] != summaries[2] == summaries[3]
     assert (ran / "scenario.toml").read_text() == Path("again/scenario.toml").read_text()
     assert tomllib.loads(file.read_text()) == tomllib.loads(Path("on_host/scenario.toml").read_text())
-    told = ["board", "board", None, None]
-    assert [json.loads(summary).get("driver") for summary in summaries] == told
-    assert [Trajectory.load(folder / "trajectory.parquet").metadata.get("driver") for folder in folders] == told
+    drivers = ["board", "board", None, None]
+    assert [json.loads(summary).get("driver") for summary in summaries] == drivers
+    assert [Trajectory.load(folder / "trajectory.parquet").metadata.get("driver") for folder in folders] == drivers
     cmg_mj("run", "push_recovery", "--driver", "board", *sets(SHORT))
     assert len(list(Path("runs").iterdir())) == 2  # the same run again goes to the same folder
 
@@ -228,13 +228,13 @@ class Presses:
 def test_ctrl_c_ends_the_board_too() -> None:
     Path("pressing.py").write_text(OPEN_LOOP_OBSERVER)
     others = children()
-    said = cmg_mj(
+    outcome = cmg_mj(
         *["run", "push_recovery", "--driver", "board", "--out", "here"],
         "--set",
         "open_loop_observers=['pressing:Presses']",
     )
-    assert said.status == 130
-    assert said.err.endswith("cmg-mj: interrupted at 0.095 s; what was recorded until then is in here\n")
+    assert outcome.status == 130
+    assert outcome.err.endswith("cmg-mj: interrupted at 0.095 s; what was recorded until then is in here\n")
     assert json.loads(Path("here/summary.json").read_text())["outcome"] == "interrupted"
     assert children() == others
 

@@ -103,7 +103,7 @@ def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("update", "said"),
+    ("update", "message"),
     [
         pytest.param("for (;;) {}", "the board has not answered for 3 s", marks=pytest.mark.slow),
         ("__builtin_trap();", "the board is gone: its processor met a fault"),
@@ -114,11 +114,11 @@ def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_goes_wrong_on_it_is_said(tmp_path: Path, update: str, said: str) -> None:
+def test_what_goes_wrong_on_it_is_said(tmp_path: Path, update: str, message: str) -> None:
     image = toy(tmp_path, update=f"if (e[0] == 1) {{ {update} }}")
-    with Board(image, patience_s=3.0 if "not answered" in said else 30.0) as board:
+    with Board(image, patience_s=3.0 if "not answered" in message else 30.0) as board:
         assert board.update(SHOWN, (0.0, 0.0)).u == 100.0
-        with pytest.raises(RunStopped, match=f"^{said}$"):
+        with pytest.raises(RunStopped, match=f"^{message}$"):
             board.update(SHOWN, (1.0, 0.0))
         process = board.process_id
     assert not is_running(process)

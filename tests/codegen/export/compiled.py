@@ -47,10 +47,10 @@ class Compiled:
 
     def __init__(self, kind: str, precision: Any, folder: Path, *settings: str) -> None:
         self.type = TYPES[precision]
-        of = controller(kind, *settings)
-        files = export(of, folder, precision=precision)
+        loop = controller(kind, *settings)
+        files = export(loop, folder, precision=precision)
         self.name = files[0].stem
-        self.width = 3 + len(of.extra_signals[0])
+        self.width = 3 + len(loop.extra_signals[0])
         self.header, self.source, self.example, _ = files
         read_by_every_compiler(self.source, self.example)
         self.library = folder / "export.so"
@@ -69,11 +69,11 @@ class Compiled:
             self._call("update", controller, sample[:4], sample[4:], result, result[-1:])
         return results.astype(float)
 
-    def step(self, state: np.ndarray, *given: float) -> tuple[np.ndarray, np.ndarray]:
+    def step(self, state: np.ndarray, *arguments: float) -> tuple[np.ndarray, np.ndarray]:
         """One step of the observer alone: the state and the estimate."""
         state, estimate = state.astype(self.type), np.full(self.width, np.nan, self.type)
         number = ctypes.c_double if self.type is np.float64 else ctypes.c_float
-        self._call("step", state, *map(number, given), estimate)
+        self._call("step", state, *map(number, arguments), estimate)
         return state.astype(float), estimate.astype(float)
 
     def _call(self, function: str, *arguments: Any) -> None:

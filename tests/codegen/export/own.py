@@ -63,8 +63,8 @@ class Elaborate(Plain):
         fast = (abs(x2) > 0.2) | (state.samples < 3)
         size = where(fast, sqrt(1.0 + x2 * x2), exp(-abs(x2)))
         trace = 0.9 * part.other[1] + sin(size) * sign(jump) + 1e-3 * y.acceleration + state.moving * 0.01
-        made = Restless(state.samples + 1, fast, {"π": Part(x1, [x2, trace])}, y, jump + u)
-        return made, (x1, x2 + 1e-3 * trace, y.y2, state.double, trace / (state.samples + 1), size)
+        result = Restless(state.samples + 1, fast, {"π": Part(x1, [x2, trace])}, y, jump + u)
+        return result, (x1, x2 + 1e-3 * trace, y.y2, state.double, trace / (state.samples + 1), size)
 
 
 class Matrix(Plain):

@@ -80,11 +80,11 @@ def test_what_single_precision_cannot_follow(tmp_path: Path) -> None:
     loop = recorded(SWITCHING)
     compiled = Compiled(SWITCHING, "single", tmp_path)
     off = rms(compiled.run(loop.samples)[:, 1] - loop.results[:, 1])
-    own = controller(SWITCHING)
-    rounded = [own.tilt(*forces) for forces in loop.samples[:, :4].astype(np.float32).astype(float).tolist()]
-    states, estimates = [own.observer.init(Measurement(rounded[0], 0.0))], [0.0]
+    switching = controller(SWITCHING)
+    rounded = [switching.tilt(*forces) for forces in loop.samples[:, :4].astype(np.float32).astype(float).tolist()]
+    states, estimates = [switching.observer.init(Measurement(rounded[0], 0.0))], [0.0]
     for y1 in rounded[1:]:
-        state, estimate = own.observer.step(states[-1], Measurement(y1, 0.0), 0.0)
+        state, estimate = switching.observer.step(states[-1], Measurement(y1, 0.0), 0.0)
         states.append(state)
         estimates.append(estimate[1])
     assert rms(np.array(estimates) - loop.results[:, 1]) > 0.1 * off > 1e-4

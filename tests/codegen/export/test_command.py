@@ -31,10 +31,10 @@ def written(folder: str) -> list[str]:
 
 @needs_compiler
 def test_what_the_readme_of_an_export_says() -> None:
-    said = cmg_mj("export", "linear", "--out", "board")
-    assert said.status == 0
-    assert "linear, double precision" in said.out
-    assert said.out.count("0 (bit for bit)") == 5
+    outcome = cmg_mj("export", "linear", "--out", "board")
+    assert outcome.status == 0
+    assert "linear, double precision" in outcome.out
+    assert outcome.out.count("0 (bit for bit)") == 5
     assert written("board") == FILES
     compile_c("board/linear.c", "board/linear_example.c", "-lm", "-o", "example")
     subprocess.run(["./example"], check=True, capture_output=True)
@@ -42,8 +42,8 @@ def test_what_the_readme_of_an_export_says() -> None:
 
 @pytest.mark.slow
 def test_json_and_the_folder_it_takes_by_itself() -> None:
-    said = cmg_mj("export", "linear", "--precision", "single", "--json", "--set", "observer.tau=0.03")
-    figures = json.loads(said.out)
+    outcome = cmg_mj("export", "linear", "--precision", "single", "--json", "--set", "observer.tau=0.03")
+    figures = json.loads(outcome.out)
     assert (figures["observer"], figures["precision"], figures["trace_off_by"]) == ("linear", "single", 0.0)
     assert sorted(figures["files"]) == written("runs/export-linear-single") == FILES
     assert "tau = 0.03  Time constant [s]" in Path("runs/export-linear-single/linear.h").read_text()
@@ -188,10 +188,10 @@ def test_a_compiler_that_is_none(cc: str, words: str, monkeypatch: pytest.Monkey
 def test_without_a_compiler_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr("shutil.which", lambda name: None)
-    said = cmg_mj("export", "linear", "--out", "board")
-    assert said.status == 0
-    assert "no C compiler was found" in said.err
-    assert "C, off from Python" not in said.out
+    outcome = cmg_mj("export", "linear", "--out", "board")
+    assert outcome.status == 0
+    assert "no C compiler was found" in outcome.err
+    assert "C, off from Python" not in outcome.out
     assert written("board") == FILES
 
 

@@ -45,8 +45,8 @@ def test_what_is_nearly_zero_or_very_large_stays_so() -> None:
     assert [float(literal(x, "single")[:-1]) for x in (1e-200, -1e-300, 1e300)] == pytest.approx([tiny, -tiny, largest])
     assert np.float32(literal(1e-200, "single")[:-1]) > 0.0
     assert [literal(x, "single") for x in (math.inf, -math.inf, math.nan)] == ["INFINITY", "-INFINITY", "NAN"]
-    shown = ["(double)INFINITY", "-(double)INFINITY", "(double)NAN"]
-    assert [literal(x, "double") for x in (math.inf, -math.inf, math.nan)] == shown
+    literals = ["(double)INFINITY", "-(double)INFINITY", "(double)NAN"]
+    assert [literal(x, "double") for x in (math.inf, -math.inf, math.nan)] == literals
 
 
 @needs_compiler

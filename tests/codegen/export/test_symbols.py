@@ -68,8 +68,8 @@ def test_casadi_is_left_as_it_was(name: str) -> None:
 
 def test_a_state_is_taken_apart_and_put_together() -> None:
     state = own.Elaborate(0.005, None).init(Measurement(0.1, 0.2, 0.3))
-    found = list(numbers(state))
-    assert [leaf.value for leaf in found] == [0, False, 0.1, 0.0, 0.0, 0.1, 0.2, 0.3, 0.0]
+    result = list(numbers(state))
+    assert [leaf.value for leaf in result] == [0, False, 0.1, 0.0, 0.0, 0.1, 0.2, 0.3, 0.0]
     again = rebuild(state, iter(range(9)))
     assert form(again) == form(state)
     assert (again.last.acceleration, again.parts["π"].other, again.label) == (7, [3, 4], "a constant")
@@ -116,10 +116,10 @@ def test_a_name_that_c_cannot_spell_is_asked_for(name: str) -> None:
     assert name_of(observer, "mine_2") == "mine_2"
 
 
-@pytest.mark.parametrize("asked", ["", "2x", "a b", "größe", "../x", "x" * 41, "_x", "double", "main", "Math", "x\n"])
-def test_a_name_asked_for_is_one_of_c(asked: str) -> None:
+@pytest.mark.parametrize("name", ["", "2x", "a b", "größe", "../x", "x" * 41, "_x", "double", "main", "Math", "x\n"])
+def test_a_name_asked_for_is_one_of_c(name: str) -> None:
     with pytest.raises(InputError, match=r"^--name "):
-        name_of(own.Plain(0.005, None), asked)
+        name_of(own.Plain(0.005, None), name)
 
 
 def test_a_symbol_has_no_value() -> None:
