@@ -8,7 +8,7 @@ from cmg_mj.studies.tuning import tune, tuned_scenario
 scenario = cmg_mj.load_scenario("observer_tuning", ["open_loop_observers=[]"], observer="linear")
 study = tune(scenario, worlds=5, parameters=["tau"], noise_ug_rthz=[400.0])
 (level,) = study.levels
-print(f"tau: {study.given['tau']} s given, {level.sizes['tau']:.4f} s tuned")
+print(f"tau: {study.start_parameters['tau']} s given, {level.sizes['tau']:.4f} s tuned")
 ratio = level.ratio
 print(f"held-out error, given by tuned: {ratio.mean:.3f} ({ratio.low:.3f} to {ratio.high:.3f}): {level.verdict}")
 

@@ -304,7 +304,7 @@ def test_a_law_for_one_world_among_many(quick: str, wrong_input: type, fragments
 
 
 def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
-    """A batch that was not rehearsed on arrays stops, rather than go on with an estimate that nobody made."""
+    """A batch that had no dry run on arrays stops, rather than go on with an estimate that nobody made."""
     settings = ["push=[]", "duration_s=0.1", f"controller.kind={named(ChangesWhatItIsGiven)}"]
     result = prepare(load_scenario("push_recovery", settings)).run_many(2)
     assert [outcome.kind for outcome in result.outcomes] == ["stopped"] * 2
