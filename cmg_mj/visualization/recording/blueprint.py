@@ -8,9 +8,10 @@ import rerun.blueprint as rrb
 
 from cmg_mj.plant.plant import Plant
 from cmg_mj.visualization.plots.readability import FEW
+from cmg_mj.visualization.recording.branch import Branch
 from cmg_mj.visualization.recording.run import best_observers, best_runs
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
-from cmg_mj.visualization.recording.signals import TIMELINE, Branch
+from cmg_mj.visualization.recording.signals import TIMELINE
 from cmg_mj.visualization.recording.views import (
     Choice,
     Plot,

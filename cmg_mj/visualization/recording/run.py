@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push
@@ -17,6 +18,35 @@ from cmg_mj.visualization.plots.readability import Summary, figures_by_observer,
 BALANCING, PUSH, RECOVERING, SETTLED = "balancing", "push", "recovering", "settled"
 ENDINGS = {"fell": "fallen", "stopped": "stopped", "interrupted": "interrupted"}
 """Kind of the outcome of a run that did not reach its end -> the run's last phase."""
+
+
+@dataclass(frozen=True)
+class RecordingHeader:
+    """The experiment of a recording's runs, known before the first tick.
+
+    Attributes:
+        plant: The plant of all runs.
+        title: The experiment's title.
+        pushes: Torques from outside, the same in all runs.
+        settings: The settle band.
+        rate_limit_rad_s: Largest gimbal rate; None to leave its bounds away [rad/s].
+        scenario_toml: The resolved scenario.
+    """
+
+    plant: Plant
+    title: str = ""
+    pushes: Sequence[Push] = ()
+    settings: MetricsSettings = field(default_factory=MetricsSettings)
+    rate_limit_rad_s: float | None = None
+    scenario_toml: str = ""
+
+    def plant_of(self, axis: str | None) -> Plant:
+        """Return the plant with one of its axes alone; None for a plant of one axis."""
+        return self.plant if axis is None else self.plant.single_axis(axis)
+
+    def pushes_on(self, axis: str | None) -> list[Push]:
+        """Return the pushes about an axis; None for a plant of one axis."""
+        return [push for push in self.pushes if axis is None or push.axis == axis]
 
 
 @dataclass(frozen=True)
@@ -36,10 +66,6 @@ class Run:
     summary: Summary
     outcome: Outcome
     axis: str | None = None
-
-    def pushes_on_axis(self, pushes: Sequence[Push]) -> list[Push]:
-        """Return the pushes about this axis."""
-        return [push for push in pushes if self.axis is None or push.axis == self.axis]
 
     @property
     def observers(self) -> dict[str, Summary]:

@@ -14,7 +14,6 @@ from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour, colours
 from cmg_mj.visualization.plots.readability import short_names
-from cmg_mj.visualization.recording.camera import Ball
 from cmg_mj.visualization.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
 
 TIMELINE = "sim_time"
@@ -77,19 +76,6 @@ class Lines:
     label: str
     series: dict[str, Series]
     timeline: str = TIMELINE
-
-
-@dataclass(frozen=True, kw_only=True)
-class Branch(Lines):
-    """A run and its place in the recording.
-
-    Attributes:
-        run: The run.
-        ball: A ball that encloses the rig.
-    """
-
-    run: Run
-    ball: Ball
 
 
 def instant(seconds: float) -> np.timedelta64:

@@ -10,26 +10,19 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.disturbances import Push
-from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.recording.blueprint import default_blueprint
-from cmg_mj.visualization.recording.camera import enclosing_ball
-from cmg_mj.visualization.recording.run import SETTLED, Run, phases, torque_steps
+from cmg_mj.visualization.recording.branch import Branch, make_branch, pose_stride
+from cmg_mj.visualization.recording.run import SETTLED, RecordingHeader, Run, phases, torque_steps
 from cmg_mj.visualization.recording.scene import (
     largest_torque,
     log_poses,
     log_shapes,
     log_torques,
-    pose_samples,
-    pose_stride,
-    radius_at_start,
 )
 from cmg_mj.visualization.recording.signals import (
-    Branch,
     Lines,
     log_lane,
     log_phases,
@@ -66,24 +59,14 @@ class StreamHeader:
     """A run before its first tick.
 
     Attributes:
+        experiment: The experiment of the run.
         branches: One branch; of several axes, a branch for each axis.
-        plant: The plant.
         dt: Control period [s].
-        title: The experiment's title.
-        pushes: Torques from outside.
-        settings: The settle band.
-        rate_limit_rad_s: Largest gimbal rate [rad/s].
-        scenario_toml: The resolved scenario.
     """
 
+    experiment: RecordingHeader
     branches: Sequence[BranchSpec]
-    plant: Plant
     dt: float
-    title: str
-    pushes: Sequence[Push]
-    settings: MetricsSettings
-    rate_limit_rad_s: float
-    scenario_toml: str
 
 
 class StreamedRun:
@@ -111,14 +94,15 @@ class StreamedRun:
 
     def blueprint(self) -> rrb.Blueprint:
         """Lay out the recording before the best observers and the ranges of the axes are known."""
-        return default_blueprint(self.header.plant, self.branches, live=True)
+        return default_blueprint(self.header.experiment.plant, self.branches, live=True)
 
     def begin(self, rec: rr.RecordingStream) -> None:
         """Record shapes, styles, the scenario and a page for the meantime."""
         for streamed in self._branches:
             streamed.begin(rec)
-        log_scenario(rec, self.header.scenario_toml)
-        log_page(rec, "summary", f"# {self.header.title or 'Run'}\n\nIt goes on; its figures come when it has ended.")
+        log_scenario(rec, self.header.experiment.scenario_toml)
+        title = self.header.experiment.title or "Run"
+        log_page(rec, "summary", f"# {title}\n\nIt goes on; its figures come when it has ended.")
 
     def add(self, rec: rr.RecordingStream, piece: Trajectory) -> None:
         """Record the next ticks."""
@@ -137,12 +121,11 @@ class StreamedRun:
         Returns:
             The layout, the one of `write_recording`.
         """
-        header = self.header
-        pairs = list(zip(self._branches, runs, strict=True))
-        for streamed, run in pairs:
-            streamed.end(rec, run, run.trajectory.from_tick(self._ticks))
-        log_results(rec, runs, header.title, header.pushes, header.settings)
-        return default_blueprint(header.plant, [streamed.branch_with(run) for streamed, run in pairs], live=True)
+        branches = [streamed.branch_with(run) for streamed, run in zip(self._branches, runs, strict=True)]
+        for streamed, branch in zip(self._branches, branches, strict=True):
+            streamed.end(rec, branch, branch.run.trajectory.from_tick(self._ticks))
+        log_results(rec, self.header.experiment, runs)
+        return default_blueprint(self.header.experiment.plant, branches, live=True)
 
 
 class _StreamedBranch:
@@ -158,16 +141,14 @@ class _StreamedBranch:
 
     def __init__(self, header: StreamHeader, spec: BranchSpec, path: str, label: str, empty: Trajectory) -> None:
         self.spec, self.path, self._label = spec, path, label
-        self._header = header
-        self._plant = header.plant if spec.axis is None else header.plant.single_axis(spec.axis)
-        self._radius = radius_at_start(self._plant)
+        self._header = header.experiment
+        self.branch = self.branch_with(self._so_far(empty, 0.0))
+        self._plant, self._pushes, self._radius = self.branch.plant, self.branch.pushes, self.branch.radius
         self._stride = pose_stride(header.dt)
-        self._pushes = self._so_far(empty, 0.0).pushes_on_axis(header.pushes)
         self._torques = torque_steps(self._pushes, math.inf)
         self._largest = largest_torque(self._pushes)
         self._ticks = self._n_torques = self._n_phases = 0
         self._past = empty
-        self.branch = self.branch_with(self._so_far(empty, 0.0))
 
     def begin(self, rec: rr.RecordingStream) -> None:
         log_shapes(rec, self.path, self._plant, self._radius)
@@ -192,20 +173,17 @@ class _StreamedBranch:
             steps.pop()
         self._phase(rec, steps)
 
-    def end(self, rec: rr.RecordingStream, run: Run, last: Trajectory) -> None:
-        end = run.outcome.time_s
+    def end(self, rec: rr.RecordingStream, branch: Branch, last: Trajectory) -> None:
+        end = branch.run.outcome.time_s
         self.add(rec, last)
-        time, qpos = pose_samples(self._plant, run)
         if not self._ticks or (self._ticks - 1) % self._stride:
-            log_poses(rec, self.path, self._plant, time[-1:], qpos[-1:])
+            log_poses(rec, self.path, self._plant, branch.pose_times[-1:], branch.qpos[-1:])
         self._push(rec, torque_steps(self._pushes, end))
-        self._phase(rec, phase_steps(run, self._pushes, self._header.settings, end))
+        self._phase(rec, phase_steps(branch.run, self._pushes, self._header.settings, end))
 
     def branch_with(self, run: Run) -> Branch:
         """Return the branch with a run, as far as the run has come."""
-        lines = self._lines(run)
-        ball = enclosing_ball(self._plant, pose_samples(self._plant, run)[1])
-        return Branch(path=lines.path, label=lines.label, series=lines.series, run=run, ball=ball)
+        return make_branch(self._header, run, self.path, self._label)
 
     def _so_far(self, trajectory: Trajectory, now: float) -> Run:
         spec = self.spec

@@ -10,9 +10,8 @@ from cmg_mj.results import markdown
 from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, format_figure, heading
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.resolve import versions
-from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.visualization.plots.readability import FEW, section, short_names
-from cmg_mj.visualization.recording.run import Run, best_observers, best_runs
+from cmg_mj.visualization.recording.run import RecordingHeader, Run, best_observers, best_runs
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
 from cmg_mj.visualization.recording.stream import log_page
 
@@ -30,27 +29,17 @@ BOLD = "In bold: those that are switched on in the plots; the legends of the oth
 NOTES = f"In the 3-D view the flywheels turn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed."
 
 
-def log_results(
-    rec: rr.RecordingStream, runs: Sequence[Run], title: str, pushes: Sequence[Push], settings: MetricsSettings
-) -> None:
-    """Record properties and result pages of finished runs.
-
-    Args:
-        rec: The recording.
-        runs: The runs.
-        title: The experiment's title.
-        pushes: Torques from outside.
-        settings: The settle band.
-    """
+def log_results(rec: rr.RecordingStream, header: RecordingHeader, runs: Sequence[Run]) -> None:
+    """Record properties and result pages of finished runs."""
     package_versions = {name: versions()[name] for name in ("cmg_mj", "mujoco")}
     rec.send_property(
-        "experiment", rr.AnyValues(True, **package_versions, title=title, runs=[run.name for run in runs])
+        "experiment", rr.AnyValues(True, **package_versions, title=header.title, runs=[run.name for run in runs])
     )
     for run in runs:
         numbers = {key: value for key, value in run.summary.items() if isinstance(value, float)}
         values = rr.AnyValues(True, **numbers, outcome=run.outcome.kind, time_s=run.outcome.time_s)
         rec.send_property(rr.escape_entity_path_part(run.name), values)
-    log_page(rec, "summary", summary_page(title, runs, pushes, settings))
+    log_page(rec, "summary", summary_page(header, runs))
     if observers := observers_page(runs):
         log_page(rec, "observers", observers)
 
@@ -60,22 +49,12 @@ def log_scenario(rec: rr.RecordingStream, toml: str) -> None:
     log_page(rec, "scenario", f"# Scenario\n\n```toml\n{toml.strip()}\n```\n")
 
 
-def summary_page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: MetricsSettings) -> str:
-    """Write the page of summaries.
-
-    Args:
-        title: The experiment's title.
-        runs: The runs.
-        pushes: Torques from outside.
-        settings: The settle band.
-
-    Returns:
-        The page in Markdown.
-    """
+def summary_page(header: RecordingHeader, runs: Sequence[Run]) -> str:
+    """Write the page of summaries in Markdown."""
     tables = [_by_column(runs)] if len(runs) <= FEW else _by_row(runs)
-    band = f"Settled: the tilt stays within ±{settings.settle_band_deg:g}° to the end."
+    band = f"Settled: the tilt stays within ±{header.settings.settle_band_deg:g}° to the end."
     reasons = [f"**{run.name}**: {run.outcome.reason}" for run in runs if run.outcome.reason]
-    return _paragraphs(f"# {title or 'Run'}", *tables, _pushes(pushes), band, *reasons, NOTES)
+    return _paragraphs(f"# {header.title or 'Run'}", *tables, _pushes(header.pushes), band, *reasons, NOTES)
 
 
 def observers_page(runs: Sequence[Run]) -> str:

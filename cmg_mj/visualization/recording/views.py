@@ -12,8 +12,9 @@ import rerun.blueprint as rrb
 
 from cmg_mj.visualization.plots.colours import Colour, colours
 from cmg_mj.visualization.plots.readability import axis_range, free_corner
+from cmg_mj.visualization.recording.branch import Branch
 from cmg_mj.visualization.recording.run import ENDINGS
-from cmg_mj.visualization.recording.signals import Branch, Lines, Series
+from cmg_mj.visualization.recording.signals import Lines, Series
 
 RATE, RATE_ERROR = "rate/true", "rate_error/"
 """An error is drawn to the scale of the rate: it must not look small because its axis is large."""
