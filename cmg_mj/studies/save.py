@@ -119,6 +119,7 @@ def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False)
     """
     from cmg_mj.visualization.recording import write_recording
 
+    names = files_of_run(report.experiment, plot=plot)
     header = recording_header(report.experiment, report.driver, report.world)
     writers = (
         report.trajectory.save,
@@ -129,8 +130,7 @@ def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False)
     )
     with claimed(folder) as place:
         complete = report.outcome.kind in ("done", "fell")
-        files = files_of_run(report.experiment, plot=plot)
-        return place.write(dict(zip(files, writers, strict=False)), complete=complete)
+        return place.write(dict(zip(names, writers, strict=False)), complete=complete)
 
 
 def files_of_comparison(kinds: Sequence[str], *, plot: bool = False) -> list[str]:

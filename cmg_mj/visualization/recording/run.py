@@ -1,4 +1,4 @@
-"""A run to record, and its torques and phases as steps in time."""
+"""A run to record, and its torques, phases and poses in time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import Summary, figures_by_observer, observers_to_draw
+from cmg_mj.visualization.plots.readability import Summary, figures_by_observer, observers_to_draw, section
+
+POSE_RATE_HZ = 100.0
+"""Largest rate at which poses are recorded; the eye needs no more."""
 
 BALANCING, PUSH, RECOVERING, SETTLED = "balancing", "push", "recovering", "settled"
 ENDINGS = {"fell": "fallen", "stopped": "stopped", "interrupted": "interrupted"}
@@ -40,14 +43,6 @@ class RecordingHeader:
     rate_limit_rad_s: float | None = None
     scenario_toml: str = ""
 
-    def plant_of(self, axis: str | None) -> Plant:
-        """Return the plant with one of its axes alone; None for a plant of one axis."""
-        return self.plant if axis is None else self.plant.single_axis(axis)
-
-    def pushes_on(self, axis: str | None) -> list[Push]:
-        """Return the pushes about an axis; None for a plant of one axis."""
-        return [push for push in self.pushes if axis is None or push.axis == axis]
-
 
 @dataclass(frozen=True)
 class Run:
@@ -73,6 +68,17 @@ class Run:
         return figures_by_observer(self.trajectory.observers, self.summary)
 
     @property
+    def ranking(self) -> Summary:
+        """The numbers that rank the run: a run that did not reach its end ranks last."""
+        return {**self.summary, "fell": self.outcome.kind in ENDINGS}
+
+    @property
+    def references(self) -> dict[str, Summary]:
+        """The baselines, each with its numbers."""
+        references = section(self.summary, "references")
+        return {name: section(references, name) for name in references}
+
+    @property
     def open_loop_observers(self) -> tuple[str, ...]:
         """The open-loop observers."""
         return self.trajectory.observers[1:]
@@ -82,11 +88,6 @@ def best_observers(run: Run, among: Collection[str] | None = None) -> list[str]:
     """Choose the observer in the loop and the best open-loop observers; only from `among`, unless it is None."""
     summaries = {name: summary for name, summary in run.observers.items() if among is None or name in among}
     return observers_to_draw(summaries, always=[name for name in run.trajectory.observers[:1] if name in summaries])
-
-
-def best_runs(runs: Sequence[Run]) -> list[str]:
-    """Choose the runs with the best estimates, first from those that reached their end; return their names."""
-    return observers_to_draw({run.name: {**run.summary, "fell": run.outcome.kind in ENDINGS} for run in runs})
 
 
 def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, float]]:
@@ -146,3 +147,27 @@ def _recovery(trajectory: Trajectory, start: float, end: float, band: float) -> 
     if first_settled < len(times):
         steps.append((max(start, float(times[first_settled])), SETTLED))
     return steps
+
+
+def pose_stride(dt: float) -> int:
+    """Return the number of ticks, dt [s] apart, from one recorded pose to the next."""
+    return max(1, round(1.0 / (POSE_RATE_HZ * dt)))
+
+
+def pose_samples(plant: Plant, run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Choose the ticks at which poses are recorded; the initial pose, if the run has no tick.
+
+    Args:
+        plant: The plant.
+        run: The run.
+
+    Returns:
+        Times, (n_poses,) [s], and joint angles, (n_poses, n_joints) [rad].
+    """
+    trajectory = run.trajectory
+    n = len(trajectory)
+    if n == 0:
+        return np.zeros(1), plant.new_data().qpos[None].copy()
+    time = trajectory["time_s"]
+    ticks = np.union1d(np.arange(0, n, pose_stride(time[1] - time[0]) if n > 1 else 1), n - 1)
+    return time[ticks], trajectory.qpos()[ticks]

@@ -37,5 +37,5 @@ def write_recording(path: Path, header: RecordingHeader, runs: Sequence[Run]) ->
             log_series(rec, branch)
             log_lane(rec, branch.path)
             log_phases(rec, branch.path, phase_steps(branch.run, branch.pushes, header.settings, end))
-        log_results(rec, header, runs)
+        log_results(rec, header, branches)
         log_scenario(rec, header.scenario_toml)

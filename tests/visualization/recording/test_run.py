@@ -25,8 +25,7 @@ from cmg_mj.scenario.loading import Scenario, load_scenario
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.visualization.recording import RecordingHeader, Run, save, write_recording
-from cmg_mj.visualization.recording.branch import POSE_RATE_HZ
-from cmg_mj.visualization.recording.run import phases, torque_steps
+from cmg_mj.visualization.recording.run import POSE_RATE_HZ, phases, torque_steps
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
 from cmg_mj.visualization.recording.shapes import drawn_shapes
 from cmg_mj.visualization.recording.signals import instant, time_column
