@@ -104,6 +104,11 @@ def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, floa
     return [(t, sum(p.torque_n_m for p in pushes if p.start_s <= t < p.end_s)) for t in edges]
 
 
+def largest_torque(pushes: Sequence[Push]) -> float:
+    """Return the largest torque that ever acts, the scale of the arrows [N m]."""
+    return max((abs(torque) for _, torque in torque_steps(pushes, math.inf)), default=0.0)
+
+
 def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[tuple[float, str]]:
     """Divide a run into phases.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import mujoco
@@ -11,9 +10,8 @@ import rerun as rr
 
 from cmg_mj.plant.parts import Cube
 from cmg_mj.plant.plant import Plant
-from cmg_mj.scenario.disturbances import Push
 from cmg_mj.visualization.recording.branch import Branch
-from cmg_mj.visualization.recording.run import torque_steps
+from cmg_mj.visualization.recording.run import largest_torque, torque_steps
 from cmg_mj.visualization.recording.shapes import drawn_shapes
 from cmg_mj.visualization.recording.signals import TIMELINE, instant, time_column
 
@@ -110,11 +108,6 @@ def log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float
     for body, name, shape in drawn_shapes(model, radius):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
         rec.log(f"{parents[body]}/{path}", shape, static=True)
-
-
-def largest_torque(pushes: Sequence[Push]) -> float:
-    """Return the largest torque that ever acts, the scale of the arrows [N m]."""
-    return max((abs(torque) for _, torque in torque_steps(pushes, math.inf)), default=0.0)
 
 
 def log_torques(

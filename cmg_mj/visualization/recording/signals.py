@@ -140,11 +140,10 @@ def _estimates(run: Run, observer: LegendEntry) -> list[Series]:
     estimates = {"rate_estimate": rate, "rate_error": rate - t["x2_rad_s"]}
     if BIAS in t.extra_signals(name):
         estimates["bias"] = np.degrees(t[f"estimate/{name}/{BIAS}"])
+    part, label, color = observer.part, observer.label, observer.color
     width = 1.5 if name == t.observers[0] else 1.0
     rows = [
-        Series(
-            f"{folder}/{observer.part}", observer.label, time, values, observer.color, width, whole=False, observer=name
-        )
+        Series(f"{folder}/{part}", label, time, values, color, width, whole=False, observer=name)
         for folder, values in estimates.items()
     ]
     if "bias" in estimates and isinstance(bias := run.observers[name].get("bias_deg"), (int, float)):

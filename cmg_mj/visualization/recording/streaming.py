@@ -14,13 +14,16 @@ from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.recording.blueprint import default_blueprint
 from cmg_mj.visualization.recording.branch import Branch, make_branches
-from cmg_mj.visualization.recording.run import SETTLED, RecordingHeader, Run, phases, pose_stride, torque_steps
-from cmg_mj.visualization.recording.scene import (
+from cmg_mj.visualization.recording.run import (
+    SETTLED,
+    RecordingHeader,
+    Run,
     largest_torque,
-    log_poses,
-    log_shapes,
-    log_torques,
+    phases,
+    pose_stride,
+    torque_steps,
 )
+from cmg_mj.visualization.recording.scene import log_poses, log_shapes, log_torques
 from cmg_mj.visualization.recording.signals import (
     Lines,
     log_lane,

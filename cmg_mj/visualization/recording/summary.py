@@ -57,9 +57,8 @@ def summary_page(header: RecordingHeader, branches: Sequence[Branch]) -> str:
     """Write the page of summaries in Markdown."""
     tables = [_by_column(branches)] if len(branches) <= FEW else _by_row(branches)
     band = f"Settled: the tilt stays within ±{header.settings.settle_band_deg:g}° to the end."
-    reasons = [
-        f"**{run.name}**: {run.outcome.reason}" for run in (branch.run for branch in branches) if run.outcome.reason
-    ]
+    runs = [branch.run for branch in branches]
+    reasons = [f"**{run.name}**: {run.outcome.reason}" for run in runs if run.outcome.reason]
     return _paragraphs(f"# {header.title or 'Run'}", *tables, _pushes(header.pushes), band, *reasons, NOTES)
 
 
