@@ -74,7 +74,7 @@ def run(
 
     A rerun needs the same --driver board and --world, if they were given.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.results import terminal_tables as report
+    from cmg_mj.results import terminal_tables as tables
     from cmg_mj.simulation.experiment import prepare
     from cmg_mj.simulation.simulate import SimulationOptions
     from cmg_mj.studies import save as runs
@@ -95,13 +95,13 @@ def run(
                 {"on_progress": on_progress} if live_view is None else live_view.options(on_progress)
             )
             result = experiment.run(driver=driver, world=world, **options)
+        report = runs.report_run(experiment, result)
         if live_view is not None:
-            live_view.ended(result)
-        summary = runs.summary_of(experiment, result)
+            live_view.ended(report)
         try:
-            place = runs.save_run(folder, experiment, result, plot=plot)
+            place = runs.save_run(folder, report, plot=plot)
         finally:
-            show(summary, report.summary_table(summary), arguments.as_json)
+            show(report.summary, tables.summary_table(report.summary), arguments.as_json)
     if live_view is not None and live_view.lost:
         note(f"the viewer missed a part: {live_view.lost}; the run and its files are complete")
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", arguments.as_json)

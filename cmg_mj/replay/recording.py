@@ -13,8 +13,9 @@ from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import replay_markdown, shown_first
 from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, colours
 from cmg_mj.visualization.plots.readability import short_names
+from cmg_mj.visualization.recording.legend import numbered_parts
 from cmg_mj.visualization.recording.replay_recording import LogSeries, write_logs
-from cmg_mj.visualization.recording.signals import CONTROLLER, MODULES, Series, numbered_parts
+from cmg_mj.visualization.recording.signals import CONTROLLER, MODULES, Series
 
 
 def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:

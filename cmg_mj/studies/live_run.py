@@ -8,11 +8,11 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from cmg_mj.results.result import Driver, Result
+from cmg_mj.results.result import Driver
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
 from cmg_mj.simulation.simulate import SimulationOptions
-from cmg_mj.studies.save import recording_title, to_record
+from cmg_mj.studies.save import RunReport, recording_header
 
 if TYPE_CHECKING:
     from cmg_mj.visualization.recording.streaming import StreamHeader
@@ -61,23 +61,13 @@ def shown_before(experiment: Experiment, driver: Driver = "native", world: int =
     """Collect what a viewer needs before a run's first tick."""
     from cmg_mj.visualization.recording.streaming import BranchSpec, StreamHeader
 
-    scenario = experiment.scenario
     several = len(experiment.parts) > 1
     branches = []
     for part in experiment.parts:
         bias = math.degrees(part.plant.apparent_bias(part.scenario.sensors.accelerometer))
         axis = part.plant.axis.name if several else None
-        branches.append(BranchSpec(axis or scenario.observer.kind, bias, axis))
-    return StreamHeader(
-        branches,
-        experiment.plant,
-        experiment.law.dt,
-        recording_title(experiment, driver),
-        scenario.push,
-        scenario.metrics,
-        experiment.law.rate_limit,
-        experiment.as_toml(driver, world),
-    )
+        branches.append(BranchSpec(axis or experiment.scenario.observer.kind, bias, axis))
+    return StreamHeader(recording_header(experiment, driver, world), branches, experiment.law.dt)
 
 
 class LiveRun:
@@ -98,7 +88,6 @@ class LiveRun:
     ) -> None:
         from cmg_mj.visualization.recording.live import ViewerStream  # 0.4 s of import, needed only here
 
-        self._experiment = experiment
         self._pace = pace
         self._ticks = 0
         self._shown_at = -math.inf
@@ -145,9 +134,9 @@ class LiveRun:
         self._view.begin(recorder.since(0))
         self._pace.start()
 
-    def ended(self, result: Result) -> None:
+    def ended(self, report: RunReport) -> None:
         """Show how the run ended."""
-        self._view.end(to_record(self._experiment, result))
+        self._view.end(report.runs)
 
     def _show(self) -> None:
         assert self._recorder is not None

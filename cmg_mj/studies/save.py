@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.per_world_table import save_table
-from cmg_mj.results.result import Driver, Result
+from cmg_mj.results.result import Driver, Outcome, Result
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
 from cmg_mj.results.terminal_tables import run_title
@@ -21,26 +22,78 @@ from cmg_mj.studies.compare.comparison import ComparedObserver
 from cmg_mj.studies.compare.statistics import standings, worlds_table
 
 if TYPE_CHECKING:
-    from cmg_mj.visualization.recording import Run
+    from cmg_mj.visualization.recording import RecordingHeader, Run
 
 
-def summary_of(experiment: Experiment, result: Result, world: int = 0) -> Summary:
-    """Assemble one world's summary as `--json` prints it."""
-    outcome = result.outcomes[world]
-    scenario = experiment.scenario
-    summary: Summary = {
-        "scenario": scenario.title,
-        "observer": experiment.observer_title,
-        "seed": scenario.seed,
-        **_world_and_driver(result, world),
-        "outcome": outcome.kind,
-        "end_time_s": outcome.time_s,
-        "fell": outcome.fell,
-        "differs": experiment.differences,
-    }
-    if outcome.reason:
-        summary["reason"] = outcome.reason
-    return finite(summary | result.summaries[world])
+@dataclass(frozen=True)
+class RunReport:
+    """One world's run with all that its files and its viewer show, computed once.
+
+    Attributes:
+        experiment: The experiment.
+        driver: Who called the controller.
+        world: Number of the world.
+        outcome: The outcome.
+        summary: The summary as `--json` prints it.
+        trajectory: All ticks, with the outcome, world, driver and scenario as metadata.
+        runs: The run for a recording and for plots; of several axes a run each.
+    """
+
+    experiment: Experiment
+    driver: Driver
+    world: int
+    outcome: Outcome
+    summary: Summary
+    trajectory: Trajectory
+    runs: Sequence[Run]
+
+
+def report_run(experiment: Experiment, result: Result, *, compared: bool = False) -> RunReport:
+    """Assemble the report of a result's first world.
+
+    Args:
+        experiment: The experiment.
+        result: Its result, with the trajectory.
+        compared: Whether a recording has several observers: names of `runs` then begin with the observer.
+
+    Returns:
+        The report.
+    """
+    from cmg_mj.visualization.recording import Run  # 0.4 s of import, needed only here
+
+    assert result.trajectory is not None
+    scenario, outcome = experiment.scenario, result.outcomes[0]
+    world = result.worlds[0] if result.worlds else 0
+    origin: Summary = {"driver": result.driver} if result.driver == "board" else {}
+    if world:
+        origin["world"] = world
+    reason: Summary = {"reason": outcome.reason} if outcome.reason else {}
+    summary = finite(
+        {
+            "scenario": scenario.title,
+            "observer": experiment.observer_title,
+            "seed": scenario.seed,
+            **origin,
+            "outcome": outcome.kind,
+            "end_time_s": outcome.time_s,
+            "fell": outcome.fell,
+            "differs": experiment.differences,
+            **reason,
+            **result.summaries[0],
+        }
+    )
+    ending = {"kind": outcome.kind, "time_s": outcome.time_s, "reason": outcome.reason}
+    metadata = {"outcome": ending, **origin, "scenario": experiment.resolved()}
+    trajectory = dataclasses.replace(result.trajectory, metadata=metadata)
+    observer = scenario.observer.kind
+    runs = [Run(observer, trajectory, summary, outcome)]
+    if trajectory.axes:
+        common = {key: value for key, value in summary.items() if key not in (AXES, *OPEN_LOOP_SECTIONS)}
+        runs = [
+            Run(f"{observer}, {axis}" if compared else axis, trajectory.along(axis), {**common, **own}, outcome, axis)
+            for axis, own in section(summary, AXES).items()
+        ]
+    return RunReport(experiment, result.driver, world, outcome, summary, trajectory, runs)
 
 
 def files_of_run(experiment: Experiment, *, plot: bool = False) -> list[str]:
@@ -50,13 +103,12 @@ def files_of_run(experiment: Experiment, *, plot: bool = False) -> list[str]:
 
 
 @quiet()
-def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *, plot: bool = False) -> Path:
+def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False) -> Path:
     """Write scenario.toml, summary.json, trajectory.parquet and recording.rrd, all at once.
 
     Args:
         folder: Where to. Files there that cmg_mj has not written stay.
-        experiment: The experiment.
-        result: One world's result, with its trajectory.
+        report: The run.
         plot: Write plot.png as well.
 
     Returns:
@@ -65,18 +117,20 @@ def save_run(folder: RunFolder | Path, experiment: Experiment, result: Result, *
     Raises:
         InputError: The folder, or a file, cannot be written.
     """
-    trajectory = trajectory_with_metadata(experiment, result)
-    summary = summary_of(experiment, result)
+    from cmg_mj.visualization.recording import write_recording
+
+    names = files_of_run(report.experiment, plot=plot)
+    header = recording_header(report.experiment, report.driver, report.world)
     writers = (
-        trajectory.save,
-        lambda path: _write_json(path, summary),
-        lambda path: experiment.save(path, result.driver, _world(result)),
-        lambda path: _record(path, [(experiment, result)]),
-        *(partial(_plot, run=run, experiment=experiment) for run in to_record(experiment, result)),
+        report.trajectory.save,
+        lambda path: _write_json(path, report.summary),
+        lambda path: write_text(path, header.scenario_toml),
+        lambda path: write_recording(path, header, report.runs),
+        *(partial(_plot, run=run, experiment=report.experiment) for run in report.runs),
     )
     with claimed(folder) as place:
-        complete = result.outcomes[0].kind in ("done", "fell")
-        return place.write(dict(zip(files_of_run(experiment, plot=plot), writers, strict=False)), complete=complete)
+        complete = report.outcome.kind in ("done", "fell")
+        return place.write(dict(zip(names, writers, strict=False)), complete=complete)
 
 
 def files_of_comparison(kinds: Sequence[str], *, plot: bool = False) -> list[str]:
@@ -111,13 +165,17 @@ def save_comparison(
         InputError: The folder, or a file, cannot be written.
     """
     from cmg_mj.studies.compare.plot import plot_worlds
+    from cmg_mj.visualization.recording import write_recording
 
+    several = len(compared) > 1
+    reports = [report_run(entry.experiment, entry.world_0, compared=several) for entry in compared]
+    header = recording_header(reports[0].experiment, reports[0].driver, reports[0].world)
     writers = (
-        *(trajectory_with_metadata(entry.experiment, entry.world_0).save for entry in compared),
+        *(report.trajectory.save for report in reports),
         lambda path: _write_json(path, standings(compared)),
         lambda path: save_table(path, worlds_table(compared), {"scenario": experiment.resolved()}),
         experiment.save,
-        lambda path: _record(path, [(entry.experiment, entry.world_0) for entry in compared]),
+        lambda path: write_recording(path, header, [run for report in reports for run in report.runs]),
         lambda path: plot_worlds(path, compared, experiment.scenario.title),
     )
     names = files_of_comparison([entry.kind for entry in compared], plot=plot)
@@ -136,26 +194,6 @@ def file_name(kind: str) -> str:
     return kind.rpartition(":")[2]
 
 
-def trajectory_with_metadata(experiment: Experiment, result: Result) -> Trajectory:
-    """Add to the trajectory how it came about: its outcome, world, driver and scenario."""
-    assert result.trajectory is not None
-    outcome = {key: getattr(result.outcomes[0], key) for key in ("kind", "time_s", "reason")}
-    metadata = {"outcome": outcome, **_world_and_driver(result), "scenario": experiment.resolved()}
-    return dataclasses.replace(result.trajectory, metadata=metadata)
-
-
-def _world(result: Result, at: int = 0) -> int:
-    """Return the number of a world, by its place in the result."""
-    return result.worlds[at] if result.worlds else at
-
-
-def _world_and_driver(result: Result, at: int = 0) -> Summary:
-    """Name what changes the numbers and stands in no scenario: the driver, if it is the board, and any world but 0."""
-    driver: Summary = {"driver": result.driver} if result.driver == "board" else {}
-    world = _world(result, at)
-    return driver | ({"world": world} if world else {})
-
-
 def _plot(path: Path, run: Run, experiment: Experiment) -> None:
     from cmg_mj.visualization.plots.run_plot import plot_run
 
@@ -170,52 +208,18 @@ def _plot(path: Path, run: Run, experiment: Experiment) -> None:
     )
 
 
-def to_record(experiment: Experiment, result: Result, *, compared: bool = False) -> list[Run]:
-    """Prepare one world's run for a recording: of several axes a run each, by the axis' name.
+def recording_header(experiment: Experiment, driver: Driver = "native", world: int = 0) -> RecordingHeader:
+    """Collect what a recording shows of an experiment; the title says if it ran on the board."""
+    from cmg_mj.visualization.recording import RecordingHeader
 
-    Args:
-        experiment: The experiment.
-        result: The experiment's result.
-        compared: Whether the recording has several observers: the run's name then begins with its observer.
-
-    Returns:
-        The runs.
-    """
-    from cmg_mj.visualization.recording import Run
-
-    assert result.trajectory is not None
-    summary, outcome, observer = summary_of(experiment, result), result.outcomes[0], experiment.scenario.observer.kind
-    if not result.trajectory.axes:
-        return [Run(observer, result.trajectory, summary, outcome)]
-    common = {key: value for key, value in summary.items() if key not in (AXES, *OPEN_LOOP_SECTIONS)}
-    return [
-        Run(
-            f"{observer}, {axis}" if compared else axis, result.trajectory.along(axis), {**common, **own}, outcome, axis
-        )
-        for axis, own in section(summary, AXES).items()
-    ]
-
-
-def recording_title(experiment: Experiment, driver: Driver) -> str:
-    """A recording's title: the scenario's, and that it ran on the board if it did."""
-    title = experiment.scenario.title
-    return (title or "Run") + ", on the board" if driver == "board" else title
-
-
-def _record(path: Path, runs: Sequence[tuple[Experiment, Result]]) -> None:
-    from cmg_mj.visualization.recording import write_recording  # 0.4 s of import, needed only here
-
-    experiment, first = runs[0]
-    scenario = experiment.scenario
-    write_recording(
-        path,
-        experiment.plant,
-        [run for e, result in runs for run in to_record(e, result, compared=len(runs) > 1)],
-        title=recording_title(experiment, first.driver),
+    scenario, title = experiment.scenario, experiment.scenario.title
+    return RecordingHeader(
+        plant=experiment.plant,
+        title=(title or "Run") + ", on the board" if driver == "board" else title,
         pushes=scenario.push,
         settings=scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,
-        scenario_toml=experiment.as_toml(first.driver, _world(first)),
+        scenario_toml=experiment.as_toml(driver, world),
     )
 
 

@@ -12,7 +12,7 @@ from cmg_mj.results.summary_keys import AXES, KEYS
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.save import save_run
+from cmg_mj.studies.save import report_run, save_run
 from tests.command import cmg_mj
 
 SHORT = ("duration_s=2", "push.0.start_s=1", "push.1.start_s=1")
@@ -47,7 +47,7 @@ def test_an_axis_has_what_it_is_given_and_the_rest_of_what_holds_for_all() -> No
 def test_what_a_run_writes_reruns_and_has_every_axis(tmp_path: Path) -> None:
     experiment = two_axes("axes.roll.observer.kind=adaptive", "axes.pitch.controller.lqr.state_cost=[1, 1, 1, 1]")
     result = experiment.run()
-    place = save_run(tmp_path / "run", experiment, result, plot=True)
+    place = save_run(tmp_path / "run", report_run(experiment, result), plot=True)
     assert result.trajectory is not None
 
     again = prepare(load_scenario(str(place / "scenario.toml"))).run().trajectory
@@ -127,7 +127,7 @@ def test_the_true_rate_is_used_throughout_where_it_is_fed_back() -> None:
 
 def test_replay_of_several_axes_is_refused_for_what_it_is(tmp_path: Path) -> None:
     experiment = two_axes()
-    place = save_run(tmp_path / "run", experiment, experiment.run())
+    place = save_run(tmp_path / "run", report_run(experiment, experiment.run()))
     assert "about several axes (roll, pitch)" in cmg_mj("replay", str(place)).complaint
 
 

@@ -21,7 +21,7 @@ from cmg_mj.replay.user_noise import noise_numbers, noise_of
 from cmg_mj.replay.user_pendulum import model_of
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
-from cmg_mj.studies.save import save_run, summary_of
+from cmg_mj.studies.save import report_run, save_run
 from cmg_mj.studies.tuning import tune_on_logs
 from tests.observers.reference import PAPER
 from tests.replay.logs.motion import COLUMNS, DT, N, sine, write_csv
@@ -36,8 +36,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     experiment = prepare(load_scenario("push_recovery", SETTINGS))
     folder = tmp_path_factory.mktemp("runs") / "a-run"
     result = experiment.run()
-    save_run(folder, experiment, result)
-    assert summary_of(experiment, result)["observer"] == "homogeneous"
+    save_run(folder, report_run(experiment, result))
+    assert report_run(experiment, result).summary["observer"] == "homogeneous"
     return folder
 
 

@@ -26,7 +26,7 @@ from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.live_run import LiveRun, RealTimeClock, shown_before
-from cmg_mj.studies.save import save_run, to_record
+from cmg_mj.studies.save import report_run, save_run
 from cmg_mj.visualization.recording import viewer
 from cmg_mj.visualization.recording.live import GONE, STUCK
 from cmg_mj.visualization.recording.stream import set_up
@@ -134,8 +134,8 @@ def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: 
     view = LiveRun(experiment, receiver.url, RealTimeClock(5.0))
     with view:
         result = experiment.run(**view.options())
-        view.ended(result)
-        save_run(RunFolder(Path("it"), []), experiment, result)
+        view.ended(report_run(experiment, result))
+        save_run(RunFolder(Path("it"), []), report_run(experiment, result))
     assert view.lost == ""
     until_it_is_still(Path("received.rrd"))
     assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
@@ -171,9 +171,9 @@ def assert_alike_in_pieces(experiment: Experiment, ticks: int) -> None:
         growing.begin(rec)
         for first in range(0, len(result.trajectory) - ticks, ticks):
             growing.add(rec, rows(result.trajectory, first, first + ticks))
-        growing.end(rec, to_record(experiment, result))
+        growing.end(rec, report_run(experiment, result).runs)
         Path("streamed.rrd").write_bytes(memory.drain_as_bytes())
-    save_run(RunFolder(Path("it"), []), experiment, result)
+    save_run(RunFolder(Path("it"), []), report_run(experiment, result))
     assert_alike(Path("streamed.rrd"), Path("it/recording.rrd"))
 
 

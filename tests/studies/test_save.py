@@ -150,7 +150,7 @@ def test_a_run_without_a_tick_can_be_written() -> None:
     assert result.trajectory is not None
     none = replace(result.trajectory, columns={name: column[:0] for name, column in result.trajectory.columns.items()})
     empty = dataclasses.replace(result, trajectory=none, outcomes=[Outcome("interrupted", 0.0)])
-    runs.save_run(Path("it"), experiment, empty, plot=True)
+    runs.save_run(Path("it"), runs.report_run(experiment, empty), plot=True)
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 0
     assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
 
@@ -159,7 +159,7 @@ def test_numbers_json_does_not_know() -> None:
     experiment = prepare(load_scenario(write("duration_s = 0.1")))
     result = experiment.run()
     result.summaries[0]["gimbal_peak_deg"] = float("nan")
-    assert runs.summary_of(experiment, result)["gimbal_peak_deg"] is None
+    assert runs.report_run(experiment, result).summary["gimbal_peak_deg"] is None
 
 
 # --- comparisons ---------------------------------------------------------------------------------------------
@@ -323,7 +323,7 @@ def test_a_title_that_no_file_can_hold_loses_nothing_else(capfd: pytest.CaptureF
     experiment = prepare(parse_scenario({"duration_s": 0.2, "title": "ok"}))
     bad = replace(experiment, scenario=experiment.scenario.model_copy(update={"title": "\udcff"}))
     with pytest.raises(InputError, match="cannot be written: UnicodeEncodeError"):
-        runs.save_run(Path("it"), bad, bad.run())
+        runs.save_run(Path("it"), runs.report_run(bad, bad.run()))
     assert {"summary.json", "trajectory.parquet"} <= {path.name for path in Path("it").iterdir()}
     gc.collect()
     assert capfd.readouterr().err == ""  # nor does rerun complain of a recording that it did not get to write

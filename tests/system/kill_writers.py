@@ -107,13 +107,13 @@ def at_random(times: int) -> None:
     for seed in (1, 2):
         experiment = prepare(parse_scenario({"duration_s": 0.05, "seed": seed}))
         results.append((experiment, experiment.run()))
-    runs.save_run(Path("it"), *results[0])
+    runs.save_run(Path("it"), runs.report_run(*results[0]))
     Path("it/notes").write_text("mine")
 
     def for_ever() -> None:
         while True:
             for experiment, result in results:
-                runs.save_run(Path("it"), experiment, result)
+                runs.save_run(Path("it"), runs.report_run(experiment, result))
 
     chance = random.Random(8)
     seeds = []
@@ -125,7 +125,7 @@ def at_random(times: int) -> None:
         seeds.append(ended(forked(lambda: os._exit(10 + seed_of(Path("it"))))) - 10)
         assert seeds[-1] in (1, 2), seeds
         assert (Path("it") / "notes").read_text() == "mine"
-    runs.save_run(Path("it"), *results[0])
+    runs.save_run(Path("it"), runs.report_run(*results[0]))
     assert os.listdir() == ["it"], os.listdir()
     assert os.listdir(f"it/{HIDDEN}") == ["files.json"]
     print(f"{times} kills, seeds {seeds}")

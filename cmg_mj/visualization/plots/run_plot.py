@@ -147,6 +147,8 @@ def plot_run(
     """
     summaries = figures_by_observer(trajectory.observers, summary)
     few = observers_to_draw(summaries, always=trajectory.observers[:1])
+    labels = short_names(trajectory.observers)
+    palette = {name: hexadecimal(rgb) for name, rgb in colours(trajectory.observers).items()}
     others = [name for name in trajectory.observers if name not in few]
     columns = max(SMALL_COLUMNS, -(-len(others) // SMALL_ROWS))
     small = [others[i : i + columns] for i in range(0, len(others), columns)]
@@ -156,9 +158,7 @@ def plot_run(
     panels = [figure.add_subplot(grid[0, :])]
     panels += [figure.add_subplot(grid[i, :], sharex=panels[0]) for i in range(1, 5)]
     _draw_tilt(panels[0], trajectory, settle_band_deg)
-    palette = {name: hexadecimal(rgb) for name, rgb in colours(trajectory.observers).items()}
-    labels = short_names(trajectory.observers)
-    rates = _draw_estimates(panels[1], panels[2], trajectory, {name: palette[name] for name in few}, summaries)
+    rates = _draw_estimates(panels[1], panels[2], trajectory, {name: palette[name] for name in few}, labels, summaries)
     _draw_actuators(panels[3], panels[4], trajectory, rate_limit_rad_s)
     for i, row in enumerate(small, 5):
         for j, name in enumerate(row):
@@ -201,6 +201,7 @@ def _draw_estimates(
     errors: Axes,
     trajectory: Trajectory,
     palette: Mapping[str, str],
+    labels: Mapping[str, str],
     summaries: Mapping[str, Summary],
 ) -> tuple[float, float] | None:
     """Draw tilt rate and error of some observers; return the range of the rates."""
@@ -208,7 +209,6 @@ def _draw_estimates(
     estimates = {name: trajectory[f"estimate/{name}/x2_rad_s"] for name in palette}
     rates.plot(t, trajectory["fog_rad_s"], color=MEASURED, linewidth=0.6, label="gyro")
     rates.plot(t, true, color=INK, linewidth=1.8, label="true $x_2$")
-    labels = short_names(trajectory.observers)
     ranking_key = next(
         (key for key in RANKING_KEYS if any(summaries[name].get(key) is not None for name in palette)), ""
     )

@@ -8,9 +8,10 @@ import rerun.blueprint as rrb
 
 from cmg_mj.plant.plant import Plant
 from cmg_mj.visualization.plots.readability import FEW
-from cmg_mj.visualization.recording.run import best_observers, best_runs
+from cmg_mj.visualization.recording.branch import Branch
+from cmg_mj.visualization.recording.run import best_observers
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
-from cmg_mj.visualization.recording.signals import TIMELINE, Branch
+from cmg_mj.visualization.recording.signals import TIMELINE
 from cmg_mj.visualization.recording.views import (
     Choice,
     Plot,
@@ -98,9 +99,9 @@ def _all_observers(branch: Branch) -> rrb.Container:
 
 def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]:
     """Lay out the best runs over each other; then, if there are more, all runs."""
-    few = best_runs([branch.run for branch in branches])
+    few = [branch.run.name for branch in branches if branch.entry.is_best]
     module = plant.modules[0].of_axis
-    shown = [branch for branch in branches if branch.run.name in few]
+    shown = [branch for branch in branches if branch.entry.is_best]
     tilt = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_TILT_PLOTS]
     actuators = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_ACTUATOR_PLOTS]
     mechanisms = rrb.Tabs(*(mechanism_view(branch, branch.label) for branch in shown), active_tab=0)

@@ -91,7 +91,7 @@ class ViewerStream:
         self._rec = rr.RecordingStream(f"{application_name(names, branches)} live")
         self._rec.connect_grpc(url_of(str(self._relay.port)))
         labels = ", ".join(branch.label for branch in branches)
-        set_up(self._rec, f"{self._header.title or 'Run'}: {labels}, live")
+        set_up(self._rec, f"{self._header.experiment.title or 'Run'}: {labels}, live")
         self._layout(self._run.blueprint(), active=True)
         self._run.begin(self._rec)
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import rerun.blueprint as rrb
 
-from cmg_mj.visualization.recording.signals import Lines, Series, log_series, numbered_parts
+from cmg_mj.visualization.recording.legend import numbered_parts
+from cmg_mj.visualization.recording.signals import Lines, Series, log_series
 from cmg_mj.visualization.recording.stream import application_name, log_page, recorded
 from cmg_mj.visualization.recording.views import Choice, Plot, page_tabs, plot_view, tabbed_blueprint
 

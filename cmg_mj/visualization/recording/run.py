@@ -1,22 +1,47 @@
-"""A run to record, and its torques and phases as steps in time."""
+"""A run to record, and its torques, phases and poses in time."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import Summary, figures_by_observer, observers_to_draw
+from cmg_mj.visualization.plots.readability import Summary, figures_by_observer, observers_to_draw, section
+
+POSE_RATE_HZ = 100.0
+"""Largest rate at which poses are recorded; the eye needs no more."""
 
 BALANCING, PUSH, RECOVERING, SETTLED = "balancing", "push", "recovering", "settled"
 ENDINGS = {"fell": "fallen", "stopped": "stopped", "interrupted": "interrupted"}
 """Kind of the outcome of a run that did not reach its end -> the run's last phase."""
+
+
+@dataclass(frozen=True)
+class RecordingHeader:
+    """The experiment of a recording's runs, known before the first tick.
+
+    Attributes:
+        plant: The plant of all runs.
+        title: The experiment's title.
+        pushes: Torques from outside, the same in all runs.
+        settings: The settle band.
+        rate_limit_rad_s: Largest gimbal rate; None to leave its bounds away [rad/s].
+        scenario_toml: The resolved scenario.
+    """
+
+    plant: Plant
+    title: str = ""
+    pushes: Sequence[Push] = ()
+    settings: MetricsSettings = field(default_factory=MetricsSettings)
+    rate_limit_rad_s: float | None = None
+    scenario_toml: str = ""
 
 
 @dataclass(frozen=True)
@@ -37,14 +62,21 @@ class Run:
     outcome: Outcome
     axis: str | None = None
 
-    def pushes_on_axis(self, pushes: Sequence[Push]) -> list[Push]:
-        """Return the pushes about this axis."""
-        return [push for push in pushes if self.axis is None or push.axis == self.axis]
-
     @property
     def observers(self) -> dict[str, Summary]:
         """The observer in the loop, then the open-loop observers, each with its numbers."""
         return figures_by_observer(self.trajectory.observers, self.summary)
+
+    @property
+    def ranking(self) -> Summary:
+        """The numbers that rank the run: a run that did not reach its end ranks last."""
+        return {**self.summary, "fell": self.outcome.kind in ENDINGS}
+
+    @property
+    def references(self) -> dict[str, Summary]:
+        """The baselines, each with its numbers."""
+        references = section(self.summary, "references")
+        return {name: section(references, name) for name in references}
 
     @property
     def open_loop_observers(self) -> tuple[str, ...]:
@@ -56,11 +88,6 @@ def best_observers(run: Run, among: Collection[str] | None = None) -> list[str]:
     """Choose the observer in the loop and the best open-loop observers; only from `among`, unless it is None."""
     summaries = {name: summary for name, summary in run.observers.items() if among is None or name in among}
     return observers_to_draw(summaries, always=[name for name in run.trajectory.observers[:1] if name in summaries])
-
-
-def best_runs(runs: Sequence[Run]) -> list[str]:
-    """Choose the runs with the best estimates, first from those that reached their end; return their names."""
-    return observers_to_draw({run.name: {**run.summary, "fell": run.outcome.kind in ENDINGS} for run in runs})
 
 
 def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, float]]:
@@ -75,6 +102,11 @@ def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, floa
     """
     edges = sorted({time for push in pushes for time in (push.start_s, push.end_s) if time < end_s})
     return [(t, sum(p.torque_n_m for p in pushes if p.start_s <= t < p.end_s)) for t in edges]
+
+
+def largest_torque(pushes: Sequence[Push]) -> float:
+    """Return the largest torque that ever acts, the scale of the arrows [N m]."""
+    return max((abs(torque) for _, torque in torque_steps(pushes, math.inf)), default=0.0)
 
 
 def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[tuple[float, str]]:
@@ -120,3 +152,27 @@ def _recovery(trajectory: Trajectory, start: float, end: float, band: float) -> 
     if first_settled < len(times):
         steps.append((max(start, float(times[first_settled])), SETTLED))
     return steps
+
+
+def pose_stride(dt: float) -> int:
+    """Return the number of ticks, dt [s] apart, from one recorded pose to the next."""
+    return max(1, round(1.0 / (POSE_RATE_HZ * dt)))
+
+
+def pose_samples(plant: Plant, run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Choose the ticks at which poses are recorded; the initial pose, if the run has no tick.
+
+    Args:
+        plant: The plant.
+        run: The run.
+
+    Returns:
+        Times, (n_poses,) [s], and joint angles, (n_poses, n_joints) [rad].
+    """
+    trajectory = run.trajectory
+    n = len(trajectory)
+    if n == 0:
+        return np.zeros(1), plant.new_data().qpos[None].copy()
+    time = trajectory["time_s"]
+    ticks = np.union1d(np.arange(0, n, pose_stride(time[1] - time[0]) if n > 1 else 1), n - 1)
+    return time[ticks], trajectory.qpos()[ticks]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import mujoco
@@ -11,14 +10,10 @@ import rerun as rr
 
 from cmg_mj.plant.parts import Module
 from cmg_mj.plant.plant import Plant
-from cmg_mj.scenario.disturbances import Push
-from cmg_mj.visualization.recording.camera import enclosing_ball
-from cmg_mj.visualization.recording.run import Run, torque_steps
+from cmg_mj.visualization.recording.branch import Branch
+from cmg_mj.visualization.recording.run import largest_torque, torque_steps
 from cmg_mj.visualization.recording.shapes import drawn_shapes
 from cmg_mj.visualization.recording.signals import TIMELINE, instant, time_column
-
-POSE_RATE_HZ = 100.0
-"""Largest rate at which poses are recorded; the eye needs no more."""
 
 FLYWHEEL_SLOWDOWN = 100.0
 """Flywheels are drawn turning this many times slower.
@@ -32,17 +27,12 @@ PUSH_LENGTH, PUSH_RADIUS = 0.8, 0.047
 """Length and radius of the strongest push's arrow, in radii of the rig."""
 
 
-def log_rig(rec: rr.RecordingStream, branch: str, plant: Plant, run: Run, pushes: Sequence[Push]) -> None:
+def log_rig(rec: rr.RecordingStream, branch: Branch) -> None:
     """Record the mechanism of one run under `<branch>/rig`."""
-    radius = radius_at_start(plant)
-    log_shapes(rec, branch, plant, radius)
-    log_poses(rec, branch, plant, *pose_samples(plant, run))
-    log_torques(rec, branch, plant, torque_steps(pushes, run.outcome.time_s), largest_torque(pushes), radius)
-
-
-def radius_at_start(plant: Plant) -> float:
-    """Return the radius of a plant at its start, the scale of arrows and floors [m]."""
-    return enclosing_ball(plant, np.empty((0, plant.model.nq))).radius
+    log_shapes(rec, branch.path, branch.plant, branch.radius)
+    log_poses(rec, branch.path, branch.plant, branch.pose_times, branch.qpos)
+    steps, largest = torque_steps(branch.pushes, branch.run.outcome.time_s), largest_torque(branch.pushes)
+    log_torques(rec, branch.path, branch.plant, steps, largest, branch.radius)
 
 
 def log_poses(rec: rr.RecordingStream, branch: str, plant: Plant, time: np.ndarray, qpos: np.ndarray) -> None:
@@ -70,30 +60,6 @@ def body_path(branch: str, plant: Plant, body: int) -> str:
     """Name a body's entity: `cube1/gimbal` is `cube1.gimbal`, flat under the rig, as poses are in the world's frame."""
     name = plant.model.body(body).name or f"body{body}"
     return f"{branch}/rig/{rr.escape_entity_path_part(name.replace('/', '.'))}"
-
-
-def pose_samples(plant: Plant, run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Choose the ticks at which poses are recorded; the initial pose, if the run has no tick.
-
-    Args:
-        plant: The plant.
-        run: The run.
-
-    Returns:
-        Times, (n_poses,) [s], and joint angles, (n_poses, n_joints) [rad].
-    """
-    trajectory = run.trajectory
-    n = len(trajectory)
-    if n == 0:
-        return np.zeros(1), plant.new_data().qpos[None].copy()
-    time = trajectory["time_s"]
-    ticks = np.union1d(np.arange(0, n, pose_stride(time[1] - time[0]) if n > 1 else 1), n - 1)
-    return time[ticks], trajectory.qpos()[ticks]
-
-
-def pose_stride(dt: float) -> int:
-    """Return the number of ticks, dt [s] apart, from one recorded pose to the next."""
-    return max(1, round(1.0 / (POSE_RATE_HZ * dt)))
 
 
 def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -142,11 +108,6 @@ def log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float
     for body, name, shape in drawn_shapes(model, radius):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
         rec.log(f"{parents[body]}/{path}", shape, static=True)
-
-
-def largest_torque(pushes: Sequence[Push]) -> float:
-    """Return the largest torque that ever acts, the scale of the arrows [N m]."""
-    return max((abs(torque) for _, torque in torque_steps(pushes, math.inf)), default=0.0)
 
 
 def log_torques(

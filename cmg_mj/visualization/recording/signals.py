@@ -12,9 +12,8 @@ from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour, colours
-from cmg_mj.visualization.plots.readability import short_names
-from cmg_mj.visualization.recording.camera import Ball
+from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour
+from cmg_mj.visualization.recording.legend import LegendEntry
 from cmg_mj.visualization.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
 
 TIMELINE = "sim_time"
@@ -79,19 +78,6 @@ class Lines:
     timeline: str = TIMELINE
 
 
-@dataclass(frozen=True, kw_only=True)
-class Branch(Lines):
-    """A run and its place in the recording.
-
-    Attributes:
-        run: The run.
-        ball: A ball that encloses the rig.
-    """
-
-    run: Run
-    ball: Ball
-
-
 def instant(seconds: float) -> np.timedelta64:
     """Round a time to the nanosecond (rerun would truncate it)."""
     return np.timedelta64(round(seconds * 1e9), "ns")
@@ -102,21 +88,15 @@ def time_column(seconds: np.ndarray, timeline: str = TIMELINE) -> rr.TimeColumn:
     return rr.TimeColumn(timeline, duration=np.rint(seconds * 1e9).astype("timedelta64[ns]"))
 
 
-def numbered_parts(names: Sequence[str]) -> list[str]:
-    """Make parts of entity paths; each of several gets a number before its name, because the viewer sorts by path."""
-    digits = len(str(len(names)))
-    return [
-        rr.escape_entity_path_part(f"{i:0{digits}}_{name}" if len(names) > 1 else name)
-        for i, name in enumerate(names, 1)
-    ]
-
-
-def run_series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: float | None) -> list[Series]:
+def run_series(
+    run: Run, plant: Plant, observers: Sequence[LegendEntry], settings: MetricsSettings, rate_limit: float | None
+) -> list[Series]:
     """Make all time series of a run.
 
     Args:
         run: The run.
         plant: The plant.
+        observers: The run's observers.
         settings: The settle band.
         rate_limit: Largest gimbal rate, if it is known [rad/s].
 
@@ -133,9 +113,8 @@ def run_series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: fl
         Series("rate/true", "true", time, t["x2_rad_s"], true, 3.0),
         Series("rate/gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False),
     ]
-    labels = short_names(t.observers)
-    for part, (name, color) in zip(numbered_parts(t.observers), colours(t.observers).items(), strict=True):
-        rows += _estimates(run, part, name, labels[name], color)
+    for observer in observers:
+        rows += _estimates(run, observer)
     rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
     if rate_limit is not None:
         rows.append(_bounds("command/limit", "rate limit", time, rate_limit))
@@ -154,13 +133,14 @@ def run_series(run: Run, plant: Plant, settings: MetricsSettings, rate_limit: fl
     return rows
 
 
-def _estimates(run: Run, part: str, name: str, label: str, color: Colour) -> list[Series]:
+def _estimates(run: Run, observer: LegendEntry) -> list[Series]:
     """Make the series of one observer's estimates."""
-    t = run.trajectory
+    t, name = run.trajectory, observer.name
     time, rate = t["time_s"], t[f"estimate/{name}/x2_rad_s"]
     estimates = {"rate_estimate": rate, "rate_error": rate - t["x2_rad_s"]}
     if BIAS in t.extra_signals(name):
         estimates["bias"] = np.degrees(t[f"estimate/{name}/{BIAS}"])
+    part, label, color = observer.part, observer.label, observer.color
     width = 1.5 if name == t.observers[0] else 1.0
     rows = [
         Series(f"{folder}/{part}", label, time, values, color, width, whole=False, observer=name)

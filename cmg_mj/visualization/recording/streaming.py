@@ -10,32 +10,26 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.disturbances import Push
-from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.recording.blueprint import default_blueprint
-from cmg_mj.visualization.recording.camera import enclosing_ball
-from cmg_mj.visualization.recording.run import SETTLED, Run, phases, torque_steps
-from cmg_mj.visualization.recording.scene import (
+from cmg_mj.visualization.recording.branch import Branch, make_branches
+from cmg_mj.visualization.recording.run import (
+    SETTLED,
+    RecordingHeader,
+    Run,
     largest_torque,
-    log_poses,
-    log_shapes,
-    log_torques,
-    pose_samples,
+    phases,
     pose_stride,
-    radius_at_start,
+    torque_steps,
 )
+from cmg_mj.visualization.recording.scene import log_poses, log_shapes, log_torques
 from cmg_mj.visualization.recording.signals import (
-    Branch,
     Lines,
     log_lane,
     log_phases,
     log_styles,
     log_values,
-    numbered_parts,
     phase_steps,
     run_series,
 )
@@ -60,30 +54,26 @@ class BranchSpec:
     bias_deg: float
     axis: str | None = None
 
+    def run_until(self, trajectory: Trajectory, now: float) -> Run:
+        """Make the run of the branch so far, which is taken to end now [s]."""
+        bias = {"bias_deg": self.bias_deg}
+        summary = {**bias, "open_loop_observers": dict.fromkeys(trajectory.observers[1:], bias)}
+        return Run(self.name, trajectory, summary, Outcome("done", now), self.axis)
+
 
 @dataclass(frozen=True)
 class StreamHeader:
     """A run before its first tick.
 
     Attributes:
+        experiment: The experiment of the run.
         branches: One branch; of several axes, a branch for each axis.
-        plant: The plant.
         dt: Control period [s].
-        title: The experiment's title.
-        pushes: Torques from outside.
-        settings: The settle band.
-        rate_limit_rad_s: Largest gimbal rate [rad/s].
-        scenario_toml: The resolved scenario.
     """
 
+    experiment: RecordingHeader
     branches: Sequence[BranchSpec]
-    plant: Plant
     dt: float
-    title: str
-    pushes: Sequence[Push]
-    settings: MetricsSettings
-    rate_limit_rad_s: float
-    scenario_toml: str
 
 
 class StreamedRun:
@@ -97,12 +87,10 @@ class StreamedRun:
     def __init__(self, header: StreamHeader, empty: Trajectory) -> None:
         self.header = header
         self._ticks = 0
-        names = [spec.name for spec in header.branches]
-        specs = zip(header.branches, numbered_parts(names), short_names(names).values(), strict=True)
-        self._branches = [
-            _StreamedBranch(header, spec, f"/{part}", label, _select_axis(empty, spec.axis))
-            for spec, part, label in specs
-        ]
+        runs = [spec.run_until(_select_axis(empty, spec.axis), 0.0) for spec in header.branches]
+        branches = make_branches(header.experiment, runs)
+        pairs = zip(header.branches, branches, strict=True)
+        self._branches = [_StreamedBranch(header, spec, branch) for spec, branch in pairs]
 
     @property
     def branches(self) -> list[Branch]:
@@ -111,14 +99,15 @@ class StreamedRun:
 
     def blueprint(self) -> rrb.Blueprint:
         """Lay out the recording before the best observers and the ranges of the axes are known."""
-        return default_blueprint(self.header.plant, self.branches, live=True)
+        return default_blueprint(self.header.experiment.plant, self.branches, live=True)
 
     def begin(self, rec: rr.RecordingStream) -> None:
         """Record shapes, styles, the scenario and a page for the meantime."""
         for streamed in self._branches:
             streamed.begin(rec)
-        log_scenario(rec, self.header.scenario_toml)
-        log_page(rec, "summary", f"# {self.header.title or 'Run'}\n\nIt goes on; its figures come when it has ended.")
+        log_scenario(rec, self.header.experiment.scenario_toml)
+        title = self.header.experiment.title or "Run"
+        log_page(rec, "summary", f"# {title}\n\nIt goes on; its figures come when it has ended.")
 
     def add(self, rec: rr.RecordingStream, piece: Trajectory) -> None:
         """Record the next ticks."""
@@ -137,12 +126,11 @@ class StreamedRun:
         Returns:
             The layout, the one of `write_recording`.
         """
-        header = self.header
-        pairs = list(zip(self._branches, runs, strict=True))
-        for streamed, run in pairs:
-            streamed.end(rec, run, run.trajectory.from_tick(self._ticks))
-        log_results(rec, runs, header.title, header.pushes, header.settings)
-        return default_blueprint(header.plant, [streamed.branch_with(run) for streamed, run in pairs], live=True)
+        branches = make_branches(self.header.experiment, runs)
+        for streamed, branch in zip(self._branches, branches, strict=True):
+            streamed.end(rec, branch, branch.run.trajectory.from_tick(self._ticks))
+        log_results(rec, self.header.experiment, branches)
+        return default_blueprint(self.header.experiment.plant, branches, live=True)
 
 
 class _StreamedBranch:
@@ -150,24 +138,19 @@ class _StreamedBranch:
 
     Args:
         header: The run before its first tick.
-        spec: The branch before its first tick.
-        path: Path of the branch.
-        label: Shortened name of the branch.
-        empty: The branch's trajectory before the first tick.
+        spec: The branch, as it is known before its first tick.
+        branch: The branch before its first tick.
     """
 
-    def __init__(self, header: StreamHeader, spec: BranchSpec, path: str, label: str, empty: Trajectory) -> None:
-        self.spec, self.path, self._label = spec, path, label
-        self._header = header
-        self._plant = header.plant if spec.axis is None else header.plant.single_axis(spec.axis)
-        self._radius = radius_at_start(self._plant)
+    def __init__(self, header: StreamHeader, spec: BranchSpec, branch: Branch) -> None:
+        self.spec, self.branch, self.path = spec, branch, branch.path
+        self._header = header.experiment
+        self._plant, self._pushes, self._radius = branch.plant, branch.pushes, branch.radius
         self._stride = pose_stride(header.dt)
-        self._pushes = self._so_far(empty, 0.0).pushes_on_axis(header.pushes)
         self._torques = torque_steps(self._pushes, math.inf)
         self._largest = largest_torque(self._pushes)
         self._ticks = self._n_torques = self._n_phases = 0
-        self._past = empty
-        self.branch = self.branch_with(self._so_far(empty, 0.0))
+        self._past = branch.run.trajectory
 
     def begin(self, rec: rr.RecordingStream) -> None:
         log_shapes(rec, self.path, self._plant, self._radius)
@@ -179,7 +162,7 @@ class _StreamedBranch:
             return
         time = piece["time_s"]
         now = float(time[-1]) + NOW
-        log_values(rec, self._lines(self._so_far(piece, now)))
+        log_values(rec, self._lines(self.spec.run_until(piece, now)))
         has_pose = (self._ticks + np.arange(len(piece))) % self._stride == 0
         if has_pose.any():
             log_poses(rec, self.path, self._plant, time[has_pose], piece.qpos()[has_pose])
@@ -187,35 +170,23 @@ class _StreamedBranch:
         self._push(rec, [step for step in self._torques if step[0] < now])
         columns = {name: np.concatenate([self._past[name], piece[name]]) for name in ("time_s", "x1_rad")}
         self._past = Trajectory(columns, layout=piece.layout)
-        steps = phases(self._so_far(self._past, now), self._pushes, self._header.settings)
+        steps = phases(self.spec.run_until(self._past, now), self._pushes, self._header.settings)
         if steps and steps[-1][1] == SETTLED:  # the rig may still leave the band before the next push
             steps.pop()
         self._phase(rec, steps)
 
-    def end(self, rec: rr.RecordingStream, run: Run, last: Trajectory) -> None:
-        end = run.outcome.time_s
+    def end(self, rec: rr.RecordingStream, branch: Branch, last: Trajectory) -> None:
+        end = branch.run.outcome.time_s
         self.add(rec, last)
-        time, qpos = pose_samples(self._plant, run)
         if not self._ticks or (self._ticks - 1) % self._stride:
-            log_poses(rec, self.path, self._plant, time[-1:], qpos[-1:])
+            log_poses(rec, self.path, self._plant, branch.pose_times[-1:], branch.qpos[-1:])
         self._push(rec, torque_steps(self._pushes, end))
-        self._phase(rec, phase_steps(run, self._pushes, self._header.settings, end))
-
-    def branch_with(self, run: Run) -> Branch:
-        """Return the branch with a run, as far as the run has come."""
-        lines = self._lines(run)
-        ball = enclosing_ball(self._plant, pose_samples(self._plant, run)[1])
-        return Branch(path=lines.path, label=lines.label, series=lines.series, run=run, ball=ball)
-
-    def _so_far(self, trajectory: Trajectory, now: float) -> Run:
-        spec = self.spec
-        bias = {"bias_deg": spec.bias_deg}
-        summary = {**bias, "open_loop_observers": dict.fromkeys(trajectory.observers[1:], bias)}
-        return Run(spec.name, trajectory, summary, Outcome("done", now), spec.axis)
+        self._phase(rec, phase_steps(branch.run, self._pushes, self._header.settings, end))
 
     def _lines(self, run: Run) -> Lines:
-        rows = run_series(run, self._plant, self._header.settings, self._header.rate_limit_rad_s)
-        return Lines(path=self.path, label=self._label, series={row.path: row for row in rows})
+        branch, header = self.branch, self._header
+        rows = run_series(run, self._plant, branch.observers, header.settings, header.rate_limit_rad_s)
+        return Lines(path=branch.path, label=branch.label, series={row.path: row for row in rows})
 
     def _push(self, rec: rr.RecordingStream, steps: Sequence[tuple[float, float]]) -> None:
         log_torques(rec, self.path, self._plant, steps[self._n_torques :], self._largest, self._radius)

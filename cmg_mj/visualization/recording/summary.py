@@ -10,9 +10,10 @@ from cmg_mj.results import markdown
 from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, format_figure, heading
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.resolve import versions
-from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.readability import FEW, section, short_names
-from cmg_mj.visualization.recording.run import Run, best_observers, best_runs
+from cmg_mj.visualization.plots.readability import FEW
+from cmg_mj.visualization.recording.branch import Branch
+from cmg_mj.visualization.recording.legend import LegendEntry
+from cmg_mj.visualization.recording.run import RecordingHeader, Run
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
 from cmg_mj.visualization.recording.stream import log_page
 
@@ -30,28 +31,20 @@ BOLD = "In bold: those that are switched on in the plots; the legends of the oth
 NOTES = f"In the 3-D view the flywheels turn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed."
 
 
-def log_results(
-    rec: rr.RecordingStream, runs: Sequence[Run], title: str, pushes: Sequence[Push], settings: MetricsSettings
-) -> None:
-    """Record properties and result pages of finished runs.
-
-    Args:
-        rec: The recording.
-        runs: The runs.
-        title: The experiment's title.
-        pushes: Torques from outside.
-        settings: The settle band.
-    """
+def log_results(rec: rr.RecordingStream, header: RecordingHeader, branches: Sequence[Branch]) -> None:
+    """Record properties and result pages of finished runs."""
+    summary, observers = summary_page(header, branches), observers_page(branches)
+    runs = [branch.run for branch in branches]
     package_versions = {name: versions()[name] for name in ("cmg_mj", "mujoco")}
     rec.send_property(
-        "experiment", rr.AnyValues(True, **package_versions, title=title, runs=[run.name for run in runs])
+        "experiment", rr.AnyValues(True, **package_versions, title=header.title, runs=[run.name for run in runs])
     )
     for run in runs:
         numbers = {key: value for key, value in run.summary.items() if isinstance(value, float)}
         values = rr.AnyValues(True, **numbers, outcome=run.outcome.kind, time_s=run.outcome.time_s)
         rec.send_property(rr.escape_entity_path_part(run.name), values)
-    log_page(rec, "summary", summary_page(title, runs, pushes, settings))
-    if observers := observers_page(runs):
+    log_page(rec, "summary", summary)
+    if observers:
         log_page(rec, "observers", observers)
 
 
@@ -60,34 +53,26 @@ def log_scenario(rec: rr.RecordingStream, toml: str) -> None:
     log_page(rec, "scenario", f"# Scenario\n\n```toml\n{toml.strip()}\n```\n")
 
 
-def summary_page(title: str, runs: Sequence[Run], pushes: Sequence[Push], settings: MetricsSettings) -> str:
-    """Write the page of summaries.
-
-    Args:
-        title: The experiment's title.
-        runs: The runs.
-        pushes: Torques from outside.
-        settings: The settle band.
-
-    Returns:
-        The page in Markdown.
-    """
-    tables = [_by_column(runs)] if len(runs) <= FEW else _by_row(runs)
-    band = f"Settled: the tilt stays within ±{settings.settle_band_deg:g}° to the end."
+def summary_page(header: RecordingHeader, branches: Sequence[Branch]) -> str:
+    """Write the page of summaries in Markdown."""
+    tables = [_by_column(branches)] if len(branches) <= FEW else _by_row(branches)
+    band = f"Settled: the tilt stays within ±{header.settings.settle_band_deg:g}° to the end."
+    runs = [branch.run for branch in branches]
     reasons = [f"**{run.name}**: {run.outcome.reason}" for run in runs if run.outcome.reason]
-    return _paragraphs(f"# {title or 'Run'}", *tables, _pushes(pushes), band, *reasons, NOTES)
+    return _paragraphs(f"# {header.title or 'Run'}", *tables, _pushes(header.pushes), band, *reasons, NOTES)
 
 
-def observers_page(runs: Sequence[Run]) -> str:
+def observers_page(branches: Sequence[Branch]) -> str:
     """Write the page of all observers of a run; of several runs, of those with open-loop observers."""
-    return _paragraphs(*(part for run in runs if len(runs) == 1 or run.open_loop_observers for part in _estimates(run)))
+    shown = [branch for branch in branches if len(branches) == 1 or branch.run.open_loop_observers]
+    return _paragraphs(*(part for branch in shown for part in _estimates(branch)))
 
 
-def _estimates(run: Run) -> list[str]:
+def _estimates(branch: Branch) -> list[str]:
     """Write tables of one run's observers and, below them, its baselines."""
-    references = section(run.summary, "references")
-    names = [*_marked(list(run.observers), best_observers(run)), *references]
-    summaries = [*run.observers.values(), *(section(references, name) for name in references)]
+    run = branch.run
+    names = [*map(_marked, branch.observers), *run.references]
+    summaries = [*run.observers.values(), *run.references.values()]
     intro = f"In the run of {run.name}.{' The others are open loop.' if len(names) > 1 else ''}"
     parts = [f"{intro} {BOLD}" if len(run.observers) > FEW else intro]
     for keys in OPEN_LOOP_TABLES:
@@ -99,20 +84,22 @@ def _estimates(run: Run) -> list[str]:
     return parts
 
 
-def _by_column(runs: Sequence[Run]) -> str:
+def _by_column(branches: Sequence[Branch]) -> str:
     """Write a table with a column for each run."""
+    runs = [branch.run for branch in branches]
     rows = [("Outcome", *map(_outcome, runs))]
     rows += [
         (heading(key), *(format_figure(key, run.summary.get(key)) for run in runs))
         for key in KEYS
         if any(key in run.summary for run in runs)
     ]
-    return markdown.table(("", *short_names([run.name for run in runs]).values()), rows)
+    return markdown.table(("", *(branch.label for branch in branches)), rows)
 
 
-def _by_row(runs: Sequence[Run]) -> list[str]:
+def _by_row(branches: Sequence[Branch]) -> list[str]:
     """Write tables with a row for each run."""
-    first = [_marked([run.name for run in runs], best_runs(runs)), [_outcome(run) for run in runs]]
+    runs = [branch.run for branch in branches]
+    first = [[_marked(branch.entry) for branch in branches], [_outcome(run) for run in runs]]
     tables = []
     for i, keys in enumerate(ROW_TABLES):
         columns = [[format_figure(key, run.summary.get(key)) for run in runs] for key in keys]
@@ -122,9 +109,9 @@ def _by_row(runs: Sequence[Run]) -> list[str]:
     return [*tables, BOLD]
 
 
-def _marked(names: Sequence[str], best: Sequence[str]) -> list[str]:
-    """Shorten names; make those that are switched on bold."""
-    return [f"**{short}**" if name in best else short for name, short in short_names(names).items()]
+def _marked(entry: LegendEntry) -> str:
+    """Shorten a name; make one that is switched on bold."""
+    return f"**{entry.label}**" if entry.is_best else entry.label
 
 
 def _outcome(run: Run) -> str:

@@ -10,10 +10,11 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from cmg_mj.visualization.plots.colours import Colour, colours
+from cmg_mj.visualization.plots.colours import Colour
 from cmg_mj.visualization.plots.readability import axis_range, free_corner
+from cmg_mj.visualization.recording.branch import Branch
 from cmg_mj.visualization.recording.run import ENDINGS
-from cmg_mj.visualization.recording.signals import Branch, Lines, Series
+from cmg_mj.visualization.recording.signals import Lines, Series
 
 RATE, RATE_ERROR = "rate/true", "rate_error/"
 """An error is drawn to the scale of the rate: it must not look small because its axis is large."""
@@ -99,7 +100,6 @@ def overlay_view(plot: Plot, branches: Sequence[Branch], module: str, runs: Choi
     Returns:
         The view.
     """
-    color = colours(branch.run.name for branch in branches)
     part = rr.escape_entity_path_part(module)
     overrides: dict[str, list[Override]] = {}
     required: list[np.ndarray] = []
@@ -108,7 +108,7 @@ def overlay_view(plot: Plot, branches: Sequence[Branch], module: str, runs: Choi
     for branch in branches:
         name = branch.run.name
         row = _row(branch, plot.entities[0].format(module=part))
-        overrides[f"{branch.path}/{row.path}"] = runs.styled_line(name, color[name], branch.label)
+        overrides[f"{branch.path}/{row.path}"] = runs.styled_line(name, branch.entry.color, branch.label)
         stands = branch.run.outcome.kind not in ENDINGS
         if name in runs.shown:
             visible.append(row)

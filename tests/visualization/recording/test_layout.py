@@ -20,11 +20,12 @@ from cmg_mj.results.result import Outcome
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.compare.comparison import prepare_comparison
-from cmg_mj.studies.save import summary_of
-from cmg_mj.visualization.recording import Run, write_recording
+from cmg_mj.studies.save import report_run
+from cmg_mj.visualization.recording import RecordingHeader, Run, write_recording
+from cmg_mj.visualization.recording.branch import make_branches
 from cmg_mj.visualization.recording.camera import FARTHEST, enclosing_ball
-from cmg_mj.visualization.recording.run import best_observers, best_runs
-from cmg_mj.visualization.recording.signals import numbered_parts
+from cmg_mj.visualization.recording.legend import legend, numbered_parts
+from cmg_mj.visualization.recording.run import best_observers
 from cmg_mj.visualization.recording.summary import ROW_TABLES, summary_page
 from cmg_mj.visualization.recording.views import EYE
 
@@ -93,12 +94,22 @@ def named(found: Sequence[View], name: str) -> list[View]:
 def recorded(experiment: Experiment) -> Run:
     result = experiment.run()
     assert result.trajectory is not None
-    summary = summary_of(experiment, result)
+    summary = report_run(experiment, result).summary
     return Run(experiment.scenario.observer.kind, result.trajectory, summary, result.outcomes[0])
 
 
+def summary_of_runs(experiment: Experiment, runs: Sequence[Run]) -> str:
+    header = RecordingHeader(experiment.plant, pushes=experiment.scenario.push)
+    return summary_page(header, make_branches(header, runs))
+
+
+def best_runs(runs: Sequence[Run]) -> list[str]:
+    return [entry.name for entry in legend({run.name: run.ranking for run in runs}) if entry.is_best]
+
+
 def write(path: Path, experiment: Experiment, runs: Sequence[Run]) -> Path:
-    write_recording(path, experiment.plant, runs, pushes=experiment.scenario.push, rate_limit_rad_s=4.7)
+    header = RecordingHeader(experiment.plant, pushes=experiment.scenario.push, rate_limit_rad_s=4.7)
+    write_recording(path, header, runs)
     return path
 
 
@@ -155,7 +166,7 @@ def test_the_best_runs_are_on(compared: tuple[Experiment, list[Run]], tmp_path: 
         assert {entity.split("/")[1] for entity in second.listed - second.grey} == on
     lanes = {len(view.contents) for view in named(found, "Phase")}
     assert lanes == {1, len(few), len(runs)}
-    text = summary_page("", runs, experiment.scenario.push, experiment.scenario.metrics)
+    text = summary_of_runs(experiment, runs)
     names = [line.split("|")[1].strip().strip("*") for line in text.splitlines() if line.startswith("| ")]
     assert [name for name in names if name] == [run.name for run in runs] * len(ROW_TABLES)
 
@@ -163,7 +174,7 @@ def test_the_best_runs_are_on(compared: tuple[Experiment, list[Run]], tmp_path: 
 def test_tables_fit_their_view(compared: tuple[Experiment, list[Run]]) -> None:
     """As wide as those that were looked at, in a window of 1400 pixels."""
     experiment, runs = compared
-    text = summary_page("", runs, experiment.scenario.push, experiment.scenario.metrics)
+    text = summary_of_runs(experiment, runs)
     tables = [part.splitlines() for part in text.split("\n\n") if part.startswith("|")]
     assert len(tables) == len(ROW_TABLES)
     for lines in tables:

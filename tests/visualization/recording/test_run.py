@@ -24,9 +24,9 @@ from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import Scenario, load_scenario
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.visualization.recording import Run, save, write_recording
-from cmg_mj.visualization.recording.run import phases, torque_steps
-from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN, POSE_RATE_HZ
+from cmg_mj.visualization.recording import RecordingHeader, Run, save, write_recording
+from cmg_mj.visualization.recording.run import POSE_RATE_HZ, phases, torque_steps
+from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
 from cmg_mj.visualization.recording.shapes import drawn_shapes
 from cmg_mj.visualization.recording.signals import instant, time_column
 from cmg_mj.visualization.recording.summary import ROW_TABLES
@@ -48,16 +48,15 @@ def recorded(experiment: Experiment, name: str | None = None) -> Run:
 
 
 def write(path: Path, experiment: Experiment, runs: list[Run]) -> Path:
-    write_recording(
-        path,
+    header = RecordingHeader(
         experiment.plant,
-        runs,
         title="A title",
         pushes=experiment.scenario.push,
         settings=experiment.scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,
         scenario_toml='kind = "made up"',
     )
+    write_recording(path, header, runs)
     return path
 
 

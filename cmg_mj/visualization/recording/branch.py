@@ -1,0 +1,76 @@
+"""A run with all that its branch of a recording shows, computed once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmg_mj.plant.plant import Plant
+from cmg_mj.scenario.disturbances import Push
+from cmg_mj.visualization.recording.camera import Ball, enclosing_ball
+from cmg_mj.visualization.recording.legend import LegendEntry, legend
+from cmg_mj.visualization.recording.run import RecordingHeader, Run, pose_samples
+from cmg_mj.visualization.recording.signals import Lines, run_series
+
+
+@dataclass(frozen=True, kw_only=True)
+class Branch(Lines):
+    """A run and its place in the recording.
+
+    Attributes:
+        run: The run.
+        entry: The run in the legends.
+        observers: The run's observers in the legends.
+        plant: The plant; of several axes, with the run's axis alone.
+        pushes: The pushes about the run's axis.
+        pose_times: Times of the recorded poses, (n_poses,) [s].
+        qpos: Joint angles of the recorded poses, (n_poses, n_joints) [rad].
+        ball: A ball that encloses the rig during the run.
+        radius: Radius of the rig at its start, the scale of arrows and floors [m].
+    """
+
+    run: Run
+    entry: LegendEntry
+    observers: Sequence[LegendEntry]
+    plant: Plant
+    pushes: Sequence[Push]
+    pose_times: np.ndarray
+    qpos: np.ndarray
+    ball: Ball
+    radius: float
+
+
+def make_branches(header: RecordingHeader, runs: Sequence[Run]) -> list[Branch]:
+    """Make the branches of a recording, each named after its run, as far as the runs have come.
+
+    Raises:
+        ValueError: There is no run, or two have the same name.
+    """
+    names = [run.name for run in runs]
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"a recording needs runs of different names, not {names}")
+    entries = legend({run.name: run.ranking for run in runs})
+    return [_make_branch(header, run, entry) for run, entry in zip(runs, entries, strict=True)]
+
+
+def _make_branch(header: RecordingHeader, run: Run, entry: LegendEntry) -> Branch:
+    plant = header.plant if run.axis is None else header.plant.single_axis(run.axis)
+    times, qpos = pose_samples(plant, run)
+    observers = legend(run.observers, always=run.trajectory.observers[:1])
+    series = run_series(run, plant, observers, header.settings, header.rate_limit_rad_s)
+    return Branch(
+        path=f"/{entry.part}",
+        label=entry.label,
+        series={row.path: row for row in series},
+        run=run,
+        entry=entry,
+        observers=observers,
+        plant=plant,
+        pushes=[push for push in header.pushes if run.axis is None or push.axis == run.axis],
+        pose_times=times,
+        qpos=qpos,
+        ball=enclosing_ball(plant, qpos),
+        radius=enclosing_ball(plant, np.empty((0, plant.model.nq))).radius,
+    )
