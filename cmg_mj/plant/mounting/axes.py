@@ -100,4 +100,6 @@ def _level(direction: np.ndarray, what: str, path: Path) -> np.ndarray:
 
 
 def _axis_text(axis: AxisLike) -> str:
-    return axis if isinstance(axis, str) else shown(" ".join(map(str, axis)))
+    if isinstance(axis, str):
+        return axis
+    return shown(" ".join(f"{part:g}" if isinstance(part, float) else str(part) for part in axis))
