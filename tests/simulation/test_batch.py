@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import tracemalloc
 from collections.abc import Sequence
 from dataclasses import replace
@@ -179,6 +180,7 @@ def test_seeds_and_worlds_differ() -> None:
 def peak_bytes(duration_s: float, n_worlds: int | None, keep: bool) -> int:
     settings = ["push=[]", "controller.feedback=truth", "observer.kind=finite_difference"]
     setup = prepare(load_scenario("push_recovery", [*settings, f"duration_s={duration_s}"]))
+    gc.collect()  # what tests before this one left would count, whenever it goes
     tracemalloc.start()
     result = setup.run(keep_trajectory=keep) if n_worlds is None else setup.run_many(n_worlds, keep_trajectory=keep)
     peak = tracemalloc.get_traced_memory()[1]
@@ -193,11 +195,11 @@ def test_memory_does_not_grow_with_the_duration_unless_the_trajectory_is_kept(n_
     """Once the first 256 ticks have become a piece. The first run fills caches."""
     _, short, long, full = (
         peak_bytes(duration, n_worlds, keep)
-        for duration, keep in ((0.1, False), (1.4, False), (3.0, False), (3.0, True))
+        for duration, keep in ((0.1, False), (1.4, False), (6.0, False), (6.0, True))
     )
-    print(f"{n_worlds} worlds: {short / 1e3:.0f} kB for 1.4 s, {long / 1e3:.0f} for 3 s, {full / 1e3:.0f} if kept")
+    print(f"{n_worlds} worlds: {short / 1e3:.0f} kB for 1.4 s, {long / 1e3:.0f} for 6 s, {full / 1e3:.0f} if kept")
     assert long < 1.05 * short + 20_000
-    assert full > long + 40_000  # 320 ticks more, of 26 columns
+    assert full > long + 100_000  # 920 ticks more, of 26 columns
 
 
 def test_without_trajectory_the_numbers_are_the_same() -> None:
