@@ -11,8 +11,8 @@ import pytest
 
 from cmg_mj import Estimate, Measurement
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies import save as runs
+from cmg_mj.visualization import recording
 from tests.command import cmg_mj
 from tests.inputs.complaints import assert_in_order, table
 from tests.inputs.test_users_observer import Mine
@@ -59,13 +59,19 @@ def test_a_file_that_cannot_be_written_keeps_no_other_from_being(
         path.write_text("begun")
         raise IsADirectoryError(21, "Is a directory")
 
+    write_text = runs.write_text
+
+    def fails_on_toml(path: Path, text: str) -> None:
+        (write_text if text.startswith("{") else fails)(path, text)
+
     owner, writer = {
-        "scenario.toml": (Experiment, "save"),
+        "scenario.toml": (runs, "write_text"),
         "trajectory.parquet": (Trajectory, "save"),
         "summary.json": (runs, "_write_json"),
-        "recording.rrd": (runs, "_record"),
+        "recording.rrd": (recording, "write_recording"),
     }[name]
-    monkeypatch.setattr(owner, writer, fails if isinstance(owner, ModuleType) else lambda _, path, *more: fails(path))
+    method = fails_on_toml if name == "scenario.toml" else fails
+    monkeypatch.setattr(owner, writer, method if isinstance(owner, ModuleType) else lambda _, path, *more: fails(path))
     outcome = cmg_mj("run", quick, "--out", "it", "--json")
     assert outcome.status == 2
     assert outcome.err == f"cmg-mj: it/{name}: cannot be written: Is a directory\n"

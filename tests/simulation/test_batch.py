@@ -18,7 +18,6 @@ from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-from tests.tiers import slow_but
 
 SHORT = ("duration_s=0.8", "push.0.start_s=0.2", "push.0.duration_s=0.1")
 
@@ -190,7 +189,8 @@ def peak_bytes(duration_s: float, n_worlds: int | None, keep: bool) -> int:
     return peak
 
 
-@pytest.mark.parametrize("n_worlds", slow_but([None, 4], None))
+@pytest.mark.slow
+@pytest.mark.parametrize("n_worlds", [None, 4])
 def test_memory_does_not_grow_with_the_duration_unless_the_trajectory_is_kept(n_worlds: int | None) -> None:
     """Once the first 256 ticks have become a piece. The first run fills caches."""
     _, short, long, full = (

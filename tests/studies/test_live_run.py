@@ -261,6 +261,7 @@ def test_a_run_ends_and_its_viewer_stays(monkeypatch: pytest.MonkeyPatch) -> Non
         end(started, signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         monkeypatch.delenv(name, raising=False)
