@@ -4,8 +4,8 @@ Counted is the processor time of this process and of the children it has waited 
 teardown. Wall time is not: other work on the machine lengthens it. What the machine is slower by than the one where
 the limit was set is measured at once when a test is over the limit, and the limit raised by as much.
 
-The same test takes up to half as much again from one run to the next (`NOISE`), which is added to the limit. Libraries that code imports when it first needs them are imported before the
-first test, so that no test pays for them.
+The same test takes up to half as much again from one run to the next (`NOISE`), which is added to the limit. Libraries
+that code imports when it first needs them are imported before the first test, so that no test pays for them.
 """
 
 from __future__ import annotations
