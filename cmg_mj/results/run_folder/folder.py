@@ -11,7 +11,7 @@ from pathlib import Path
 
 from cmg_mj.errors import InputError, raised
 from cmg_mj.results.run_folder.lock import Busy, Lock
-from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, users_files
+from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, require_own, users_files
 from cmg_mj.results.run_folder.swap import ASIDE, recover, stage, swap_in
 
 Writers = Mapping[str, Callable[[Path], None]]
@@ -40,7 +40,8 @@ class RunFolder:
             names: What will be written, as far as it is known.
 
         Raises:
-            FolderInUse: Another run writes to it, or one of the names is that of a file that cmg_mj has not written.
+            FolderInUse: Another run writes to it, one of the names is that of a file that cmg_mj has not written, or
+                what is there under cmg_mj's own names is somebody else's.
             InputError: It cannot be made or written.
         """
         self.path = path
@@ -50,27 +51,28 @@ class RunFolder:
             self._made = [folder for folder in (path, *path.parents) if not folder.exists()]
             path.mkdir(parents=True, exist_ok=True)
             self._folder = path.resolve()
+            require_own(self._folder)  # before the lock, which is a file in it
             self._lock = Lock(self._folder / HIDDEN / "lock")
             recover(self._folder, self._lock)
-            self._refuse(names)
+            theirs = sorted(set(users_files(self._folder)) & set(names))
         except Busy:
             self.release()
             raise FolderInUse(f"--out {path}: another run is writing to it") from None
         except OSError as error:
             self.release()
             raise InputError(f"--out {path}: cannot be written: {error.strerror}") from error
+        except InputError as error:
+            self.release()
+            raise FolderInUse(f"--out {path}: {error}") from None
         except BaseException:
             self.release()
             raise
-
-    def _refuse(self, names: Iterable[str]) -> None:
-        """Refuse to write over what is not cmg_mj's."""
-        theirs = sorted(set(users_files(self._folder)) & set(names))
         if theirs:
+            self.release()
             are = "is" if len(theirs) == 1 else "are"
             raise FolderInUse(
-                f"--out {self.path}: {', '.join(theirs)} there {are} not as cmg-mj wrote it, and would be lost: move "
-                "it, or name another folder"
+                f"--out {path}: {', '.join(theirs)} there {are} not as cmg-mj wrote it, and would be lost: move it, or "
+                "name another folder"
             )
 
     def write(self, files: Writers, *, complete: bool = True, all_or_none: bool = False) -> Path:
@@ -139,6 +141,8 @@ class RunFolder:
         """Put what may not take the folder's place into a folder in it."""
         for number in itertools.count(1):
             name = ASIDE if number == 1 else f"{ASIDE}-{number}"
+            if (self.path / name).is_symlink():  # out of the folder
+                continue
             with suppress(FolderInUse), RunFolder(self.path / name) as aside:
                 if aside._has_room_for(manifest):
                     assert aside._lock is not None
@@ -220,5 +224,5 @@ def _is_of(path: Path, request_toml: str) -> bool:
     """Return whether cmg_mj wrote this file, and the file makes the same request."""
     try:
         return Manifest.read(path.parent).has(path) and path.read_text(encoding="utf-8") == request_toml
-    except (OSError, ValueError):
+    except (OSError, ValueError):  # or somebody else's list of files
         return False

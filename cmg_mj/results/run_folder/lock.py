@@ -36,7 +36,7 @@ class Lock:
         while self._descriptor < 0:
             path.parent.mkdir(exist_ok=True)
             try:
-                descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+                descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
             except FileNotFoundError:
                 if not path.parent.parent.is_dir():
                     raise

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
+from cmg_mj.errors import InputError, shown
+
 HIDDEN = ".cmg-mj"
 """What is cmg_mj's own in a run folder: the manifest; while a run lives, also its lock and the result being written."""
+
+FILES = "files.json"
+"""The manifest's file in `HIDDEN`."""
+REMOVE = f"remove {HIDDEN}, or name another folder"
+LARGEST_MANIFEST = 4_000_000
+"""A manifest of more bytes is not cmg_mj's."""
 
 
 @dataclass(frozen=True)
@@ -31,28 +40,54 @@ class Manifest:
 
     @staticmethod
     def read(folder: Path) -> Manifest:
-        """A folder's manifest; empty where there is none: then nothing there is known to be cmg_mj's."""
+        """Read a folder's manifest; empty where there is none: then nothing there is known to be cmg_mj's.
+
+        Raises:
+            InputError: The manifest names what is not a file of its own folder. Somebody else has written it.
+        """
+        path = folder / HIDDEN / FILES
         try:
-            stored = json.loads((folder / HIDDEN / "files.json").read_text(encoding="utf-8"))
-            return Manifest(dict(stored["files"]), bool(stored["complete"]))
-        except (OSError, ValueError, LookupError, TypeError):
+            if not is_plain_file(path) or path.stat().st_size > LARGEST_MANIFEST:
+                return Manifest()
+            stored = json.loads(path.read_text(encoding="utf-8"))
+            files, complete = dict(stored["files"]), bool(stored["complete"])
+        except (OSError, ValueError, LookupError, TypeError, RecursionError):
             return Manifest()
+        for name, digest in files.items():
+            if not _is_bare(name) or not isinstance(digest, str):
+                raise InputError(f"{HIDDEN} there names {shown(name)}, which cmg-mj never writes: {REMOVE}")
+        return Manifest(files, complete)
 
     def write(self, folder: Path) -> None:
         """Write it into a folder that has none yet."""
         stored = {"written_by": f"cmg_mj {version('cmg_mj')}", "complete": self.complete, "files": self.files}
-        (folder / HIDDEN / "files.json").write_text(json.dumps(stored, indent=2) + "\n", encoding="utf-8")
+        (folder / HIDDEN / FILES).write_text(json.dumps(stored, indent=2) + "\n", encoding="utf-8")
 
     def has(self, path: Path) -> bool:
         """Return whether a file is as cmg_mj has written it."""
         try:
-            return not path.is_symlink() and path.is_file() and self.files.get(path.name) == _digest(path)
+            return is_plain_file(path) and self.files.get(path.name) == _digest(path)
         except OSError:
             return False
 
     def stands(self, folder: Path) -> bool:
         """Return whether this is a complete result, and all of it still there."""
         return self.complete and all((folder / name).is_file() for name in self.files)
+
+
+def require_own(folder: Path) -> None:
+    """Refuse a `.cmg-mj` that cmg_mj has not made: a link in the place of a folder or file leads out of the folder.
+
+    Raises:
+        InputError: Something there is of another kind than what cmg_mj makes.
+    """
+    hidden = folder / HIDDEN
+    for path in (hidden, hidden / "new", hidden / "new" / HIDDEN, hidden / "ready", hidden / "ready" / HIDDEN):
+        if path.is_symlink() or (path.exists() and not path.is_dir()):
+            raise InputError(f"{path.relative_to(folder)} there is no folder that cmg-mj makes: {REMOVE}")
+    for path in (hidden / "lock", hidden / FILES, hidden / "ready" / HIDDEN / FILES):
+        if path.is_symlink() or (path.exists() and not is_plain_file(path)):
+            raise InputError(f"{path.relative_to(folder)} there is no file that cmg-mj writes: {REMOVE}")
 
 
 def users_files(folder: Path) -> list[str]:
@@ -67,12 +102,22 @@ def remove_result(folder: Path) -> None:
     for name in manifest.files:
         if manifest.has(folder / name):
             (folder / name).unlink()
-    (folder / HIDDEN / "files.json").unlink(missing_ok=True)
+    (folder / HIDDEN / FILES).unlink(missing_ok=True)
     for empty in (folder / HIDDEN, folder):
         try:
             empty.rmdir()
         except OSError:  # what holds something stays
             return
+
+
+def is_plain_file(path: Path) -> bool:
+    """Return whether this is a file, and neither a link to one nor a pipe or a device."""
+    return path.is_file() and not path.is_symlink()
+
+
+def _is_bare(name: str) -> bool:
+    """Return whether a name leads to a file in the folder itself, on any system."""
+    return bool(name) and name not in (".", "..", HIDDEN) and not re.search(r"[/\\:\0]", name)
 
 
 def _digest(path: Path) -> str:

@@ -16,8 +16,17 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+from cmg_mj.errors import InputError
 from cmg_mj.results.run_folder.lock import Busy, Lock
-from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, remove_result, users_files
+from cmg_mj.results.run_folder.manifest import (
+    FILES,
+    HIDDEN,
+    Manifest,
+    is_plain_file,
+    remove_result,
+    require_own,
+    users_files,
+)
 
 ASIDE = "incomplete"
 """Where in a folder goes what may not take the place of the result there."""
@@ -27,7 +36,6 @@ def stage(folder: Path) -> Path:
     """Make the folder where a new result is written before it takes its place."""
     new = folder / HIDDEN / "new"
     (new / HIDDEN).mkdir(parents=True)
-    (new / HIDDEN / "staged").touch()  # as long as this is there, nothing of a user's is but links
     return new
 
 
@@ -53,14 +61,14 @@ def swap_in(new: Path, folder: Path, lock: Lock) -> None:
 
 
 def recover(folder: Path, lock: Lock) -> None:
-    """Finish or take away what a process that has ended left behind; `lock`, held, shows that it has ended."""
+    """Finish or take away what a process that has ended left behind; `lock`, held, shows that it has ended.
+
+    Raises:
+        InputError: The list of the folder's files is not cmg_mj's.
+    """
     beside = _beside(folder)
-    if beside.is_dir() and _is_dead(beside, lock):
-        if (beside / HIDDEN / "staged").exists():
-            shutil.rmtree(beside)
-        else:
-            _clear(beside, folder)
-    (folder / HIDDEN / "staged").unlink(missing_ok=True)
+    if _is_left_over(beside, lock):
+        _clear(beside, folder)
     if (folder / HIDDEN / "ready").is_dir():
         _move_in(folder)
     if (folder / HIDDEN / "new").is_dir():
@@ -79,7 +87,18 @@ def _beside(folder: Path) -> Path:
 
 
 def _asides(folder: Path) -> list[Path]:
-    return [path for path in folder.glob(f"{ASIDE}*") if (path / HIDDEN).is_dir()]
+    """List the folders in a folder where cmg_mj has set results aside."""
+    return [path for path in folder.glob(f"{ASIDE}*") if (path / HIDDEN).is_dir() and _is_own(path)]
+
+
+def _is_own(folder: Path) -> bool:
+    """Return whether all that a folder in a run folder says of itself can be cmg_mj's; a link leads elsewhere."""
+    try:
+        require_own(folder)
+        Manifest.read(folder)
+    except InputError:
+        return False
+    return not folder.is_symlink()
 
 
 def _superseded(folder: Path, by: Manifest) -> list[Path]:
@@ -87,17 +106,16 @@ def _superseded(folder: Path, by: Manifest) -> list[Path]:
     return [path for path in _asides(folder) if by.complete and not (path / HIDDEN / "lock").exists()]
 
 
-def _is_dead(beside: Path, lock: Lock) -> bool:
-    """Return whether the folder is cmg_mj's, and of a process that has ended."""
-    if not (beside / HIDDEN).is_dir():
-        return not any(beside.iterdir())
-    if lock.is_the_file(beside / HIDDEN / "lock"):
-        return True
-    try:
-        Lock(beside / HIDDEN / "lock").release()
-    except Busy:
+def _is_left_over(beside: Path, lock: Lock) -> bool:
+    """Return whether the folder is one that a run of this folder, now ended, had there while it swapped the two.
+
+    Its lock is then the folder's own, by another name. A folder that only looks like it is somebody's.
+    """
+    if beside.is_symlink() or not beside.is_dir():
         return False
-    return True
+    if not any(beside.iterdir()):
+        return True
+    return _is_own(beside) and lock.is_the_file(beside / HIDDEN / "lock")
 
 
 def _swap_folders(new: Path, folder: Path, lock: Lock) -> bool:
@@ -188,16 +206,16 @@ def _unused(path: Path) -> Path:
 def _move_in(folder: Path) -> None:
     """Move the files of `.cmg-mj/ready` into their folder, as many as are still to be moved; its manifest last."""
     ready = folder / HIDDEN / "ready"
-    if (ready / HIDDEN / "files.json").exists():
+    if (ready / HIDDEN / FILES).exists():
         old, new = Manifest.read(folder), Manifest.read(ready)
         for name in old.files:
             if name not in new.files and old.has(folder / name):
                 (folder / name).unlink()
         for name in new.files:
             free = not os.path.lexists(folder / name) or old.has(folder / name)
-            if free and (ready / name).exists():
+            if free and is_plain_file(ready / name):
                 (ready / name).replace(folder / name)
         for aside in _superseded(folder, new):
             remove_result(aside)
-        (ready / HIDDEN / "files.json").replace(folder / HIDDEN / "files.json")
+        (ready / HIDDEN / FILES).replace(folder / HIDDEN / FILES)
     shutil.rmtree(ready)
