@@ -111,11 +111,12 @@ def _is_left_over(beside: Path, lock: Lock) -> bool:
 
     Its lock is then the folder's own, by another name. A folder that only looks like it is somebody's.
     """
-    if beside.is_symlink() or not beside.is_dir():
+    if not beside.is_dir() or not _is_own(beside):
         return False
-    if not any(beside.iterdir()):
-        return True
-    return _is_own(beside) and lock.is_the_file(beside / HIDDEN / "lock")
+    hidden = beside / HIDDEN
+    if list(beside.iterdir()) in ([], [hidden]) and not any(hidden.glob("*")):
+        return True  # all but taken away
+    return lock.is_the_file(hidden / "lock")
 
 
 def _swap_folders(new: Path, folder: Path, lock: Lock) -> bool:
@@ -183,8 +184,14 @@ def _clear(old: Path, folder: Path) -> None:
             path.rename(there)
         else:
             path.rename(_unused(there))
-    shutil.rmtree(old / HIDDEN, ignore_errors=True)
+    for path in (old / HIDDEN).glob("*"):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        elif path.name != "lock":
+            path.unlink()
+    (old / HIDDEN / "lock").unlink(missing_ok=True)  # last: it shows that the folder is cmg_mj's
     with suppress(OSError):  # if there is something again, it stays
+        (old / HIDDEN).rmdir()
         old.rmdir()
 
 
