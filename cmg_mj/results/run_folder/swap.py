@@ -190,8 +190,8 @@ def _clear(old: Path, folder: Path) -> None:
         elif path.name != "lock":
             path.unlink()
     (old / HIDDEN / "lock").unlink(missing_ok=True)  # last: it shows that the folder is cmg_mj's
+    shutil.rmtree(old / HIDDEN, ignore_errors=True)
     with suppress(OSError):  # if there is something again, it stays
-        (old / HIDDEN).rmdir()
         old.rmdir()
 
 
