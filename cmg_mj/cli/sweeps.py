@@ -99,7 +99,7 @@ def sweep(
     with _runner(cluster) as run:
         folder = claim_folder(place, FILES)
         store = Store(place, study)
-        before = store.open()
+        before = store.open(on_damage=note)
         if before:
             note(f"{before} of {study.trials} trials are there from before")
         with CtrlC() as ctrl_c:

@@ -12,6 +12,11 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
+def is_plain_file(path: Path) -> bool:
+    """Return whether this is a file, and neither a link to one nor a pipe or a device."""
+    return path.is_file() and not path.is_symlink()
+
+
 @contextmanager
 def whole_file(path: Path, ending: str = "") -> Iterator[Path]:
     """Give a temporary name to write to; rename it to `path` at the end, or remove it if the writing failed.

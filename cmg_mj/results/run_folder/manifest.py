@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from cmg_mj.errors import InputError, shown
+from cmg_mj.results.files import is_plain_file
 
 HIDDEN = ".cmg-mj"
 """What is cmg_mj's own in a run folder: the manifest; while a run lives, also its lock and the result being written."""
@@ -108,11 +109,6 @@ def remove_result(folder: Path) -> None:
             empty.rmdir()
         except OSError:  # what holds something stays
             return
-
-
-def is_plain_file(path: Path) -> bool:
-    """Return whether this is a file, and neither a link to one nor a pipe or a device."""
-    return path.is_file() and not path.is_symlink()
 
 
 def _is_bare(name: str) -> bool:

@@ -17,12 +17,12 @@ from contextlib import suppress
 from pathlib import Path
 
 from cmg_mj.errors import InputError
+from cmg_mj.results.files import is_plain_file
 from cmg_mj.results.run_folder.lock import Busy, Lock
 from cmg_mj.results.run_folder.manifest import (
     FILES,
     HIDDEN,
     Manifest,
-    is_plain_file,
     remove_result,
     require_own,
     users_files,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,7 +17,7 @@ import pyarrow.parquet as pq
 import tomli_w
 
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.results.files import write_bytes, write_parquet
+from cmg_mj.results.files import is_plain_file, write_bytes, write_parquet
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.axes import FieldValue
 from cmg_mj.studies.sweeps.chunk import compute
@@ -25,10 +26,12 @@ from cmg_mj.studies.sweeps.fingerprint import (
     ChunkFingerprint,
     StudyFields,
     as_read,
+    damage,
     fingerprint_in,
     first_difference,
     hash_of_models,
     hash_of_study,
+    hash_of_table,
     not_ours,
     other_version,
     resolved,
@@ -42,6 +45,10 @@ TRIALS = "trials.parquet"
 """Files of a sweep's folder."""
 GOES_ON = "what is finished is kept, and the same command goes on from there"
 AGAIN = "delete it, and it is computed again"
+
+
+class Unreadable(Exception):
+    """A chunk's file is there, but no table can be read from it."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +65,12 @@ class Store:
     folder: Path
     study: SweepStudy
 
-    def open(self) -> int:
+    def open(self, on_damage: Callable[[str], None] | None = None) -> int:
         """Begin, or go on with the chunks that are there.
+
+        Args:
+            on_damage: Called with a message for each chunk that is damaged. It counts as not finished, and its file
+                gets another name.
 
         Returns:
             How many trials are finished.
@@ -68,10 +79,12 @@ class Store:
             InputError: The folder has another study or chunks of one, was computed with other versions and is not
                 finished, or cannot be written.
         """
-        path = self.folder / STUDY
+        path, chunks = self.folder / STUDY, self.folder / CHUNKS
+        if chunks.is_symlink():  # out of the folder
+            raise InputError(f"{chunks}: is a link: remove it, or name another folder")
         study = as_read(self._resolved)
         there = _require_same(path, study) if path.exists() else None
-        marks = self._marks()
+        marks = self._marks(on_damage)
         left = self.left()
         if left:
             versions_of: dict[Path, FieldValue | None] = {
@@ -87,7 +100,6 @@ class Store:
                 write_bytes(path, tomli_w.dumps(study).encode())
         except OSError as error:
             raise InputError(f"{self.folder}: cannot be written: {error.strerror or error}") from error
-        chunks = self.folder / CHUNKS
         try:
             chunks.mkdir(exist_ok=True)
         except OSError as error:
@@ -107,14 +119,27 @@ class Store:
     def _mark(self, number: int) -> ChunkFingerprint:
         return replace(self._ours, chunk=f"{number + 1} of {len(self.study.chunks)}")
 
-    def _marks(self) -> dict[int, ChunkFingerprint]:
-        """Read the fingerprints of the finished chunks, all of which are the study's own."""
+    def _marks(self, on_damage: Callable[[str], None] | None) -> dict[int, ChunkFingerprint]:
+        """Read the fingerprints of the finished chunks, all of which are the study's own; set damaged ones aside."""
         left = set(self.left())
         marks = {}
         for number in range(len(self.study.chunks)):
-            if number not in left:
-                with self._opened(number) as (_, mark):
+            if number in left:
+                continue
+            path = self.path(number)
+            if not is_plain_file(path):
+                raise InputError(f"{path}: is no file that cmg-mj writes; {AGAIN}, or name another folder")
+            try:
+                with self._opened(number) as (file, mark):
+                    wrong = damage(file.read(), mark)
                     marks[number] = mark
+            except Unreadable as error:
+                wrong = str(error)
+            if wrong:
+                marks.pop(number, None)
+                path.replace(path.with_suffix(".damaged"))
+                if on_damage:
+                    on_damage(f"{path}: {wrong}; it is computed again, and kept as {path.stem}.damaged")
         return marks
 
     @contextmanager
@@ -122,7 +147,8 @@ class Store:
         """Open a finished chunk's file and read its fingerprint.
 
         Raises:
-            InputError: The file cannot be read, or is not the study's own.
+            Unreadable: The file cannot be read.
+            InputError: The file is not the study's own.
         """
         path = self.path(number)
         try:
@@ -133,11 +159,11 @@ class Store:
                     raise InputError(f"{path}: {why}; {AGAIN}, or name another folder")
                 yield file, mark
         except (OSError, pa.ArrowException) as error:
-            raise InputError(f"{path}: cannot be read: {' '.join(str(error).split())}; {AGAIN}") from error
+            raise Unreadable(f"cannot be read: {' '.join(str(error).split())}") from error
 
     def left(self) -> list[int]:
         """List the numbers of the chunks that are not finished."""
-        return [number for number in range(len(self.study.chunks)) if not self.path(number).exists()]
+        return [number for number in range(len(self.study.chunks)) if not os.path.lexists(self.path(number))]
 
     def path(self, number: int) -> Path:
         """Name a chunk's file, which is there when the chunk is finished."""
@@ -153,7 +179,8 @@ class Store:
             model = self.study.scenario.plant.model
             raise RunStopped(f"{model}: has changed since the sweep began; what is finished is of the file as it was")
         try:
-            marked = table.replace_schema_metadata(self._mark(number).as_metadata())
+            mark = replace(self._mark(number), rows=len(table), content=hash_of_table(table))
+            marked = table.replace_schema_metadata(mark.as_metadata())
             write_parquet(self.path(number), marked, durable=True)
         except OSError as error:
             raise RunStopped(f"{self.path(number)}: cannot be written: {error.strerror or error}; {GOES_ON}") from error
@@ -166,8 +193,11 @@ class Store:
         """
         names = None if columns is None else list(columns)
         for number in range(len(self.study.chunks)):
-            with self._opened(number) as (file, _):
-                table = file.read(columns=names)
+            try:
+                with self._opened(number) as (file, _):
+                    table = file.read(columns=names)
+            except Unreadable as error:
+                raise InputError(f"{self.path(number)}: {error}; {AGAIN}") from error
             yield table
 
 

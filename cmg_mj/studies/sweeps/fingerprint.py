@@ -7,7 +7,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import tomli_w
 
@@ -17,6 +17,9 @@ from cmg_mj.inputs.includes import check_files
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.sweeps.axes import FieldValue
 from cmg_mj.studies.sweeps.study import SweepStudy
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 KEY = b"cmg_mj.chunk"
 FREE = "order"
@@ -34,12 +37,16 @@ class ChunkFingerprint:
         model: Hash of its models' files.
         chunk: The chunk's number, such as `2 of 8`.
         versions: Name -> version with which the chunk was computed.
+        rows: Number of its trials.
+        content: Hash of their values.
     """
 
     study: str
     model: str
     chunk: str
     versions: Mapping[str, str]
+    rows: int = 0
+    content: str = ""
 
     def as_metadata(self) -> dict[bytes, bytes]:
         """Make metadata of a file."""
@@ -49,9 +56,25 @@ class ChunkFingerprint:
 def fingerprint_in(metadata: Mapping[bytes, bytes] | None) -> ChunkFingerprint | None:
     """Read the fingerprint of a file; None if it has none."""
     try:
-        return ChunkFingerprint(**json.loads((metadata or {})[KEY]))
-    except (LookupError, ValueError, TypeError):
+        fingerprint = ChunkFingerprint(**json.loads((metadata or {})[KEY]))
+    except (LookupError, ValueError, TypeError, RecursionError):
         return None
+    return fingerprint if isinstance(fingerprint.versions, dict) else None
+
+
+def hash_of_table(table: pa.Table) -> str:
+    """Hash the values of a table, which its file's compression and layout leave the same."""
+    digest = hashlib.sha256()
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        digest.update(f"{name} {column.type} {column.to_pylist()}".encode(errors="surrogatepass"))
+    return digest.hexdigest()
+
+
+def damage(table: pa.Table, there: ChunkFingerprint) -> str | None:
+    """Say how a chunk's trials differ from those that were kept; None if they do not."""
+    if len(table) != there.rows:
+        return f"holds {len(table)} trials of {there.rows}"
+    return None if hash_of_table(table) == there.content else "holds other values than were computed"
 
 
 def not_ours(there: ChunkFingerprint | None, ours: ChunkFingerprint) -> str | None:

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+import shutil
+from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.results import files
@@ -27,10 +32,15 @@ def full(*arguments: Any, **options: Any) -> Any:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def whole_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("whole") / "out"
     assert cmg_mj(*SWEEP, out).status == 0
-    return (out / "trials.parquet").read_bytes()
+    return out
+
+
+@pytest.fixture(scope="module")
+def whole(whole_folder: Path) -> bytes:
+    return (whole_folder / "trials.parquet").read_bytes()
 
 
 def times(folder: Path) -> dict[str, int]:
@@ -93,14 +103,69 @@ def test_two_sweeps_in_one_folder(tmp_path: Path, whole: bytes) -> None:
     assert (tmp_path / "trials.parquet").read_bytes() == whole
 
 
-@pytest.mark.slow
-def test_a_chunk_that_cannot_be_read_is_named(tmp_path: Path, whole: bytes) -> None:
-    assert cmg_mj(*SWEEP, tmp_path).status == 0
-    chunk = tmp_path / "chunks" / "000002.parquet"
-    chunk.write_bytes(chunk.read_bytes()[:100])
-    complaint = cmg_mj(*SWEEP, tmp_path).err.splitlines()[-1]
-    assert complaint.startswith(f"cmg-mj: {chunk}: cannot be read: ")
-    assert complaint.endswith("; delete it, and it is computed again")
+def flipped(chunk: Path) -> None:
+    content = bytearray(chunk.read_bytes())
+    content[40] ^= 1
+    chunk.write_bytes(content)
+
+
+def rewritten(chunk: Path, table: pa.Table) -> None:
+    """Write other trials under the fingerprint that is there."""
+    metadata = pq.read_schema(chunk).metadata
+    pq.write_table(table.replace_schema_metadata(metadata), chunk)
+
+
+def edited(chunk: Path) -> None:
+    table = pq.read_table(chunk)
+    column = table.column_names.index("velocity_rms_rad_s")
+    values = [2.0 * value for value in table.column(column).to_pylist()]
+    rewritten(chunk, table.set_column(column, "velocity_rms_rad_s", pa.array(values)))
+
+
+DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
+    "the first bytes alone": (lambda chunk: chunk.write_bytes(chunk.read_bytes()[:100]), "cannot be read: .*"),
+    "no byte": (lambda chunk: chunk.write_bytes(b""), "cannot be read: .*"),
+    "one bit": (flipped, "cannot be read: .*|holds other values than were computed"),
+    "a value": (edited, "holds other values than were computed"),
+    "one trial less": (lambda chunk: rewritten(chunk, pq.read_table(chunk)[:3]), "holds 3 trials of 4"),
+}
+
+
+@pytest.fixture
+def finished(tmp_path: Path, whole_folder: Path) -> Path:
+    """A folder of a finished sweep."""
+    return Path(shutil.copytree(whole_folder, tmp_path / "out"))
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_chunk_is_computed_again(finished: Path, whole: bytes, damage: str) -> None:
+    harm, message = DAMAGES[damage]
+    chunk = finished / "chunks" / "000002.parquet"
+    kept = times(finished / "chunks")
+    harm(chunk)
+    again = cmg_mj(*SWEEP, finished)
+    assert again.status == 0
+    assert re.match(f"cmg-mj: {chunk}: ({message}); it is computed again, and kept as 000002.damaged\n", again.err)
+    assert "8 of 12 trials are there from before" in again.err
+    assert (finished / "trials.parquet").read_bytes() == whole
+    unharmed = ("000000.parquet", "000001.parquet")
+    assert {name: times(finished / "chunks")[name] for name in unharmed} == {name: kept[name] for name in unharmed}
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("nowhere", path)])
+def test_something_else_in_the_place_of_a_chunk(finished: Path, make: Callable[[Path], object]) -> None:
+    chunk = finished / "chunks" / "000002.parquet"
     chunk.unlink()
-    assert cmg_mj(*SWEEP, tmp_path).status == 0
-    assert (tmp_path / "trials.parquet").read_bytes() == whole
+    make(chunk)
+    complaint = cmg_mj(*SWEEP, finished).complaint
+    assert complaint.startswith(f"{chunk}: is no file that cmg-mj writes; delete it, and it is computed again")
+
+
+def test_chunks_elsewhere(tmp_path: Path) -> None:
+    """A folder from somebody else leads nowhere else."""
+    (tmp_path / "user").mkdir()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "chunks").symlink_to(tmp_path / "user")
+    complaint = cmg_mj(*SWEEP, tmp_path / "out").complaint
+    assert complaint == f"{tmp_path / 'out' / 'chunks'}: is a link: remove it, or name another folder"
+    assert not list((tmp_path / "user").iterdir())
