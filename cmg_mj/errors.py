@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date, time
 from typing import TypeAlias
 
 TomlValue: TypeAlias = "bool | int | float | str | date | time | Sequence[TomlValue] | Mapping[str, TomlValue] | None"
 """What a TOML file can hold."""
 LONGEST_SHOWN = 80  # characters of a value in a message
+LONGEST_LIST = 800  # characters of a list of names
+LONGEST_RAISED = 300  # characters of what a user's code says
 
 
 class InputError(ValueError):
@@ -33,28 +35,55 @@ def nearest(name: str, allowed: Iterable[str], label: str = "allowed") -> str:
     """
     names = sorted(allowed)
     folded = {known.casefold(): known for known in names}
-    match = difflib.get_close_matches(name.casefold(), folded, n=1)
-    listing = f"{label}: {', '.join(names) or 'none'}"
-    return f"did you mean {folded[match[0]]!r}? {listing}" if match else listing
+    match = difflib.get_close_matches(name[:LONGEST_SHOWN].casefold(), folded, n=1)
+    listing = f"{label}: {listed(names) or 'none'}"
+    return f"did you mean {shown(folded[match[0]])}? {listing}" if match else listing
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names with commas between, each shortened; of very many the first, and how many more there are."""
+    parts: list[str] = []
+    room = LONGEST_LIST
+    for name in names:
+        parts.append(shortened(name))
+        room -= len(parts[-1]) + 2
+        if room < 0 and len(parts) < len(names):
+            return f"{', '.join(parts)} and {len(names) - len(parts):,} more"
+    return ", ".join(parts)
 
 
 def raised(error: BaseException) -> str:
-    """Describe what a user's code raised, `ValueError: too large`, even if its own message raises."""
+    """Describe what a user's code raised, `ValueError: too large`, shortened, even if its own message raises."""
+    text = shortened(_safely(lambda: str(error), "its message cannot be shown"), LONGEST_RAISED)
+    name = shortened(type(error).__name__, LONGEST_SHOWN)
+    return f"{name}: {text}" if text else name
+
+
+def shortened(text: str, longest: int = LONGEST_SHOWN) -> str:
+    """The beginning of a text, with `...` where more follows."""
+    return text if len(text) <= longest else f"{text[:longest]}..."
+
+
+def _safely(make: Callable[[], str], otherwise: str) -> str:
+    """A user's object as text; its own methods may raise anything."""
     try:
-        text = str(error)
-    except Exception:
-        text = "its message cannot be shown"
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+        return make()
+    except KeyboardInterrupt:
+        raise
+    except BaseException:
+        return otherwise
 
 
 def shown(value: TomlValue) -> str:
     """A value as the user wrote it in TOML, shortened; strings in Python's quotes, which TOML takes too."""
+    return _safely(lambda: shortened(_as_toml(value)), "what cannot be shown")
+
+
+def _as_toml(value: TomlValue) -> str:
     if isinstance(value, bool):
-        text = "true" if value else "false"
-    elif isinstance(value, (list, tuple)):
-        text = f"[{', '.join(shown(item) for item in value)}]"
-    elif isinstance(value, dict):
-        text = "{...}"
-    else:
-        text = repr(value) if isinstance(value, str) else str(value)
-    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+        return "true" if value else "false"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_as_toml(item) for item in value)}]"
+    if isinstance(value, dict):
+        return "{...}"
+    return repr(value) if isinstance(value, str) else str(value)

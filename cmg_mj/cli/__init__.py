@@ -13,7 +13,8 @@ import click
 
 from cmg_mj.cli import bench, boards, logs, mount, reproduce, scenarios, studio, sweeps, tune
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
-from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.errors import InputError, RunStopped, raised
+from cmg_mj.inputs.users_line import users_line
 
 ExitStatus = str | int | None
 """As `sys.exit` takes it."""
@@ -117,7 +118,8 @@ def _status(arguments: Sequence[str]) -> ExitStatus:
     try:
         cli.main(args=list(arguments), prog_name="cmg-mj", standalone_mode=False)
     except SystemExit as exit:
-        return exit.code
+        line = users_line(exit.__traceback__)
+        return _fail_with(f"{line}: raised {raised(exit)}", WRONG_INPUT) if line else exit.code
     except (InputError, RunStopped, click.ClickException) as error:
         return _fail_with(
             error.format_message() if isinstance(error, click.ClickException) else str(error), WRONG_INPUT
@@ -126,6 +128,11 @@ def _status(arguments: Sequence[str]) -> ExitStatus:
         return _fail_with("there is not enough memory for this; take a shorter run or fewer worlds", WRONG_INPUT)
     except (KeyboardInterrupt, click.Abort):  # before or after a command
         return _fail_with("interrupted", INTERRUPTED)
+    except BaseException as error:
+        line = users_line(error.__traceback__)
+        if line is None:
+            raise
+        return _fail_with(f"{line}: raised {raised(error)}", WRONG_INPUT)
     return DONE
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TextIO
 import click
 
 from cmg_mj.cli.pace import ProgressRate
+from cmg_mj.errors import shortened
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 """Exit statuses."""
+LONGEST_LINE = 4000
+"""Characters of a message."""
 
 
 class OnProgress(Protocol):
@@ -104,9 +107,9 @@ def own_stdout() -> TextIO:
 
 
 def note(message: str) -> None:
-    """Write one line to standard error, if it is read."""
+    """Write one line to standard error, if it is read; of a very long message its beginning."""
     with suppress(OSError):
-        click.echo(f"cmg-mj: {' '.join(message.split())}", err=True)
+        click.echo(f"cmg-mj: {shortened(' '.join(message.split()), LONGEST_LINE)}", err=True)
 
 
 def note_hints(hints: Iterable[str]) -> None:

@@ -30,8 +30,10 @@ def dry_run_observer(observer: Observer, worlds: int | None) -> None:
         state = observer.init(first)
         call = "step(state, y, u)"
         returned = observer.step(state, second, u)
-    except (Exception, SystemExit) as error:  # a user's observer may fail in any way
-        raise InputError(f"{call} raised {raised(error)}{_hint(worlds)}") from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a user's observer may fail in any way
+        raise InputError(f"{call} raised {raised(error)}{_longer_estimate(error)}{_hint(worlds)}") from error
     try:
         _, estimate = returned
         if not hasattr(estimate, "__len__"):  # a generator, which could be read once
@@ -58,7 +60,9 @@ def dry_run_law(law: Law, extra: int, worlds: int | None) -> None:
             state = returned[0]
     except InputError:
         raise
-    except (Exception, SystemExit) as error:  # a user's law may fail in any way
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a user's law may fail in any way
         raise InputError(f"{call} raised {raised(error)}{_hint(worlds)}") from error
     trimmed = getattr(law, "trim_gain", None) is not None
     if trimmed and not (hasattr(state, "_replace") and hasattr(state, "x_e")):
@@ -88,6 +92,13 @@ def _samples(worlds: int | None) -> tuple[Measurement, Measurement, Scalar]:
     if worlds is not None:
         read_only(*first, first.acceleration, *second, second.acceleration, u)
     return first, second, u
+
+
+def _longer_estimate(error: BaseException) -> str:
+    """Say how an estimate of more than x is written, to who gave `Estimate` more than its three parts."""
+    if not isinstance(error, TypeError) or "Estimate.__new__()" not in str(error):
+        return ""
+    return "; extra signals follow an estimate of three parts, as in (*Estimate(x1, x2, x3), bias_rad)"
 
 
 def _hint(worlds: int | None) -> str:

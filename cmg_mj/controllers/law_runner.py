@@ -9,7 +9,7 @@ import numpy as np
 from cmg_mj.controllers.laws.protocol import FeedbackState, Law
 from cmg_mj.elementwise import Scalar, clip
 from cmg_mj.observers.protocol import Measurement, State
-from cmg_mj.observers.user_code import FAILURES, UserCode, real_array
+from cmg_mj.observers.user_code import UserCode, real_array
 
 
 class LawRunner:
@@ -41,7 +41,9 @@ class LawRunner:
         """
         try:
             self._state = self.law.init(y)
-        except FAILURES as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever a user's code raises
             self._user_code.fail_from(error, step)
 
     def trim(self, x_e: Scalar) -> None:
@@ -82,7 +84,9 @@ class LawRunner:
             if self._single and type(command) is float and type(x_e) is float and self._least <= command <= self._most:
                 return command, x_e
             command, x_e = self._coerced(command, x_e, y)
-        except FAILURES as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever a user's code raises
             self._user_code.fail_from(error, step)
         if self._single and not math.isfinite(command):  # many worlds are judged one by one, elsewhere
             self._user_code.fail(f"returned {command} for u", step)

@@ -53,16 +53,29 @@ class UserClassKind:
         module_name, _, class_name = self.known.get(kind, kind).partition(":")
         try:
             cls = getattr(importlib.import_module(module_name), class_name)
-        except (Exception, SystemExit) as error:  # a user's module may fail in any way while it is imported
+            fits = inspect.isclass(cls) and all(callable(getattr(cls, name, None)) for name in self.methods)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # a user's module may fail in any way while it is imported
             raise InputError(f"{setting}: cannot be imported: {raised(error)}") from error
-        if not (inspect.isclass(cls) and all(callable(getattr(cls, name, None)) for name in self.methods)):
+        if not fits:
             methods = " and ".join(f"{name}({parameters})" for name, parameters in self.methods.items())
             raise InputError(f"{setting}: must be a class with the methods {methods}")
         return cls
 
     def takes(self, kind: str) -> Mapping[str, inspect.Parameter]:
-        """Return the parameters of the constructor, by name."""
-        return inspect.signature(self.find(kind)).parameters
+        """Return the parameters of the constructor, by name.
+
+        Raises:
+            InputError: There is no such class, or it does not tell them.
+        """
+        cls = self.find(kind)
+        try:
+            return inspect.signature(cls).parameters
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # such as a __signature__ of the user's that is none
+            raise InputError(f"{self.what} {kind}: its parameters cannot be read: {raised(error)}") from error
 
     def may_take(self, kind: str, name: str) -> bool:
         """Say whether the constructor takes a parameter of this name."""
@@ -141,7 +154,9 @@ class UserClassKind:
         except ValidationError as error:
             clause = complaint(cls, error.errors()[0], {**bench_arguments, **parameters})
             raise InputError(f"{self.section}.{clause} ({self.what} {kind})") from error
-        except (Exception, SystemExit) as error:  # a user's own class may refuse its parameters in its own way
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # a user's own class may refuse its parameters in its own way
             raise InputError(f"{self.what} {kind}: {raised(error)}") from error
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple, Protocol
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, nearest, raised, shortened
 
 
 class _Angles(NamedTuple):
@@ -102,11 +103,36 @@ def needs(observer: Observer | type) -> tuple[str, ...]:
     Raises:
         InputError: It names something else.
     """
-    named = tuple(getattr(observer, "needs", ("model", "gimbals")))
-    for name in named:
-        if name not in NEEDS:
-            raise InputError(f"needs = {named!r}: there is no {name!r}; {nearest(str(name), NEEDS)}")
-    return named
+    return names_out_of(NEEDS, declared("needs", lambda: getattr(observer, "needs", ("model", "gimbals"))))
+
+
+def names_out_of(allowed: Collection[str], names: Collection[str]) -> tuple[str, ...]:
+    """Return what a user's class declares in `needs`.
+
+    Raises:
+        InputError: It is no collection of names out of those allowed.
+    """
+    if not isinstance(names, (tuple, list, set, frozenset)):
+        raise InputError(f"needs must be a tuple of names, not {shortened(repr(names))}; {nearest('', allowed)}")
+    for name in names:
+        if not isinstance(name, str) or name not in allowed:
+            where = f"needs = {shortened(repr(names))}: there is no {shortened(repr(name))}"
+            raise InputError(f"{where}; {nearest(str(name), allowed)}")
+    return tuple(names)
+
+
+def declared(attribute: str, read: Callable[[], Collection[str]]) -> Collection[str]:
+    """Read an attribute of a user's class, which may be a property that raises anything.
+
+    Raises:
+        InputError: It raised.
+    """
+    try:
+        return read()
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise InputError(f"{attribute} cannot be read: {raised(error)}") from error
 
 
 def extra_signals(observer: Observer) -> tuple[str, ...]:
@@ -121,10 +147,12 @@ def extra_signals(observer: Observer) -> tuple[str, ...]:
     Raises:
         ValueError: They are not distinct lower-case names.
     """
-    names = getattr(observer, "extra_signals", ())
+    names = declared("extra_signals", lambda: getattr(observer, "extra_signals", ()))
     fits = isinstance(names, (tuple, list)) and all(
         isinstance(name, str) and re.fullmatch("[a-z][a-z0-9_]*", name) and name not in RESERVED for name in names
     )
     if not fits or len(set(names)) < len(names):
-        raise ValueError(f"extra_signals must be a tuple of names like ('bias_rad',), each once, not {names!r}")
+        raise ValueError(
+            f"extra_signals must be a tuple of names like ('bias_rad',), each once, not {shortened(repr(names))}"
+        )
     return tuple(names)

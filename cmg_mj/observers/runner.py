@@ -11,7 +11,7 @@ import numpy as np
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers.protocol import Estimate, Measurement, Observer, State, extra_signals
-from cmg_mj.observers.user_code import FAILURES, UserCode, real_array
+from cmg_mj.observers.user_code import UserCode, real_array
 
 
 def read_only(*arrays: np.ndarray) -> None:
@@ -98,7 +98,9 @@ class ObserverRunner:
                     estimate = as_estimate([part.copy() for part in estimate])
                 else:
                     estimate = self._coerced(estimate, self._widths[i], y)
-            except FAILURES as error:
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # whatever a user's code raises
                 if i == 0:
                     self._user_codes[0].fail_from(error, step)
                 # An open-loop observer must not end the run: it is NaN from here on.
@@ -113,7 +115,9 @@ class ObserverRunner:
     def _first_state(self, i: int, y: Measurement, step: int) -> State:
         try:
             return self._running[i].init(y)
-        except FAILURES as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever a user's code raises
             self._user_codes[i].fail_from(error, step)
 
     def _has_right_shape(self, estimate: Sequence[Scalar], width: int, y: Measurement) -> bool:

@@ -9,9 +9,6 @@ from numpy.typing import ArrayLike
 
 from cmg_mj.errors import RunStopped, raised
 
-FAILURES = (Exception, SystemExit)
-"""What a user's code may raise."""
-
 
 class UserCode(NamedTuple):
     """An observer or a law in a run, as an error names it."""

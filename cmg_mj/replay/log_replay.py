@@ -179,7 +179,9 @@ def _estimates(observer: Observer, log: Log) -> dict[str, np.ndarray] | str:
         try:
             with np.errstate(all="ignore"):
                 signals = replay_all(observer, log.trajectory(part))
-        except (Exception, SystemExit) as error:  # a user's observer may fail in any way
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # a user's observer may fail in any way
             return f"raised {raised(error)}"
         for name, values in signals.items():
             if not np.isfinite(values).all():

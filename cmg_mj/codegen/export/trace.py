@@ -133,7 +133,9 @@ def _call(name: str, function: Callable[[], Result]) -> Result:
         return function()
     except NotExportable:
         raise
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise NotExportable(f"{name} raised {raised(error)} {raised_at(error.__traceback__)}") from error
 
 
