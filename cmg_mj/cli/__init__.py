@@ -14,7 +14,6 @@ import click
 from cmg_mj.cli import bench, boards, logs, mount, reproduce, scenarios, studio, sweeps, tune
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
 from cmg_mj.errors import InputError, RunStopped, raised
-from cmg_mj.inputs.users_line import users_line
 
 ExitStatus = str | int | None
 """As `sys.exit` takes it."""
@@ -118,8 +117,7 @@ def _status(arguments: Sequence[str]) -> ExitStatus:
     try:
         cli.main(args=list(arguments), prog_name="cmg-mj", standalone_mode=False)
     except SystemExit as exit:
-        line = users_line(exit.__traceback__)
-        return _fail_with(f"{line}: raised {raised(exit)}", WRONG_INPUT) if line else exit.code
+        return exit.code if (blame := _blame(exit)) is None else _fail_with(blame, WRONG_INPUT)
     except (InputError, RunStopped, click.ClickException) as error:
         return _fail_with(
             error.format_message() if isinstance(error, click.ClickException) else str(error), WRONG_INPUT
@@ -129,11 +127,18 @@ def _status(arguments: Sequence[str]) -> ExitStatus:
     except (KeyboardInterrupt, click.Abort):  # before or after a command
         return _fail_with("interrupted", INTERRUPTED)
     except BaseException as error:
-        line = users_line(error.__traceback__)
-        if line is None:
+        if (blame := _blame(error)) is None:
             raise
-        return _fail_with(f"{line}: raised {raised(error)}", WRONG_INPUT)
+        return _fail_with(blame, WRONG_INPUT)
     return DONE
+
+
+def _blame(error: BaseException) -> str | None:
+    """Describe what a user's own code raised where nobody expects it to run; None if it is not the user's."""
+    from cmg_mj.inputs.users_line import users_line
+
+    line = users_line(error.__traceback__)
+    return None if line is None else f"{line}: raised {raised(error)}"
 
 
 def _open_streams() -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import sysconfig
 from pathlib import Path
 from types import TracebackType
 
-_PACKAGE = str(Path(__file__).resolve().parents[1])
-_LIBRARIES = (_PACKAGE, *(sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")))
+_OURS = str(Path(__file__).resolve().parents[1])
+_STANDARD = sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")
+_OTHERS = {"site-packages", "dist-packages"}
 
 
 def users_line(traceback: TracebackType | None) -> str | None:
@@ -20,7 +20,8 @@ def users_line(traceback: TracebackType | None) -> str | None:
     line = None
     while traceback is not None:
         file = traceback.tb_frame.f_code.co_filename
-        if os.path.exists(file) and not os.path.abspath(file).startswith(_LIBRARIES):
-            line = f"{os.path.basename(file)}, line {traceback.tb_lineno}"
+        path = Path(file).absolute()
+        if path.exists() and not str(path).startswith((_OURS, *_STANDARD)) and _OTHERS.isdisjoint(path.parts):
+            line = f"{path.name}, line {traceback.tb_lineno}"
         traceback = traceback.tb_next
     return line

@@ -11,6 +11,7 @@ from typing import Protocol, TypeAlias, TypeGuard, runtime_checkable
 import numpy as np
 
 from cmg_mj.errors import InputError, shown
+from cmg_mj.inputs.sanity import LARGEST
 
 FieldValue: TypeAlias = "float | str | Sequence[FieldValue] | Mapping[str, FieldValue]"
 """A value of a scenario's field, as TOML has it."""
@@ -131,6 +132,8 @@ def _parse_range(field: str, text: str, where: str) -> VariedField:
         raise InputError(f"{where}: {text!r} is no range; {how}")
     if not (math.isfinite(low) and math.isfinite(high)) or low == high:
         raise InputError(f"{where}: an empty range; its ends must be two different numbers")
+    if not math.isfinite(high - low):
+        raise InputError(f"{where}: {low:g} to {high:g} is wider than numbers reach; sizes are at most {LARGEST:g}")
     if log and not (low > 0.0 and high > 0.0):
         raise InputError(f"{where}: a logarithmic range needs ends above 0")
     if count is None:

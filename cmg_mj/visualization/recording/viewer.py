@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import IO
 from urllib.parse import urlsplit
 
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, shown
 
 LOOPBACK, PORT = "127.0.0.1", 9876
 """Address of a started viewer: rerun would listen on all interfaces. The port is rerun's default."""
@@ -79,9 +79,11 @@ def require_listening(address: str) -> None:
     host, port = parts_of(address)
     try:
         socket.create_connection((host, port), ANSWERS_WITHIN_S).close()
+    except UnicodeError as error:  # a part of the name is empty, or longer than 63 letters
+        raise InputError(f"--connect {shown(address)}: no name of a computer before the port") from error
     except OSError as error:
         raise InputError(
-            f"--connect {address!r}: no viewer listens there ({(error.strerror or str(error)).lower()}); "
+            f"--connect {shown(address)}: no viewer listens there ({(error.strerror or str(error)).lower()}); "
             f"start one with: rerun --bind {LOOPBACK} --port {port}"
         ) from error
 
@@ -96,7 +98,7 @@ def parts_of(address: str) -> tuple[str, int]:
         host, port, split = None, None, urlsplit("")
     if not host or not port or split.scheme != "rerun+http" or split.path not in ("", "/proxy"):
         raise InputError(
-            f"--connect {address!r}: no address of a viewer; give PORT, HOST:PORT or rerun+http://HOST:PORT/proxy"
+            f"--connect {shown(address)}: no address of a viewer; give PORT, HOST:PORT or rerun+http://HOST:PORT/proxy"
         )
     return host, port
 
