@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
+from cmg_mj.errors import InputError, shown
 from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
@@ -82,7 +83,22 @@ def closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) -> 
 
     Returns:
         The loop.
+
+    Raises:
+        InputError: In one sample a tilt grows beyond all numbers.
     """
+    try:
+        with np.errstate(all="ignore"):
+            return _closed_loop(scenario, law, model)
+    except (np.linalg.LinAlgError, ValueError, OverflowError) as error:
+        raise InputError(
+            f"plant.model = {shown(scenario.plant.model)}: its reduced model runs beyond all numbers within a sample "
+            f"of {law.dt:g} s; gravity, masses, lengths and speeds must be of sizes that go together"
+        ) from error
+
+
+def _closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) -> Loop:
+    """See `closed_loop`."""
     sensors = scenario.sensors
     used = [sensors.accelerometer, sensors.encoder, *([sensors.fog] if scenario.controller.feedback == "fog" else [])]
     period = max(law.dt, *(1.0 / sensor.rate_hz for sensor in used))
