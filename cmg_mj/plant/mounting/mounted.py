@@ -10,10 +10,13 @@ from pathlib import Path
 
 import mujoco
 
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, shown
 from cmg_mj.inputs.includes import check_files
+from cmg_mj.inputs.paths import expanded
+from cmg_mj.inputs.sanity import is_text
 from cmg_mj.plant.mjcf import check_rig
 from cmg_mj.results.files import whole_file
+from cmg_mj.results.signed_text import signed
 
 
 @dataclass(frozen=True)
@@ -44,14 +47,14 @@ class MountedRobot:
         Raises:
             InputError: The file cannot be written, is no .xml, or would replace the robot or a file that it names.
         """
-        target = Path(path).expanduser()
+        target = expanded(path, "-o")
         check_target(target, self.path)
         spec = self.spec.copy()
         for field in ("meshdir", "texturedir"):
             setattr(spec, field, _relative_assets(target.resolve().parent, spec.modelfiledir, getattr(spec, field)))
         try:
             with whole_file(target, ".xml") as temporary:
-                temporary.write_text(spec.to_xml(), encoding="utf-8")
+                temporary.write_bytes(signed(spec.to_xml(), ".xml"))
                 check_rig(temporary, target)
         except OSError as error:
             raise InputError(f"-o {path}: cannot be written: {error.strerror}") from error
@@ -69,6 +72,8 @@ def check_target(target: Path, robot: Path) -> None:
         InputError: The target is no .xml file, has no folder, or would replace a file of the robot's; or the scenario
             beside it would.
     """
+    if not is_text(str(target.absolute())):  # MuJoCo opens no such file, and a scenario names it in UTF-8
+        raise InputError(f"-o {shown(str(target))}: not UTF-8 text, or in a folder whose name is none")
     if target.suffix != ".xml":
         raise InputError(
             f"-o {target}: must be a file that ends in .xml, such as balanced.xml; a .toml comes beside it"

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.inputs.paths import expanded, require_file
 from cmg_mj.plant.mjcf import compile_model, parse
 from cmg_mj.plant.mounting.held_joints import joint_held, unused_name
 
@@ -46,9 +47,8 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
         InputError: The file is no MJCF, does not compile, or disables a feature that mounting needs.
     """
     if isinstance(robot, (str, Path)):
-        path = Path(robot).expanduser()
-        if not path.is_file():
-            raise InputError(f"{path}: no such file")
+        path = expanded(robot, "ROBOT")
+        require_file(path)
         spec = parse(path)
     else:
         spec, path = robot.copy(), Path("robot" if robot.modelname in ("", UNNAMED) else robot.modelname)

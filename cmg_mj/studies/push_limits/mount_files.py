@@ -12,13 +12,16 @@ import mujoco
 import tomli_w
 
 from cmg_mj.errors import InputError
+from cmg_mj.inputs.paths import expanded
 from cmg_mj.observers.registry import observer_class
 from cmg_mj.plant.mounting import MountedRobot
 from cmg_mj.plant.mounting.mount import mount_on_request
 from cmg_mj.plant.mounting.mounted import check_target, with_scenario
 from cmg_mj.plant.mounting.request import MountRequest
+from cmg_mj.plant.mounting.target import check_replaceable, claimed_target
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.files import whole_file
+from cmg_mj.results.signed_text import signed
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S
@@ -78,7 +81,7 @@ def mount_and_write(
         request: The body, the axis and the modules.
         target: The model's file, `.xml`; the scenario gets the same name with `.toml`.
         observer: Observer in the scenario's loop.
-        overwrite: Whether existing files are replaced.
+        overwrite: Whether the files of an earlier mount are replaced. Others never are.
 
     Returns:
         The robot, its files and its limits.
@@ -86,12 +89,15 @@ def mount_and_write(
     Raises:
         InputError: The robot or the request does not allow it, or a file cannot be written.
     """
-    robot, file = Path(robot), Path(target).expanduser()
+    robot, file = Path(robot), expanded(target, "-o")
     observer_class(observer)
-    check_target(file, robot.expanduser())
-    for path in (file, file.with_suffix(".toml")):
-        if path.exists() and not overwrite:
-            raise InputError(f"-o {target}: {path} exists; give another name, or --overwrite")
+    check_target(file, expanded(robot, "ROBOT"))
+    with claimed_target(file, overwrite=overwrite):
+        return _mount_and_write(robot, request, file, observer, overwrite=overwrite)
+
+
+def _mount_and_write(robot: Path, request: MountRequest, file: Path, observer: str, *, overwrite: bool) -> MountResult:
+    """See `mount_and_write`; the files are claimed."""
     mounted = _mount(robot, request)
     with with_scenario(file) as model:
         mounted.save(model)
@@ -99,12 +105,13 @@ def mount_and_write(
         experiment = write_scenario(model, mounted.path, observer, limits, request.name)
         sufficient = None
         if math.degrees(limits.limit.tilt) < LOW_LIMIT_DEG:
-            trial = model.with_name(f".{file.stem}.trial.xml")
+            trial = model.with_suffix(".trial.xml")
             sufficient = smallest_sufficient_scale(
                 lambda scale: _recoverable_tilt(robot, request, scale, trial, experiment.law.rate_limit), request.scale
             )
         scenario = scenario_text(file.name, mounted.path, observer, limits, request.name)
-        model.with_suffix(".toml").write_text(scenario, encoding="utf-8")
+        model.with_suffix(".toml").write_bytes(signed(scenario, ".toml"))
+        check_replaceable(file, overwrite=overwrite)  # also what has come meanwhile
     return MountResult(mounted, file, experiment.plant.single_axis(request.name), limits, sufficient)
 
 
@@ -144,7 +151,7 @@ def write_scenario(
     """
     path = model.with_suffix(".toml")
     with whole_file(path) as temporary:
-        temporary.write_text(scenario_text(model.name, robot, observer, limits, axis), encoding="utf-8")
+        temporary.write_bytes(signed(scenario_text(model.name, robot, observer, limits, axis), ".toml"))
     return prepare(load_scenario(str(path)))
 
 
