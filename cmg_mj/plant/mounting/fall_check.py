@@ -13,7 +13,9 @@ TRIED_DEG = 0.05
 UNTIL = 4.0
 """Growth of the tilt at which the simulation ends."""
 LONGEST_S = 3.0
-"""Longest simulation; a robot that has not begun to fall by then stands [s]."""
+"""Longest simulation; a robot whose tilt has not grown so much by then falls too slowly to judge, or stands [s]."""
+SLOWEST = math.acosh(UNTIL) / LONGEST_S
+"""Slowest fall of a robot that a pair is mounted on [1/s]."""
 
 
 def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.0) -> float:
@@ -26,7 +28,7 @@ def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.
         bias: Equilibrium bias e: tilt of the equilibrium, less that of the keyframe [rad].
 
     Returns:
-        lambda [1/s]; 0 if the robot does not fall.
+        lambda [1/s]; 0 if the tilt does not grow, and less than `SLOWEST` if it has not grown enough in time.
     """
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)
@@ -42,4 +44,4 @@ def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.
     while growth < UNTIL and data.time < LONGEST_S:
         mujoco.mj_step(model, data)
         growth = (float(line.lean(data.qpos)) + bias) / start
-    return math.acosh(growth) / float(data.time) if growth >= UNTIL else 0.0
+    return math.acosh(growth) / float(data.time) if growth > 1.0 else 0.0

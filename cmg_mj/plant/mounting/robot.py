@@ -11,6 +11,8 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.paths import expanded, require_file
+from cmg_mj.inputs.sanity import is_text
+from cmg_mj.plant.checks import STEPS_S
 from cmg_mj.plant.mjcf import compile_model, parse
 from cmg_mj.plant.mounting.held_joints import joint_held, unused_name
 
@@ -58,6 +60,8 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
     # Neither may take the modules' frames away, nor fuse them with what they hang on.
     spec.compiler.discardvisual = spec.compiler.fusestatic = False
     compile_model(spec, path)
+    if not spec.option.timestep >= STEPS_S[0]:
+        raise InputError(f'{path}: <option timestep="{spec.option.timestep:g}"/>: must be at least {STEPS_S[0]:g} s')
     off = [flag for name, flag in NEEDED.items() if spec.option.disableflags & int(getattr(mujoco.mjtDisableBit, name))]
     if off:
         raise InputError(
@@ -139,7 +143,7 @@ def body_of(spec: mujoco.MjSpec, name: str, path: Path) -> mujoco.MjsBody:
     Raises:
         InputError: There is no such body, or it is the world.
     """
-    body = spec.body(name) if name != "world" else None
+    body = spec.body(name) if name != "world" and is_text(name) else None
     if body is None:
         names = [body.name for body in spec.bodies if body.name and body.name != "world"]
         raise InputError(f"--body {name}: {path} has no such body; {nearest(name, names, 'its bodies')}")
