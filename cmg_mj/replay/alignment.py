@@ -48,7 +48,8 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
         return Alignment(lag_s, None, None, None)
     rise, travel = np.concatenate(rises), np.concatenate(travels)
     rise, travel = rise[np.isfinite(travel)], travel[np.isfinite(travel)]
-    if len(rise) < 3 or not np.ptp(travel) > 0.0 or not np.ptp(rise) > 0.0:
+    rounding = np.finfo(float).eps * len(travel) * float(np.abs(travel).max(initial=0.0))
+    if len(rise) < 3 or not np.ptp(travel) > rounding or not np.ptp(rise) > 0.0:
         return Alignment(lag_s, None, None, None)
     correlation = float(np.corrcoef(rise, travel)[0, 1])
     slope, start = np.polynomial.polynomial.polyfit(travel, rise, 1)[::-1]

@@ -116,7 +116,7 @@ class Log:
         """Return which samples count: those from `settle_s` after the start of a part on, (n,)."""
         counted = np.zeros(len(self), dtype=bool)
         for part in self.parts:
-            counted[part.start + math.ceil(settle_s / self.dt - 1e-9) : part.stop] = True
+            counted[part.start + math.ceil(min(settle_s / self.dt, len(self)) - 1e-9) : part.stop] = True
         return counted
 
     def broken(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -32,6 +32,8 @@ UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
 FLICKER = 0.2
 """Noise makes an angle near the end of its turn wrap and return at once, within this of a full turn [rad]."""
+LONGEST_DELAY_S = 1e6
+"""Longest delay of a reference [s]."""
 
 
 def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
@@ -120,8 +122,8 @@ def _convert(path: Path, options: ReadOptions) -> _Rows:
     """Read the columns of a file, convert them, and check them one by one."""
     columns = columns_of(options.columns, options.units, options.scale, options.offset)
     tilt = accelerometer_geometry(columns, options.radii_m)
-    if not math.isfinite(options.delay_s):
-        raise InputError(f"--delay {options.delay_s:g}: must be a finite number of seconds")
+    if not abs(options.delay_s) <= LONGEST_DELAY_S:
+        raise InputError(f"--delay {options.delay_s:g}: must be from -{LONGEST_DELAY_S:g} to {LONGEST_DELAY_S:g} s")
     if options.delay_s and "rate" not in columns:
         raise InputError("--delay: there is no reference to shift; name it, --columns rate=...")
     headings = [column.name for column in columns.values()]

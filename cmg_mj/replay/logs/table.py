@@ -208,7 +208,7 @@ def _check_columns(path: Path, headings: Sequence[str], names: Sequence[str]) ->
     for name in headings:
         if name.strip() not in [known.strip() for known in names]:
             few = [shown(known) for known in names]
-            raise InputError(f"{path}: has no column {name!r}; {nearest(name, few, 'it has')}"[:600])
+            raise InputError(f"{path}: has no column {name!r}; {nearest(name, few, 'it has')}")
         if list(names).count(name) > 1:
             raise InputError(f"{path}: has the column {name!r} {list(names).count(name)} times: rename all but one")
 

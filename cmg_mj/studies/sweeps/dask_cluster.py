@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import re
-import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -17,6 +16,7 @@ from cmg_mj.studies.sweeps import dask_worker as on_worker
 from cmg_mj.studies.sweeps.chunk import rows_of_failed_chunk
 from cmg_mj.studies.sweeps.chunk_store import GOES_ON, Store
 from cmg_mj.studies.sweeps.dask_worker import Part, compute_part, part_of
+from cmg_mj.studies.sweeps.scratch import scratch_folder
 from cmg_mj.studies.sweeps.trials import from_bytes, table_of
 
 if TYPE_CHECKING:
@@ -56,18 +56,32 @@ def on_cluster(address: str, note: Callable[[str], None]) -> Iterator[Cluster]:
     if find_spec("distributed") is None:
         raise InputError('--cluster: distributed is not installed: python -m pip install "cmg_mj[cluster]"')
     workers = local_workers(address)
-    import distributed
 
     for name in ("distributed", "distributed.client", "distributed.gc"):  # what goes wrong is said here, in a line
         logging.getLogger(name).setLevel(logging.CRITICAL)
     with ExitStack() as stack:
         try:
             scheduler = address if workers is None else stack.enter_context(_started(workers))
-            client = stack.enter_context(distributed.Client(scheduler, timeout=PATIENCE_S, set_as_default=False))
+            client = stack.enter_context(_connected(scheduler))
+        except UnicodeError as error:  # a part of the name is empty, or longer than 63 letters
+            raise InputError(f"--cluster {address}: no name of a computer before the port") from error
         except Exception as error:  # among others OSError, and RuntimeError where a worker does not start
             verb = "reached" if workers is None else "started"
             raise InputError(f"--cluster {address}: cannot be {verb}: {raised(error)}") from error
         yield Cluster(address, client, note)
+
+
+def _connected(scheduler: Any) -> Client:
+    """Connect to a scheduler; a client that cannot is given up, as its own end would take long and print much."""
+    import distributed
+
+    client = distributed.Client.__new__(distributed.Client)
+    try:
+        client.__init__(scheduler, timeout=PATIENCE_S, set_as_default=False)
+    except BaseException:
+        client.status = "closed"
+        raise
+    return client
 
 
 def local_workers(address: str) -> int | None:
@@ -94,7 +108,7 @@ def _started(workers: int) -> Iterator[Any]:
     from distributed import LocalCluster
 
     with (
-        tempfile.TemporaryDirectory(prefix="cmg-mj-", ignore_cleanup_errors=True) as scratch,
+        scratch_folder() as scratch,
         config.set({"temporary-directory": scratch}),
         LocalCluster(
             n_workers=workers,
