@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.controllers.laws.protocol import Law, feedback_state
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, raised, shown
+from cmg_mj.errors import InputError, listed, raised, shown
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.runner import read_only
@@ -40,7 +40,9 @@ def dry_run_observer(observer: Observer, worlds: int | None) -> None:
             raise TypeError
         parts = list(zip(names, estimate, strict=True))
     except (TypeError, ValueError) as error:
-        raise InputError(f"{call} must return (state, ({', '.join(names)})), not {_given(returned)}") from error
+        raise InputError(
+            f"{call} must return (state, ({listed(names)})), not {_given(returned, len(names))}"
+        ) from error
     for name, value in parts:
         _check_number(call, name, value, worlds)
 
@@ -111,9 +113,12 @@ def _wanted(worlds: int | None) -> str:
     return "a number" if worlds is None else f"an array of {worlds} numbers"
 
 
-def _given(returned: Any) -> str:
-    pair = isinstance(returned, tuple) and len(returned) == 2
-    return f"(state, {shown(returned[1])})" if pair else shown(returned)
+def _given(returned: Any, wanted: int) -> str:
+    if not (isinstance(returned, tuple) and len(returned) == 2):
+        return shown(returned)
+    longer = isinstance(returned[1], (tuple, list)) and len(returned[1]) > wanted
+    named = "; extra_signals names what comes after x3" if longer else ""
+    return f"(state, {shown(returned[1])}){named}"
 
 
 def _check_number(call: str, name: str, value: Any, worlds: int | None, tilt: float = TILTS[1]) -> None:

@@ -152,7 +152,8 @@ class Store:
         """
         path = self.path(number)
         try:
-            with pq.ParquetFile(path) as file:
+            # Opened here: Arrow takes no path with bytes that are no UTF-8.
+            with path.open("rb") as source, pq.ParquetFile(source) as file:
                 mark = fingerprint_in(file.schema_arrow.metadata)
                 why = not_ours(mark, self._mark(number))
                 if mark is None or why:
