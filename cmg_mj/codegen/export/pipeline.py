@@ -70,7 +70,9 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
         )
     try:
         for_dry_run, for_trace = copy.deepcopy(controller.observer), copy.deepcopy(controller.observer)
-    except Exception as error:  # a user's observer may hold anything
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a user's observer may hold anything
         raise InputError(f"it cannot be copied: {raised(error)}") from error
     dry_run_observer(for_dry_run, None)
     constants = constants_of(controller)
