@@ -7,6 +7,10 @@ import sys
 from pathlib import Path
 
 
+MOST_TRIES = 1000
+"""Most times that a folder is taken away while a lock is being made in it."""
+
+
 class Busy(Exception):
     """Another process, or another part of this one, holds the lock."""
 
@@ -33,12 +37,14 @@ class Lock:
         """
         self.path = path
         self._descriptor = -1
+        tries = 0
         while self._descriptor < 0:
+            tries += 1
             path.parent.mkdir(exist_ok=True)
             try:
                 descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
             except FileNotFoundError:
-                if not path.parent.parent.is_dir():
+                if tries > MOST_TRIES or not path.parent.parent.is_dir():  # no file can be made in /proc
                     raise
                 continue  # the one before has just taken the folder away
             if not _lock(descriptor):
