@@ -6,7 +6,6 @@ import os
 import sys
 from pathlib import Path
 
-
 MOST_TRIES = 1000
 """Most times that a folder is taken away while a lock is being made in it."""
 

@@ -89,6 +89,12 @@ def test_the_files_of_an_earlier_mount_are_replaced_if_that_is_asked_for() -> No
     Path("b.toml").write_bytes(SCENARIO)
     assert "b.xml exists; give another name, or --overwrite" in cmg_mj(*GIVEN).complaint
     check_replaceable(Path("b.xml"), overwrite=True)
+
+
+@pytest.mark.slow
+def test_a_mount_knows_its_own_files() -> None:
+    Path("b.xml").write_bytes(MODEL)
+    assert cmg_mj(*GIVEN, "--overwrite", "--json").status == 0
     assert cmg_mj(*GIVEN, "--overwrite", "--json").status == 0
     assert there() == ["b.toml", "b.xml"]
     assert all(is_as_written(Path(name)) for name in there())

@@ -11,6 +11,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mounting import mount
+from cmg_mj.results.signed_text import signed
 from cmg_mj.studies.push_limits.prospects import smallest_sufficient_scale
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import EXAMPLES, ROBOTS
@@ -55,8 +56,9 @@ def test_an_observer_that_is_none_leaves_nothing(observer: str) -> None:
 
 def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.MonkeyPatch) -> None:
     """Both files are written under other names, and renamed when all is done."""
-    for name in ("a.xml", "a.toml"):
-        Path(name).write_text("mine", encoding="utf-8")
+    before = [signed("seed = 1\n", ".toml"), signed("<mujoco/>\n", ".xml")]
+    for name, content in zip(("a.toml", "a.xml"), before, strict=True):
+        Path(name).write_bytes(content)
 
     def fails(*_: object, **__: object) -> None:
         raise InputError(f"{next(Path().glob('.a.*.partial.xml'))}: fails")
@@ -64,7 +66,7 @@ def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.Monke
     monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.prospects", fails)
     assert "a.xml: fails" in cmg_mj(*GIVEN, "-o", "a.xml", "--overwrite").complaint
     assert there() == ["a.toml", "a.xml"]
-    assert [Path(name).read_text(encoding="utf-8") for name in there()] == ["mine", "mine"]
+    assert [Path(name).read_bytes() for name in there()] == before
 
 
 def test_a_file_that_the_robot_includes_is_never_overwritten() -> None:
