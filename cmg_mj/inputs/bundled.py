@@ -51,7 +51,7 @@ def find(kind: str, name: str, suffix: str, field: str, beside: Path | None = No
                 return path
         if name and any(path.is_dir() for path in candidates):
             raise InputError(f"{field} {name!r}: is a folder, not a file")
-        if any(path.exists() for path in candidates):
+        if name and any(path.exists() for path in candidates):
             raise InputError(f"{field} {name!r}: is no ordinary file")
     except OSError as error:  # a name that is too long, a folder that may not be looked into
         raise InputError(f"{field} {name!r}: cannot be read: {error.strerror}") from error
