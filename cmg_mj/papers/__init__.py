@@ -60,9 +60,9 @@ def check_installed(papers: Iterable[str]) -> None:
     needed = {(paper, package) for paper in papers for package in NEEDS.get(paper, ())}
     missing = sorted((paper, package) for paper, package in needed if find_spec(package) is None)
     if missing:
-        who = " and ".join(dict.fromkeys(paper for paper, _ in missing))
-        what = " and ".join(dict.fromkeys(package for _, package in missing))
-        raise InputError(f'{who}: {what} is not installed: python -m pip install "cmg_mj[papers]"')
+        paper_names = " and ".join(dict.fromkeys(paper for paper, _ in missing))
+        packages = " and ".join(dict.fromkeys(package for _, package in missing))
+        raise InputError(f'{paper_names}: {packages} is not installed: python -m pip install "cmg_mj[papers]"')
 
 
 def sections_of(paper: str) -> list[Section]:
@@ -86,17 +86,19 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
     check_installed(papers)
     sections = {paper: sections_of(paper) for paper in papers}
     entries = [Reproduced(paper) for paper in papers]
-    total = sum(section.seconds for of_paper in sections.values() for section in of_paper)
-    before = 0.0
+    total = sum(section.seconds for paper_sections in sections.values() for section in paper_sections)
+    seconds_before = 0.0
     try:
         for entry in entries:
             for section in sections[entry.paper]:
-                on_share = _on_share(on_progress, f"{entry.paper}: {section.title}", before, section.seconds, total)
+                on_share = _on_share(
+                    on_progress, f"{entry.paper}: {section.title}", seconds_before, section.seconds, total
+                )
                 on_share(0.0)
                 start = time.perf_counter()
                 entry.claims += section.claims(on_share)
                 entry.seconds += time.perf_counter() - start
-                before += section.seconds
+                seconds_before += section.seconds
             entry.complete = True
     except KeyboardInterrupt:
         pass
@@ -104,7 +106,7 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
 
 
 def _on_share(
-    on_progress: Callable[[str, float], None], now: str, before: float, seconds: float, total: float
+    on_progress: Callable[[str, float], None], label: str, seconds_before: float, seconds: float, total: float
 ) -> Callable[[float], None]:
     """From a section's share to that of the whole, of which so many seconds lie before it."""
-    return lambda share: on_progress(now, (before + share * seconds) / total)
+    return lambda share: on_progress(label, (seconds_before + share * seconds) / total)

@@ -113,23 +113,23 @@ def any_m1() -> Any:
 
 def symmetric_part_is_lie_derivative(i: int, M: Any) -> bool:
     """Step 1 for one column and any Psi, at q = 0."""
-    Psi, here = any_psi(), dict.fromkeys(coordinates(), 0)
-    matrix = B(i, Psi, M, here)
-    return all(vanishes(entry) for entry in matrix + matrix.T - lie_derivative(Psi[:, i], M).subs(here))
+    Psi, origin = any_psi(), dict.fromkeys(coordinates(), 0)
+    matrix = B(i, Psi, M, origin)
+    return all(vanishes(entry) for entry in matrix + matrix.T - lie_derivative(Psi[:, i], M).subs(origin))
 
 
 def printed_entries() -> dict[str, bool]:
     """Whether the definition gives what the appendix prints for the entries of B_(2), for any Psi and any m1(q2)."""
     import sympy as sp
 
-    found = B(1, any_psi(), any_m1(), dict.fromkeys(coordinates(), 0))
+    matrix = B(1, any_psi(), any_m1(), dict.fromkeys(coordinates(), 0))
     m, dm, d, b_1, b_2, d_1, d_2 = sp.symbols("m m_2 d b_1 b_2 d_1 d_2")
-    printed = {
-        "B_(2)22": (found[1, 1], -d_2),
-        "B_(2)11": (found[0, 0], (-2 * m * b_1 - d * dm) / (2 * m**2)),
-        "B_(2)12 + B_(2)21": (found[0, 1] + found[1, 0], -(d_1 + m * b_2) / m),
+    pairs = {
+        "B_(2)22": (matrix[1, 1], -d_2),
+        "B_(2)11": (matrix[0, 0], (-2 * m * b_1 - d * dm) / (2 * m**2)),
+        "B_(2)12 + B_(2)21": (matrix[0, 1] + matrix[1, 0], -(d_1 + m * b_2) / m),
     }
-    return {name: vanishes(here - there) for name, (here, there) in printed.items()}
+    return {name: vanishes(entry - formula) for name, (entry, formula) in pairs.items()}
 
 
 def mixed_derivatives(sign: int = 1) -> bool:
@@ -173,9 +173,9 @@ class Proof:
     @property
     def wrong(self) -> list[str]:
         """What was not found so: a step, a Psi for the paper's m1, no Psi for an m1 that has one."""
-        wrong = [name for name, right in self.steps.items() if not right]
-        wrong += [f"m1 = {decision.m1}: a Psi was found" for decision in self.no if decision.plvcc]
-        return wrong + [f"m1 = {decision.m1}: no Psi was found" for decision in self.yes if not decision.plvcc]
+        failures = [name for name, right in self.steps.items() if not right]
+        failures += [f"m1 = {decision.m1}: a Psi was found" for decision in self.no if decision.plvcc]
+        return failures + [f"m1 = {decision.m1}: no Psi was found" for decision in self.yes if not decision.plvcc]
 
 
 def proof(paper: Paper) -> Proof:
@@ -207,25 +207,25 @@ def claim(paper: Paper) -> Claim:
     """The appendix of aranovskiy2020, or Proposition 1 of sokolov2019, whose proof is not printed there."""
     result = proof(paper)
     symbolic, numeric = result.no
-    constant, *others = result.yes
-    said = ", ".join(f"{value} at q2 = {angle}" for angle, value in symbolic.values.items())
-    gap, factor, printed = not zero_d_is_singular(), inertia_factor(paper), PRINTED[paper].factor
+    constant, *other_decisions = result.yes
+    condition_values = ", ".join(f"{value} at q2 = {angle}" for angle, value in symbolic.values.items())
+    gap, factor, printed_factor = not zero_d_is_singular(), inertia_factor(paper), PRINTED[paper].factor
     remarks = {
         "The printed proof has a gap: d = 0 alone does not make Psi singular (m1 = 1, Psi = [[0, 1], [1, 0]]); the "
         "same argument for c, from B_(1), closes it: m1 (m1'/m1)' not constant makes both c and d zero.": gap,
         "The equality of the mixed derivatives is printed with a wrong sign: it is "
         "m1 (m1'/m1)' d = +2 d''.": mixed_derivatives() and not mixed_derivatives(sign=-1),
-        f"By (2) the factor before (J1 + J2 cos^2 q2)/(I_c + I_d) is {factor}, not {printed}, since both gimbals turn; "
-        "the conclusion is the same for any factor.": factor != printed,
+        f"By (2) the factor before (J1 + J2 cos^2 q2)/(I_c + I_d) is {factor}, not {printed_factor}, since both "
+        "gimbals turn; the conclusion is the same for any factor.": factor != printed_factor,
     }
     on_printed_proof = " ".join(remark for remark, is_so in remarks.items() if is_so)
     return Claim(
         place=PRINTED[paper].place,
         says="No full-rank Psi(q) makes B_(1) and B_(2) skew-symmetric: the system is not partially linearisable via "
         "coordinate changes.",
-        found=f"No such Psi exists: m1 (m1'/m1)' is {said} (I_cd = I_c + I_d), which differ for every J2 other than 0. "
-        f"The checker can say yes: constant m1 has Psi = {_text(constant.Psi)}, "
-        + ", ".join(f"m1 = {decision.m1} has Psi = {_text(decision.Psi)}" for decision in others)
+        found=f"No such Psi exists: m1 (m1'/m1)' is {condition_values} (I_cd = I_c + I_d), which differ for every J2 "
+        f"other than 0. The checker can say yes: constant m1 has Psi = {_text(constant.Psi)}, "
+        + ", ".join(f"m1 = {decision.m1} has Psi = {_text(decision.Psi)}" for decision in other_decisions)
         + ", their B_(i) skew-symmetric by substitution in the definition. The paper's necessary condition is also "
         "sufficient: a column of Psi serves exactly if it is a Killing field of M. An m1 > 0 on the whole line has "
         "two independent ones exactly if m1 = (A exp(k q2) + D exp(-k q2))^2 with A, D >= 0."
@@ -240,7 +240,7 @@ def claim(paper: Paper) -> Claim:
             "counter_checks": [_plain(decision) | {"Psi": _text(decision.Psi)} for decision in result.yes],
             "d_zero_alone_is_singular": not gap,
             "factor_of_m1_by_the_equations": int(factor),
-            "factor_of_m1_printed": printed,
+            "factor_of_m1_printed": printed_factor,
         },
     )
 

@@ -137,12 +137,12 @@ def _count_of_verdicts(entries: Sequence[Reproduced]) -> str:
     """How many claims have which verdict, the papers' and ours apart, and how long it took."""
     claims = [claim for entry in entries for claim in entry.claims]
     sentences = []
-    for ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
-        counts = Counter(verdict_words(claim) for claim in claims if claim.ours is ours)
+    for is_ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
+        counts = Counter(verdict_words(claim) for claim in claims if claim.ours is is_ours)
         if counts:
-            order = [OURS[v] if ours else v for v in OURS]
-            listed = ", ".join(f"{counts[v]} {v}" for v in order if counts[v])
-            sentences.append(f"{sum(counts.values())} {words}: {listed}.")
+            order = [OURS[v] if is_ours else v for v in OURS]
+            counts_text = ", ".join(f"{counts[v]} {v}" for v in order if counts[v])
+            sentences.append(f"{sum(counts.values())} {words}: {counts_text}.")
     return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
 
 
@@ -169,5 +169,5 @@ def save_report(folder: RunFolder | Path, entries: Sequence[Reproduced]) -> Path
         "figures.json": lambda path: write_text(path, json.dumps(figures_of(entries), indent=2)),
         **{f"{picture.name}.png": lambda path, picture=picture: draw(path, picture) for picture in pictures},
     }
-    with claimed(folder) as it:
-        return it.write(writers, complete=all(entry.complete for entry in entries))
+    with claimed(folder) as target:
+        return target.write(writers, complete=all(entry.complete for entry in entries))

@@ -44,10 +44,10 @@ class Once:
         """
         new, before = [], []
         for sentence in sentences(text):
-            where = self._said.setdefault(sentence, place)
-            if where == place:
+            first_place = self._said.setdefault(sentence, place)
+            if first_place == place:
                 new.append(sentence)
-            elif where not in before:
-                before.append(where)
-        said = [f"As at {' and '.join(before)}."] if before else []
-        return " ".join([*said, *new])
+            elif first_place not in before:
+                before.append(first_place)
+        reference = [f"As at {' and '.join(before)}."] if before else []
+        return " ".join([*reference, *new])

@@ -89,7 +89,7 @@ def test_20_with_a_b_of_its_own(b: float) -> None:
         ahead, behind = (at(W, x * (1.0 + b * s), z * (1.0 + (1.0 + b) * s)) for s in (step, -step))
         growth = (W.W(ahead) - W.W(behind))[0] / (2.0 * step)
         quotients.append(growth / W.W(at(W, x, z))[0])
-    assert decay(W, b, at=grid).c2 == pytest.approx(min(quotients), rel=1e-3)
+    assert decay(W, b, points=grid).c2 == pytest.approx(min(quotients), rel=1e-3)
 
 
 def test_constants_hold_on_a_finer_grid() -> None:
@@ -147,7 +147,7 @@ def test_disturbances_and_starts() -> None:
 def test_the_disturbed_solution_is_one_of_the_system() -> None:
     """Without an error at the start, and with exact measurements of y, what is left is what was put in."""
     quiet = equations_11_12.follow([equations_11_12.Column()])
-    assert quiet.scaled.max() < 1e-5
+    assert quiet.scaled_error.max() < 1e-5
     assert quiet.gain[0, 0] == 2.0  # phi2
 
 

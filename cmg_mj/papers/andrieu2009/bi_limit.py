@@ -63,10 +63,10 @@ class BiLimitCorrection:
             )
         roots = np.roots([1.0, *self.linear_gains])
         if roots.real.max() > -1e-12 * np.abs(roots).max():  # the roots of a marginal case come with rounding errors
-            listed = ", ".join(f"{root:.3g}" for root in roots)
+            root_list = ", ".join(f"{root:.3g}" for root in roots)
             raise InputError(
                 "l: s^n + l_1 s^(n-1) + l_1 l_2 s^(n-2) + ... + l_1...l_n, the linear part of K, must be Hurwitz; "
-                f"its roots are {listed}"
+                f"its roots are {root_list}"
             )
 
     @property

@@ -54,8 +54,8 @@ class Bioreactor:
 
     def x2_bounds(self, x1: Array) -> tuple[Array, Array]:
         """Least and largest x2 of M_x at an x1 that lies in [eps1, 1 - eps2]."""
-        part, rest = self.hbar * x1, 1.0 - x1
-        return x1 * self.eps2 / (part + self.eps2), x1 * rest / (rest + part)
+        part, remainder = self.hbar * x1, 1.0 - x1
+        return x1 * self.eps2 / (part + self.eps2), x1 * remainder / (remainder + part)
 
     def limit_x1(self, x1: Array) -> Array:
         """x_1s."""
@@ -138,14 +138,14 @@ class Bioreactor:
         """
         _, m1, m2, m3 = self.coefficients(x1, u)
         low, high = self.x2_bounds(x1)
-        m, last = m2 + m3 * x2_hat, m2 if as_printed else m3
-        stationary = -m * (1.0 - p) / (_not_zero(last) * (2.0 - p))
+        m, last_coefficient = m2 + m3 * x2_hat, m2 if as_printed else m3
+        stationary = -m * (1.0 - p) / (_not_zero(last_coefficient) * (2.0 - p))
         stationary = np.minimum(np.maximum(stationary, low), high)
-        at_estimate = m1 + m * x2_hat
+        rate_at_estimate = m1 + m * x2_hat
         share = x2_hat**p
 
         def incremental_rate(x2: Array) -> Array:
-            return at_estimate + share * x2 ** (1.0 - p) * (m + last * x2)
+            return rate_at_estimate + share * x2 ** (1.0 - p) * (m + last_coefficient * x2)
 
         return _largest(incremental_rate, low, high, stationary)
 
@@ -159,8 +159,8 @@ class Bioreactor:
         return float(np.abs((m2 + m3 * x2_hat) * x2 ** (1.0 - p) + m3 * x2 ** (2.0 - p)).max())
 
 
-def _largest(function: Any, *where: Array) -> Array:
-    values = [np.abs(function(x2)) for x2 in where]
+def _largest(function: Any, *arguments: Array) -> Array:
+    values = [np.abs(function(x2)) for x2 in arguments]
     return np.maximum(np.maximum(values[0], values[1]), values[2])
 
 

@@ -52,26 +52,32 @@ def search(d_inf: float) -> Found | None:
 
 def claim() -> Claim:
     """(19) and (20)."""
-    found = {d_inf: search(d_inf) for d_inf in DEGREES}
-    known = [one for one in found.values() if one is not None]
+    results = {d_inf: search(d_inf) for d_inf in DEGREES}
+    successes = [success for success in results.values() if success is not None]
     rows = [
-        (f"{one.d_inf:g}", f"{one.b:.3g}", f"{one.l1:g}", f"{one.sigma:g}", *(f"{c:.3f}" for c in one.decay))
-        for one in known
+        (
+            f"{success.d_inf:g}",
+            f"{success.b:.3g}",
+            f"{success.l1:g}",
+            f"{success.sigma:g}",
+            *(f"{c:.3f}" for c in success.decay),
+        )
+        for success in successes
     ]
     return Claim(
         place="Section 4.2, (19) and (20)",
         says="There are K and a proper W, homogeneous in the bi-limit, that satisfy (19) and (20) for all A(t) within "
         "(17) and the B of section 4.3.",
         found=f"For n = 2, A1 and A2 within {SPREAD:g} of 1 and d_W = 2 + d_inf, a K and a W are found for "
-        f"{len(known)} of {len(found)} d_inf. c1 and c2 are the largest constants at {len(FINE)} scales from "
+        f"{len(successes)} of {len(results)} d_inf. c1 and c2 are the largest constants at {len(FINE)} scales from "
         f"{FINE[0]:.0e} to {FINE[-1]:.0e}, {ANGLES} directions and more each.",
         table=markdown.table(("d_inf", "b", "l1", "sigma", "c1", "c2"), rows, text_columns=0),
-        holds=len(known) == len(found) and all(min(one.decay) > 0.0 for one in known),
+        holds=len(successes) == len(results) and all(min(success.decay) > 0.0 for success in successes),
         conditions="For two dimensions, by numbers; a d_inf near its limit asks for a larger l1.",
         otherwise="For some d_inf none was found, which does not say that there is none.",
         figures={
-            "c1_by_d_inf": {str(one.d_inf): one.decay.c1 for one in known},
-            "c2_by_d_inf": {str(one.d_inf): one.decay.c2 for one in known},
-            "l1_by_d_inf": {str(one.d_inf): one.l1 for one in known},
+            "c1_by_d_inf": {str(success.d_inf): success.decay.c1 for success in successes},
+            "c2_by_d_inf": {str(success.d_inf): success.decay.c2 for success in successes},
+            "l1_by_d_inf": {str(success.d_inf): success.l1 for success in successes},
         },
     )

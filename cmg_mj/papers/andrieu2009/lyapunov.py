@@ -34,10 +34,10 @@ class States(NamedTuple):
 def states(scales: np.ndarray = SCALES, angles: int = ANGLES) -> States:
     """On squares of all scales, denser where s1 and s2 are nearly alike, and where one of them is small."""
     share = np.linspace(-1.0, 1.0, angles)
-    near = np.concatenate([share, np.geomspace(1e-3, 1.0, 40), 1.0 - np.geomspace(1e-3, 1.0, 40)])
-    ends = np.ones_like(near)
-    s1 = np.concatenate([ends, -ends, near, near])
-    s2 = np.concatenate([near, near, ends, -ends])
+    shares = np.concatenate([share, np.geomspace(1e-3, 1.0, 40), 1.0 - np.geomspace(1e-3, 1.0, 40)])
+    ends = np.ones_like(shares)
+    s1 = np.concatenate([ends, -ends, shares, shares])
+    s2 = np.concatenate([shares, shares, ends, -ends])
     return States(*(np.multiply.outer(scales, s).ravel() for s in (s1, s2)))
 
 
@@ -85,21 +85,21 @@ class Lyapunov:
         first, second = (power + 1.0 for power in self.powers)
         return np.abs(s) ** first / first + np.abs(s) ** second / second
 
-    def E(self, at: States) -> tuple[np.ndarray, np.ndarray]:
+    def E(self, points: States) -> tuple[np.ndarray, np.ndarray]:
         """e1 and e2."""
-        return at.s1 / self.K.l[0], self.q1(at.s2)
+        return points.s1 / self.K.l[0], self.q1(points.s2)
 
-    def W(self, at: States) -> np.ndarray:
+    def W(self, points: States) -> np.ndarray:
         """W, (n,)."""
-        first = self.H(at.s1) - self.H(at.s2) - self.h(at.s2) * (at.s1 - at.s2)
-        return first + self.sigma * np.abs(self.q1(at.s2)) ** self.d_W / self.d_W
+        first = self.H(points.s1) - self.H(points.s2) - self.h(points.s2) * (points.s1 - points.s2)
+        return first + self.sigma * np.abs(self.q1(points.s2)) ** self.d_W / self.d_W
 
-    def gradient(self, at: States) -> tuple[np.ndarray, np.ndarray]:
+    def gradient(self, points: States) -> tuple[np.ndarray, np.ndarray]:
         """dW/de1 and dW/de2, each (n,)."""
-        by_s2 = -self.h_slope(at.s2) * (at.s1 - at.s2) / self.q1_slope(at.s2)
+        by_s2 = -self.h_slope(points.s2) * (points.s1 - points.s2) / self.q1_slope(points.s2)
         return (
-            self.K.l[0] * (self.h(at.s1) - self.h(at.s2)),
-            by_s2 + self.sigma * signed_power(self.q1(at.s2), self.d_W - 1.0),
+            self.K.l[0] * (self.h(points.s1) - self.h(points.s2)),
+            by_s2 + self.sigma * signed_power(self.q1(points.s2), self.d_W - 1.0),
         )
 
 
@@ -110,25 +110,27 @@ class Decay(NamedTuple):
     c2: float
 
 
-def decay(W: Lyapunov, b: float, spread: float = 0.0, at: States | None = None) -> Decay:
+def decay(W: Lyapunov, b: float, spread: float = 0.0, points: States | None = None) -> Decay:
     """Try (19) and (20).
 
     Args:
         W: The function.
         b: Exponent of the scaling: B = diag(b, 1 + b) in (20).
         spread: A1 and A2 are anywhere in [1 - spread, 1 + spread]; both sides of (19) are linear in them.
-        at: Where; by default on all scales.
+        points: Where; by default on all scales.
 
     Returns:
         c1 and c2.
     """
-    at = states() if at is None else at
-    apart = np.abs(at.s1 - at.s2) > 1e-9 * np.maximum(np.abs(at.s1), np.abs(at.s2))  # else W is rounding errors
-    at = States(at.s1[apart], at.s2[apart])
-    (e1, e2), (by_e1, by_e2), value = W.E(at), W.gradient(at), W.W(at)
+    points = states() if points is None else points
+    distinct = np.abs(points.s1 - points.s2) > 1e-9 * np.maximum(
+        np.abs(points.s1), np.abs(points.s2)
+    )  # else W is rounding errors
+    points = States(points.s1[distinct], points.s2[distinct])
+    (e1, e2), (by_e1, by_e2), value = W.E(points), W.gradient(points), W.W(points)
     k1, k2 = W.K(e1)
     slopes = by_e1 * (e2 + k1), by_e2 * k2
     largest = sum(np.maximum((1.0 - spread) * part, (1.0 + spread) * part) for part in slopes)
     bound = value + value ** ((W.d_W + W.K.d_inf) / W.d_W)
-    grows = by_e1 * b * e1 + by_e2 * (1.0 + b) * e2
-    return Decay(float((-largest / bound).min()), float((grows / value).min()))
+    growth = by_e1 * b * e1 + by_e2 * (1.0 + b) * e2
+    return Decay(float((-largest / bound).min()), float((growth / value).min()))

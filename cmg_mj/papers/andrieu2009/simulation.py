@@ -95,7 +95,7 @@ def _integrated(model: Bioreactor, start: np.ndarray, u: np.ndarray, dt: float) 
     eta = np.empty((2, len(u), start.shape[1]))
     eta[:, 0] = state = start
     for k in range(len(u) - 1):
-        eta[:, k + 1] = state = runge_kutta(lambda z, held=u[k]: np.array(model.slope(z[0], z[1], held)), state, dt)
+        eta[:, k + 1] = state = runge_kutta(lambda z, u_k=u[k]: np.array(model.slope(z[0], z[1], u_k)), state, dt)
     return eta
 
 
@@ -183,8 +183,10 @@ def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B
 
 def of_seeds(part: Run | Replay, columns: slice) -> Any:
     """The same of some of the seeds."""
-    shared = ("t", "u")
-    return replace(part, **{f.name: getattr(part, f.name)[..., columns] for f in fields(part) if f.name not in shared})
+    common_fields = ("t", "u")
+    return replace(
+        part, **{f.name: getattr(part, f.name)[..., columns] for f in fields(part) if f.name not in common_fields}
+    )
 
 
 def replays(run: Run, model: Bioreactor) -> dict[str, Replay]:

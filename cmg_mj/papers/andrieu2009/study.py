@@ -53,19 +53,19 @@ def study(seeds: int, seed: int = 0, dt: float = 0.01) -> Study:
     """
     numbers = [*range(seed, seed + seeds)] * 2 + [seed]
     noise = [NOISE] * seeds + [LOUD] * seeds + [0.0]
-    everything = run_plant(numbers, noise, dt)
+    whole_run = run_plant(numbers, noise, dt)
     model = Bioreactor(HBAR_OF_OBSERVERS)
-    parts = replays(everything, model)
+    whole_replays = replays(whole_run, model)
     first, second, last = slice(0, seeds), slice(seeds, 2 * seeds), slice(2 * seeds, None)
-    run, quiet_run = of_seeds(everything, first), of_seeds(everything, last)
+    run, quiet_run = of_seeds(whole_run, first), of_seeds(whole_run, last)
 
-    def columns(which: slice) -> dict[str, Replay]:
-        return {kind: of_seeds(part, which) for kind, part in parts.items()}
+    def columns(selection: slice) -> dict[str, Replay]:
+        return {kind: of_seeds(part, selection) for kind, part in whole_replays.items()}
 
     exact = replays(run, Bioreactor(HBAR))
     return Study(run, columns(first), columns(second), quiet_run, columns(last), exact, incremental_rate(run, model))
 
 
-def rms_by_kind(run: Run, found: dict[str, Replay]) -> np.ndarray:
+def rms_by_kind(run: Run, by_kind: dict[str, Replay]) -> np.ndarray:
     """RMS error of eta2 after t = 5, (3 observers, seeds)."""
-    return np.array([rms_late(run, found[kind].eta2_error) for kind in KINDS])
+    return np.array([rms_late(run, by_kind[kind].eta2_error) for kind in KINDS])

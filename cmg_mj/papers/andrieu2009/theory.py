@@ -29,11 +29,11 @@ def claims(on_share: OnShare) -> list[Claim]:
         lambda: [theorem_1()],
         equations_11_12.claims,
     ]
-    found: list[Claim] = []
+    results: list[Claim] = []
     for i, part in enumerate(parts):
         on_share(i / len(parts))
-        found += part()
-    return found
+        results += part()
+    return results
 
 
 def scaling_conditions() -> Claim:
@@ -74,7 +74,7 @@ def gain_tracking() -> Claim:
     errors, least = zip(*(tracking_error(rate) for rate in rates), strict=True)
     quotients = [a / b for a, b in itertools.pairwise(errors)]
     proportional = all(1.6 < quotient < 2.4 for quotient in quotients)
-    above = min(least) >= 0.0
+    stays_above = min(least) >= 0.0
     return Claim(
         place="Section 2.2, (13)",
         says="L tracks phi2 + (phi3/phi1) Omega up to an error proportional to |Omega'|, and from L(0) >= phi2 stays "
@@ -82,6 +82,6 @@ def gain_tracking() -> Claim:
         found=f"For Omega = 2 + sin(w t) the largest error falls from {errors[0]:.3f} at w = {rates[0]} by factors "
         f"{', '.join(f'{quotient:.2f}' for quotient in quotients)} as w is halved; the least L - phi2 is "
         f"{min(least):.2g}.",
-        holds=proportional and above,
+        holds=proportional and stays_above,
         figures={"omega_rate_rad_per_time": list(rates), "largest_error_of_L": list(errors)},
     )

@@ -38,10 +38,10 @@ def differences(numbers: Numbers) -> list[Interval | None]:
 
 def order_of(numbers: Numbers) -> Order:
     """Whether homogeneous < ltv < linear beyond chance, the other way round, or neither."""
-    found = differences(numbers)
-    if all(step is not None and step.low > 0.0 for step in found):
+    steps = differences(numbers)
+    if all(step is not None and step.low > 0.0 for step in steps):
         return "holds"
-    if all(step is not None and step.high < 0.0 for step in found):
+    if all(step is not None and step.high < 0.0 for step in steps):
         return "is inverted"
     return "does not hold"
 
@@ -92,38 +92,38 @@ def measured(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measur
     ]
 
 
-def order(found: list[Measured]) -> Claim:
+def order(measures: list[Measured]) -> Claim:
     """Section V's ranking.
 
     Args:
-        found: The measures, that of `JUDGED` among them.
+        measures: The measures, that of `JUDGED` among them.
 
     Returns:
         The claim.
     """
-    judged = next(measure for measure in found if measure.key == JUDGED)
-    worlds = len(next(iter(judged.numbers.values()))["linear"])
+    verdict_measure = next(measure for measure in measures if measure.key == JUDGED)
+    worlds = len(next(iter(verdict_measure.numbers.values()))["linear"])
     return Claim(
         place="Section V, the comparison",
         says="The homogeneous differentiator performs best, the time-varying observer second, the linear one last.",
         found=(
             f"Means over {worlds} seeds of (11), (10), (9); an order is one if both steps of it are beyond chance, "
-            f"world by world. {' '.join(_in_words(measure) for measure in found)}"
+            f"world by world. {' '.join(_in_words(measure) for measure in measures)}"
         ),
-        holds=judged.everywhere("holds"),
+        holds=verdict_measure.everywhere("holds"),
         conditions=(
-            f"{_by_measure(found)} At e = 0.5 deg and 400 ug/rtHz under this push. At low noise or large bias the "
+            f"{_by_measure(measures)} At e = 0.5 deg and 400 ug/rtHz under this push. At low noise or large bias the "
             "order turns round, because (11) mistakes the bias for a rate most: the map over noise and bias is in "
             "docs/results.md."
         ),
         otherwise="The map over noise and bias in docs/results.md shows where the order holds.",
         figures={
             f"{worse}_less_{better}_{angles}_angles_{measure.key}": step
-            for measure in found
+            for measure in measures
             for angles, numbers in measure.numbers.items()
             for (worse, better), step in zip(PAIRS, differences(numbers), strict=True)
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(measures)],
     )
 
 
@@ -132,30 +132,30 @@ def _in_words(measure: Measured) -> str:
     parts = []
     for angles, numbers in measure.numbers.items():
         means = [known_interval(numbers[name]) for name in ("homogeneous", "ltv", "linear")]
-        shown = ", ".join(format_figure(measure.key, None if mean is None else mean.mean) for mean in means)
-        parts.append(f"{shown} with the law on {angles} angles, where the order {measure.orders[angles]}")
+        means_text = ", ".join(format_figure(measure.key, None if mean is None else mean.mean) for mean in means)
+        parts.append(f"{means_text} with the law on {angles} angles, where the order {measure.orders[angles]}")
     label = KEYS[measure.key].heading
     return f"{label[0].upper()}{label[1:]}: {'; '.join(parts)}."
 
 
-def _by_measure(found: list[Measured]) -> str:
+def _by_measure(measures: list[Measured]) -> str:
     """By which measures the order is what."""
     sentences = []
     words: dict[Order, str] = {"holds": "the order holds", "is inverted": "it is inverted: (9), (10), (11)"}
-    for kind, said in words.items():
-        by = [f"the {KEYS[measure.key].label}" for measure in found if measure.everywhere(kind)]
-        if by:
-            sentences.append(f"By {listed_and(by)} {said}.")
-    for measure in found:
+    for kind, wording in words.items():
+        labels = [f"the {KEYS[measure.key].label}" for measure in measures if measure.everywhere(kind)]
+        if labels:
+            sentences.append(f"By {listed_and(labels)} {wording}.")
+    for measure in measures:
         if not (measure.everywhere("holds") or measure.everywhere("is inverted")):
-            best = listed_and(sorted({OBSERVERS[name] for name in measure.best.values()}))
-            sentences.append(f"By the {KEYS[measure.key].label} it does not hold: best is {best}.")
+            best_equations = listed_and(sorted({OBSERVERS[name] for name in measure.best.values()}))
+            sentences.append(f"By the {KEYS[measure.key].label} it does not hold: best is {best_equations}.")
     return " ".join(sentences)
 
 
-def _picture(found: list[Measured]) -> Picture:
+def _picture(measures: list[Measured]) -> Picture:
     panels = []
-    for i, measure in enumerate(found):
+    for i, measure in enumerate(measures):
         most = max(float(np.nanmax(values)) for numbers in measure.numbers.values() for values in numbers.values())
         for angles, numbers in measure.numbers.items():
             marks = [
@@ -168,5 +168,5 @@ def _picture(found: list[Measured]) -> Picture:
         "aranovskiy2020-section-5",
         "aranovskiy2020, Section V: measures of the closed loop, world by world",
         panels,
-        columns=len(next(iter(found)).numbers),
+        columns=len(next(iter(measures)).numbers),
     )

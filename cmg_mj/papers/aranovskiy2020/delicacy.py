@@ -31,21 +31,21 @@ class Transient(NamedTuple):
     """H12 sample by sample, (n_samples,)."""
 
 
-def transient(method: str, rate_hz: float, span_s: float = 0.2, single: bool = False) -> Transient:
+def transient(method: str, rate_hz: float, span_s: float = 0.2, single_precision: bool = False) -> Transient:
     """Integrate the Riccati equation beside its exact solution.
 
     Args:
         method: One of `METHODS`.
         rate_hz: Steps a second.
         span_s: How long [s], but at least 50 steps.
-        single: Whether in single precision, which is what the paper's STM32F746 computes in hardware.
+        single_precision: Whether in single precision, which is what the paper's STM32F746 computes in hardware.
 
     Returns:
         What was met.
     """
     h, A = 1.0 / rate_hz, A_prime()
     E = expm(h * np.block([[-A.T, C.T @ C], [Q, A]]))
-    H, truth = H_0.astype(np.float32 if single else np.float64), H_0
+    H, truth = H_0.astype(np.float32 if single_precision else np.float64), H_0
     _, steady = settled_gains()
     least, error, path = math.inf, 0.0, []
     for _ in range(max(50, round(span_s * rate_hz))):
@@ -64,15 +64,15 @@ Sweeps = Mapping[str, Mapping[float, Transient]]
 """Method -> rate [Hz] -> what was met."""
 
 
-def lowest_rate(method: str, swept: Mapping[float, Transient], good: Callable[[Transient], bool]) -> float | None:
+def lowest_rate(method: str, sweep: Mapping[float, Transient], passes: Callable[[Transient], bool]) -> float | None:
     """The rate above which a method does well, by bisection to 0.1 Hz; None if it does at the lowest tried [Hz]."""
-    bad = [rate for rate, found in swept.items() if not good(found)]
-    if not bad:
+    failing_rates = [rate for rate, result in sweep.items() if not passes(result)]
+    if not failing_rates:
         return None
-    low, high = max(bad), min((rate for rate in swept if rate > max(bad)), default=math.inf)
+    low, high = max(failing_rates), min((rate for rate in sweep if rate > max(failing_rates)), default=math.inf)
     while math.isfinite(high) and high - low > 0.1:
         middle = (low + high) / 2.0
-        low, high = (low, middle) if good(transient(method, middle)) else (middle, high)
+        low, high = (low, middle) if passes(transient(method, middle)) else (middle, high)
     return high
 
 
@@ -93,12 +93,14 @@ def _down_to(rate: float | None) -> str:
 
 def delicacy(seed: int = SEED_OF_10) -> Claim:
     """Condition and definiteness of H over step size and method."""
-    swept = {name: {rate: transient(name, rate) for rate in RATES_HZ} for name in METHODS}
-    definite = {name: lowest_rate(name, swept[name], lambda t: t.least > 0.0) for name in METHODS}
-    finite = {name: lowest_rate(name, swept[name], lambda t: math.isfinite(t.error)) for name in METHODS}
+    sweeps = {name: {rate: transient(name, rate) for rate in RATES_HZ} for name in METHODS}
+    definite = {name: lowest_rate(name, sweeps[name], lambda t: t.least > 0.0) for name in METHODS}
+    finite = {name: lowest_rate(name, sweeps[name], lambda t: math.isfinite(t.error)) for name in METHODS}
     at_200 = {name: transient(name, 1.0 / DT) for name in METHODS}
-    single = {name: transient(name, 1.0 / DT, single=True) for name in ("explicit Euler", "Runge-Kutta 4")}
-    estimate = euler_against_exact(seed)
+    single_precision = {
+        name: transient(name, 1.0 / DT, single_precision=True) for name in ("explicit Euler", "Runge-Kutta 4")
+    }
+    comparison = euler_against_exact(seed)
     matrices = matrices_along(run_of_10(seed))
     condition = float(np.linalg.cond(matrices).max())
     least = float(np.linalg.eigvalsh(matrices).min())
@@ -114,10 +116,11 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
             f"the exact step {_down_to(definite['exact step (ours)'])}. At 200 Hz H12 is off, by its steady value, by "
             f"up to {at_200['explicit Euler'].error:.0%} (Euler), {at_200['Runge-Kutta 4'].error:.1e} (Runge-Kutta 4) "
             f"and {at_200['exact step (ours)'].error:.0e} (exact); in single precision by "
-            f"{single['explicit Euler'].error:.0%} and {single['Runge-Kutta 4'].error:.1e}. Along a closed-loop run "
-            f"H's condition number rises to {condition:.2g}, its least eigenvalue stays above {least:.2f}; all "
-            f"twelve equations by Euler would change the estimated rate by {estimate.difference:.3f} rad/s RMS and "
-            f"its error from {estimate.error:.3f} to {estimate.other_error:.3f} rad/s."
+            f"{single_precision['explicit Euler'].error:.0%} and {single_precision['Runge-Kutta 4'].error:.1e}. Along "
+            f"a closed-loop run H's condition number rises to {condition:.2g}, its least eigenvalue stays above "
+            f"{least:.2f}; all twelve equations by Euler would change the estimated rate by "
+            f"{comparison.difference:.3f} rad/s RMS and its error from {comparison.error:.3f} to "
+            f"{comparison.other_error:.3f} rad/s."
         ),
         holds=euler_first and rk4_fine and ours_fine,
         conditions=(
@@ -130,23 +133,23 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
             "definite_above_hz": definite,
             "finite_above_hz": finite,
             "error_of_H12_at_200_hz": {name: t.error for name, t in at_200.items()},
-            "error_of_H12_at_200_hz_single": {name: t.error for name, t in single.items()},
-            "rate_changed_by_euler_rad_s": estimate.difference,
-            "rate_error_euler_rad_s": estimate.other_error,
-            "rate_error_exact_rad_s": estimate.error,
+            "error_of_H12_at_200_hz_single": {name: t.error for name, t in single_precision.items()},
+            "rate_changed_by_euler_rad_s": comparison.difference,
+            "rate_error_euler_rad_s": comparison.other_error,
+            "rate_error_exact_rad_s": comparison.error,
             "condition_along_run": condition,
             "least_eigenvalue_along_run": least,
         },
-        pictures=[_picture(swept, at_200)],
+        pictures=[_picture(sweeps, at_200)],
     )
 
 
-def _picture(swept: Sweeps, at_200: Mapping[str, Transient]) -> Picture:
+def _picture(sweeps: Sweeps, at_200: Mapping[str, Transient]) -> Picture:
     errors, least, paths = [], [], []
-    for i, (name, by_rate) in enumerate(swept.items()):
-        found = by_rate.values()
-        finite = [t.error if math.isfinite(t.error) else math.nan for t in found]
-        positive = [t.least if t.least > 0.0 else math.nan for t in found]
+    for i, (name, by_rate) in enumerate(sweeps.items()):
+        transients = by_rate.values()
+        finite = [t.error if math.isfinite(t.error) else math.nan for t in transients]
+        positive = [t.least if t.least > 0.0 else math.nan for t in transients]
         path = np.concatenate([[0.0], at_200[name].path[:24]])
         errors.append(Line(RATES_HZ, finite, name, color=i))
         least.append(Line(RATES_HZ, positive, name, color=i, style="o-" if i < 2 else "--"))

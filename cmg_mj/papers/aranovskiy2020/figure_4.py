@@ -45,8 +45,8 @@ def riding_along(worlds: int, seed: int) -> Riding:
 
     def errors(trajectory: Trajectory) -> dict[str, np.ndarray]:
         gyro = trajectory["fog_rad_s"]
-        off = {name: rms(trajectory[f"estimate/{name}/x2_rad_s"] - gyro) for name in OBSERVERS}
-        return off | {"zero": rms(gyro)}
+        rms_errors = {name: rms(trajectory[f"estimate/{name}/x2_rad_s"] - gyro) for name in OBSERVERS}
+        return rms_errors | {"zero": rms(gyro)}
 
     return Riding(errors(whole), errors(window), whole.world(0))
 
@@ -62,33 +62,33 @@ def figure_4(worlds: int = WORLDS, seed: int = SEED) -> Claim:
 
     Over the whole run, most of which is stillness, they are judged by their noise: there zero is closer than any.
     """
-    riding = riding_along(worlds, seed)
-    whole = {name: mean_interval(values) for name, values in riding.whole.items()}
-    after = {name: mean_interval(values) for name, values in riding.after_push.items()}
-    spread, spread_after = largest_by_smallest(whole), largest_by_smallest(after)
+    runs = riding_along(worlds, seed)
+    whole_errors = {name: mean_interval(values) for name, values in runs.whole.items()}
+    push_errors = {name: mean_interval(values) for name, values in runs.after_push.items()}
+    spread, spread_after = largest_by_smallest(whole_errors), largest_by_smallest(push_errors)
     return Claim(
         place="Fig. 4",
         says="With the loop closed on the gyro and a push at 2 s, the three tuned observers are comparable open loop.",
         found=(
             f"RMS of the estimated rate less the gyro's, {worlds} seeds, with 95 % intervals [rad/s]. From the push "
-            f"to a second after it: {_listed(after)}; the largest is {spread_after:.2f} times the smallest. Over all "
-            f"10 s: {_listed(whole)}; {spread:.2f} times."
+            f"to a second after it: {_listed(push_errors)}; the largest is {spread_after:.2f} times the smallest. Over "
+            f"all 10 s: {_listed(whole_errors)}; {spread:.2f} times."
         ),
         holds=spread_after < COMPARABLE,
-        conditions=f"From our push to a second after it (1 N m for 0.1 s, e = 0.5 deg). {_against_zero(after)}",
+        conditions=f"From our push to a second after it (1 N m for 0.1 s, e = 0.5 deg). {_against_zero(push_errors)}",
         otherwise=(
             "In the second after our push (1 N m for 0.1 s, e = 0.5 deg) they are not. (10) and (11) know the command "
-            f"but not the push, and take the command's effect for a rate. {_against_zero(after)} Over the whole run, "
-            f"most of which is stillness, they are{'' if spread < COMPARABLE else ' not'} comparable; "
-            f"there {_closer(whole)}."
+            f"but not the push, and take the command's effect for a rate. {_against_zero(push_errors)} Over the whole "
+            f"run, most of which is stillness, they are{'' if spread < COMPARABLE else ' not'} comparable; "
+            f"there {_closer(whole_errors)}."
         ),
         figures={
-            **{f"rms_{name}_rad_s": found for name, found in whole.items()},
-            **{f"rms_after_push_{name}_rad_s": found for name, found in after.items()},
+            **{f"rms_{name}_rad_s": interval for name, interval in whole_errors.items()},
+            **{f"rms_after_push_{name}_rad_s": interval for name, interval in push_errors.items()},
             "largest_by_smallest": spread,
             "largest_by_smallest_after_push": spread_after,
         },
-        pictures=[_picture(riding.example)],
+        pictures=[_picture(runs.example)],
     )
 
 
@@ -103,13 +103,13 @@ def _closer(errors: Mapping[str, Interval]) -> str:
 
 
 def _against_zero(errors: Mapping[str, Interval]) -> str:
-    said = _closer(errors)
-    return f"{said[0].upper()}{said[1:]}."
+    sentence = _closer(errors)
+    return f"{sentence[0].upper()}{sentence[1:]}."
 
 
-def _listed(found: Mapping[str, Interval]) -> str:
-    named = OBSERVERS | {"zero": "an estimate of zero"}
-    return ", ".join(f"{label} {plus_minus(found[name])}" for name, label in named.items())
+def _listed(errors: Mapping[str, Interval]) -> str:
+    labels = OBSERVERS | {"zero": "an estimate of zero"}
+    return ", ".join(f"{label} {plus_minus(errors[name])}" for name, label in labels.items())
 
 
 def _picture(example: Trajectory) -> Picture:

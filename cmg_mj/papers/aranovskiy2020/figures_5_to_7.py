@@ -40,11 +40,14 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
     """One of Figs 5 to 7."""
     error = {angles: known_interval(result.values("velocity_rms_error_rad_s")) for angles, result in results.items()}
     tilt = {angles: known_interval(result.values("tilt_rms_deg")) for angles, result in results.items()}
-    fell = {angles: float(result.fell.mean()) for angles, result in results.items()}
-    settled = {angles: float(np.isfinite(result.values("settle_time_s")).mean()) for angles, result in results.items()}
-    listed = " ".join(
+    fall_shares = {angles: float(result.fell.mean()) for angles, result in results.items()}
+    settle_shares = {
+        angles: float(np.isfinite(result.values("settle_time_s")).mean()) for angles, result in results.items()
+    }
+    sentences = " ".join(
         f"On {angles} angles the velocity RMS error is {plus_minus(error[angles])} rad/s, the tilt RMS "
-        f"{plus_minus(tilt[angles], 3)} deg; {fell[angles]:.0%} fall, {settled[angles]:.0%} settle within 1 deg."
+        f"{plus_minus(tilt[angles], 3)} deg; {fall_shares[angles]:.0%} fall, {settle_shares[angles]:.0%} settle within "
+        "1 deg."
         for angles in results
     )
     worlds = len(results["measured"].outcomes)
@@ -53,9 +56,9 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
         says=f"With the estimate of {OBSERVERS[name]} in the law the rig stands, and recovers from a push.",
         found=(
             f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, the law on measured or "
-            f"on estimated angles. {listed}"
+            f"on estimated angles. {sentences}"
         ),
-        holds=max(fell.values()) == 0.0 and min(settled.values()) == 1.0,
+        holds=max(fall_shares.values()) == 0.0 and min(settle_shares.values()) == 1.0,
         otherwise="It falls in some worlds, or does not settle.",
         figures={
             key: value
@@ -63,8 +66,8 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
             for key, value in (
                 (f"velocity_rms_error_{angles}_angles_rad_s", error[angles]),
                 (f"tilt_rms_{angles}_angles_deg", tilt[angles]),
-                (f"fell_fraction_{angles}_angles", fell[angles]),
-                (f"settled_fraction_{angles}_angles", settled[angles]),
+                (f"fell_fraction_{angles}_angles", fall_shares[angles]),
+                (f"settled_fraction_{angles}_angles", settle_shares[angles]),
             )
         },
         pictures=[_picture(name, {angles: trajectory_of(result).world(0) for angles, result in results.items()})],

@@ -78,18 +78,18 @@ def decay(alpha: float) -> Decay:
         fall /= z1 * z1 + abs(z2) ** (2.0 / alpha)  # 1, but for this it would stray from it
         return f1 - fall * z1, f2 - alpha * fall * z2, fall, math.exp((1.0 - alpha) * log_r)
 
-    def along(state: Sequence[float], step: float, by: Sequence[float]) -> list[float]:
-        return [value + step * change for value, change in zip(state, by, strict=True)]
+    def advance(state: Sequence[float], step: float, slopes: Sequence[float]) -> list[float]:
+        return [value + step * change for value, change in zip(state, slopes, strict=True)]
 
     states, h = [[0.0, 1.0, 0.0, 0.0]], STEP
     while states[-1][2] > -DECADES * math.log(10.0):  # one classical Runge-Kutta step
-        now = states[-1]
-        a = slope(*now[:3])
-        b = slope(*along(now, h / 2.0, a)[:3])
-        c = slope(*along(now, h / 2.0, b)[:3])
-        d = slope(*along(now, h, c)[:3])
+        start = states[-1]
+        a = slope(*start[:3])
+        b = slope(*advance(start, h / 2.0, a)[:3])
+        c = slope(*advance(start, h / 2.0, b)[:3])
+        d = slope(*advance(start, h, c)[:3])
         mean = [(p + 2.0 * (q + r) + s) / 6.0 for p, q, r, s in zip(a, b, c, d, strict=True)]
-        states.append(along(now, h, mean))
+        states.append(advance(start, h, mean))
     _, z2, log_r, time = np.array(states).T
     lowest = np.minimum.accumulate(log_r)  # the size is not monotonic where the error turns
     return Decay(-lowest / math.log(10.0), time, np.exp(alpha * log_r) * z2)
@@ -98,23 +98,23 @@ def decay(alpha: float) -> Decay:
 def of_the_observer(alpha: float) -> float:
     """The same of the bench's observer, sampled often: from when on its error stays below `SEEN` [s]."""
     observer = make_observer("homogeneous", FINE_DT, printed_model(), alpha=alpha)
-    still = Measurement(0.0, 0.0)
-    state = observer.init(still)._replace(x2=1.0)
+    rest_measurement = Measurement(0.0, 0.0)
+    state = observer.init(rest_measurement)._replace(x2=1.0)
     errors = []
     for _ in range(round(1.5 / FINE_DT)):
-        state, estimate = observer.step(state, still, 0.0)
+        state, estimate = observer.step(state, rest_measurement, 0.0)
         errors.append(abs(estimate.x2))
     return float((np.flatnonzero(np.array(errors) > SEEN)[-1] + 2) * FINE_DT)
 
 
 def finite_time_claim() -> Claim:
     """Finite for alpha below 1, not for 1."""
-    found = {alpha: decay(alpha) for alpha in ALPHAS}
-    finite = {alpha: d for alpha, d in found.items() if alpha < 1.0}
-    foreseen = {alpha: 10.0 ** ((alpha - 1.0) * d.decades_a_turn) for alpha, d in found.items()}
-    factor_off = max(abs(d.shrinks / foreseen[alpha] - 1.0) for alpha, d in found.items())
-    printed = TABLE_2["homogeneous"]["alpha"]
-    ours, theirs = of_the_observer(printed), found[printed].below(SEEN)
+    decays = {alpha: decay(alpha) for alpha in ALPHAS}
+    finite = {alpha: d for alpha, d in decays.items() if alpha < 1.0}
+    predicted_factors = {alpha: 10.0 ** ((alpha - 1.0) * d.decades_a_turn) for alpha, d in decays.items()}
+    factor_error = max(abs(d.shrinks / predicted_factors[alpha] - 1.0) for alpha, d in decays.items())
+    printed_alpha = TABLE_2["homogeneous"]["alpha"]
+    observer_s, equation_s = of_the_observer(printed_alpha), decays[printed_alpha].below(SEEN)
     return Claim(
         place="After (11), finite time",
         says="Were it not for the replaced x2 and sin(x1), the error would converge to the origin in finite time.",
@@ -123,27 +123,27 @@ def finite_time_claim() -> Claim:
             f"after {', '.join(f'{alpha:g}: {d.end_s:.3f} s' for alpha, d in finite.items())}. Each half turn is "
             f"quicker than the one before it, by the factors {', '.join(f'{d.shrinks:.3f}' for d in finite.values())}. "
             f"By homogeneity the factor is that of the size, to the power 1 - alpha, which agrees to "
-            f"{factor_off:.1%}. With alpha = 1 each takes as long as the one before. At alpha = {printed:g} the "
-            f"bench's observer, sampled at {1.0 / FINE_DT:g} Hz, has fallen to {SEEN:g} rad/s after {ours:.4f} s, the "
-            f"differential equation after {theirs:.4f} s."
+            f"{factor_error:.1%}. With alpha = 1 each takes as long as the one before. At alpha = {printed_alpha:g} "
+            f"the bench's observer, sampled at {1.0 / FINE_DT:g} Hz, has fallen to {SEEN:g} rad/s after "
+            f"{observer_s:.4f} s, the differential equation after {equation_s:.4f} s."
         ),
         holds=all(map(math.isfinite, (d.end_s for d in finite.values())))
-        and math.isinf(found[1.0].end_s)
-        and factor_off < 0.02
-        and abs(ours / theirs - 1.0) < 0.02,
+        and math.isinf(decays[1.0].end_s)
+        and factor_error < 0.02
+        and abs(observer_s / equation_s - 1.0) < 0.02,
         conditions="For alpha below 1; the printed (1/2, 1] has 1 in it, with which the error fades exponentially.",
         otherwise="The error does not fade as homogeneity has it.",
         figures={
             "gone_after_s": {str(alpha): d.end_s for alpha, d in finite.items()},
-            "time_of_a_half_turn_by_the_one_before": {str(alpha): d.shrinks for alpha, d in found.items()},
-            "fallen_to_a_thousandth_after_s": {"observer": ours, "equation": theirs},
+            "time_of_a_half_turn_by_the_one_before": {str(alpha): d.shrinks for alpha, d in decays.items()},
+            "fallen_to_a_thousandth_after_s": {"observer": observer_s, "equation": equation_s},
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(decays)],
     )
 
 
-def _picture(found: dict[float, Decay]) -> Picture:
-    lines = [Line(d.time_s[::5], 10.0 ** (-d.decades[::5]), f"alpha = {alpha:g}") for alpha, d in found.items()]
+def _picture(decays: dict[float, Decay]) -> Picture:
+    lines = [Line(d.time_s[::5], 10.0 ** (-d.decades[::5]), f"alpha = {alpha:g}") for alpha, d in decays.items()]
     return Picture(
         "aranovskiy2020-finite-time",
         "aranovskiy2020, (11) without bias and noise: how its error fades from 1 rad/s",

@@ -43,10 +43,10 @@ def rk4_as_printed(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
 def exact_step(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
     """One sample of this package's observer at rest, where A is that of `A_prime()`."""
     observer = ours(h)
-    still = Measurement(0.0, 0.0)
+    rest_measurement = Measurement(0.0, 0.0)
     entries = {"h11": H[0, 0], "h12": H[0, 1], "h22": H[1, 1], "h33": H[2, 2]}
-    state = observer.init(still)._replace(**{name: float(value) for name, value in entries.items()})
-    return matrix_of(observer.step(state, still, 0.0)[0])
+    state = observer.init(rest_measurement)._replace(**{name: float(value) for name, value in entries.items()})
+    return matrix_of(observer.step(state, rest_measurement, 0.0)[0])
 
 
 METHODS: dict[str, Method] = {
@@ -102,13 +102,13 @@ class Compared(NamedTuple):
     """RMS error of the other [rad/s]."""
 
 
-def compared(one: Observer, other: Observer, seed: int) -> Compared:
+def compared(form: Observer, other_form: Observer, seed: int) -> Compared:
     """Replay both on a run with (10) in the loop."""
     run = run_of_10(seed)
     later = run["time_s"] > 0.2
     truth = run["x2_rad_s"][later]
-    rate, other_rate = (replay(form, run).x2[later] for form in (one, other))
-    return Compared(*(float(rms(off)) for off in (other_rate - rate, rate - truth, other_rate - truth)))
+    rate, other_rate = (replay(observer, run).x2[later] for observer in (form, other_form))
+    return Compared(*(float(rms(error)) for error in (other_rate - rate, rate - truth, other_rate - truth)))
 
 
 def euler_against_exact(seed: int) -> Compared:

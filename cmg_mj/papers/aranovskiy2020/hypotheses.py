@@ -38,24 +38,24 @@ class Yaw(NamedTuple):
 
 def yaw_of(ran: Ran, mismatch: Mismatch, size: float) -> Yaw:
     """Measure one mismatch."""
-    broken = ran.broken[mismatch.kind, size]
-    run = trajectory_of(broken)
+    mismatched = ran.broken[mismatch.kind, size]
+    run = trajectory_of(mismatched)
     rate, angle = run["rate/yaw_rad_s"], run["angle/yaw_rad"]
     largest = np.abs(rate).max(axis=0)
     miss = np.abs(balanced_yaw_rate(ran.plant, run) - rate).max(axis=0)
-    foreseen = math.nan
+    predicted_deg = math.nan
     if mismatch.foreseen:
-        foretold = foreseen_yaw_rate(mismatch.kind, size, ran.plant, trajectory_of(ran.symmetric))
+        predicted_rate = foreseen_yaw_rate(mismatch.kind, size, ran.plant, trajectory_of(ran.symmetric))
         step = float(run["time_s"][1] - run["time_s"][0])
-        foreseen = float(np.degrees(np.abs(np.cumsum(foretold, axis=0) * step).max(axis=0)).mean())
+        predicted_deg = float(np.degrees(np.abs(np.cumsum(predicted_rate, axis=0) * step).max(axis=0)).mean())
 
     def ratio(key: str) -> Interval:
-        return ratio_interval(broken.values(key), ran.symmetric.values(key))
+        return ratio_interval(mismatched.values(key), ran.symmetric.values(key))
 
     return Yaw(
         float(np.degrees(np.abs(angle).max(axis=0)).mean()),
         float(largest.mean()),
-        foreseen,
+        predicted_deg,
         float((miss / largest).max()),
         ratio("velocity_rms_error_rad_s"),
         ratio("tilt_rms_deg"),
@@ -83,13 +83,13 @@ def symmetric_claim(ran: Ran) -> Claim:
 
 def broken_claim(ran: Ran) -> Claim:
     """Hypotheses 1 and 2 broken."""
-    found = {(m, size): yaw_of(ran, m, size) for m in MISMATCHES for size in m.sizes}
-    ratios = [y.foreseen_deg / y.drift_deg for y in found.values() if not math.isnan(y.foreseen_deg)]
-    small = [(m, m.sizes[-2]) for m in MISMATCHES]
-    velocity = max(abs(y.velocity.mean - 1.0) for y in found.values())
-    tilt = max(abs(y.tilt.mean - 1.0) for y in found.values())
-    balance = max(y.balance for y in found.values())
-    listed = ", ".join(f"{found[key].drift_deg:.1f} deg for {_size(*key)}" for key in small)
+    yaws = {(m, size): yaw_of(ran, m, size) for m in MISMATCHES for size in m.sizes}
+    ratios = [y.foreseen_deg / y.drift_deg for y in yaws.values() if not math.isnan(y.foreseen_deg)]
+    examples = [(m, m.sizes[-2]) for m in MISMATCHES]
+    velocity = max(abs(y.velocity.mean - 1.0) for y in yaws.values())
+    tilt = max(abs(y.tilt.mean - 1.0) for y in yaws.values())
+    balance = max(y.balance for y in yaws.values())
+    turns_text = ", ".join(f"{yaws[key].drift_deg:.1f} deg for {_size(*key)}" for key in examples)
     return Claim(
         place="After Hypothesis 3",
         says=(
@@ -98,7 +98,7 @@ def broken_claim(ran: Ran) -> Claim:
         ),
         found=(
             f"The second cube changed on purpose, {WORLDS} seeds a case, the same push. In {DURATION_S:g} s body A "
-            f"turns by up to {listed}. Conservation of the momentum about the vertical gives its rate to "
+            f"turns by up to {turns_text}. Conservation of the momentum about the vertical gives its rate to "
             f"{balance:.1%} of the largest; from the symmetric rig's run the turn is foreseen to {min(ratios):.2f} to "
             f"{max(ratios):.2f} of what it is. The velocity RMS error changes by at most {velocity:.1%} and the tilt "
             f"RMS by at most {tilt:.0%}; {ran.fell} worlds fall."
@@ -118,9 +118,9 @@ def broken_claim(ran: Ran) -> Claim:
                 "velocity_rms_error_by_symmetric": y.velocity,
                 "tilt_rms_by_symmetric": y.tilt,
             }
-            for (m, size), y in found.items()
+            for (m, size), y in yaws.items()
         },
-        pictures=[_picture(ran, found)],
+        pictures=[_picture(ran, yaws)],
     )
 
 
@@ -128,7 +128,7 @@ def _size(mismatch: Mismatch, size: float) -> str:
     return f"{mismatch.kind} {mismatch.shown * size:g} {mismatch.unit}"
 
 
-def _picture(ran: Ran, found: dict[tuple[Mismatch, float], Yaw]) -> Picture:
+def _picture(ran: Ran, yaws: dict[tuple[Mismatch, float], Yaw]) -> Picture:
     symmetric = trajectory_of(ran.symmetric)
     t, shaded = symmetric["time_s"], pushed(symmetric.world(0))
     rates, turns, sweep = [], [], []
@@ -138,15 +138,15 @@ def _picture(ran: Ran, found: dict[tuple[Mismatch, float], Yaw]) -> Picture:
         rates.append(Line(t, run["rate/yaw_rad_s"][:, 0], _size(mismatch, size), color=i))
         turns.append(Line(t, np.degrees(run["angle/yaw_rad"][:, 0]), color=i))
         if mismatch.foreseen:
-            foretold = foreseen_yaw_rate(mismatch.kind, size, ran.plant, symmetric)[:, 0]
-            rates.append(Line(t, foretold, "" if i else "foreseen", "k--", width=0.8))
-            turns.append(Line(t, np.degrees(np.cumsum(foretold) * (t[1] - t[0])), style="k--", width=0.8))
+            predicted_rate = foreseen_yaw_rate(mismatch.kind, size, ran.plant, symmetric)[:, 0]
+            rates.append(Line(t, predicted_rate, "" if i else "foreseen", "k--", width=0.8))
+            turns.append(Line(t, np.degrees(np.cumsum(predicted_rate) * (t[1] - t[0])), style="k--", width=0.8))
         largest = mismatch.sizes[-1]
         x = [s / largest for s in mismatch.sizes]
         label = f"{mismatch.kind}, 1 is {mismatch.shown * largest:g} {mismatch.unit}"
-        sweep.append(Line(x, [found[mismatch, s].drift_deg for s in mismatch.sizes], label, "o-", color=i))
+        sweep.append(Line(x, [yaws[mismatch, s].drift_deg for s in mismatch.sizes], label, "o-", color=i))
         if mismatch.foreseen:
-            sweep.append(Line(x, [found[mismatch, s].foreseen_deg for s in mismatch.sizes], style="kx"))
+            sweep.append(Line(x, [yaws[mismatch, s].foreseen_deg for s in mismatch.sizes], style="kx"))
     return Picture(
         "aranovskiy2020-hypotheses",
         "aranovskiy2020, Hypotheses 1 and 2 broken: what thrust bearing A does (dashed and x: foreseen)",
@@ -165,28 +165,28 @@ def hypothesis_3(ran: Ran) -> Claim:
     names = plant.joint_names
     speeds = np.stack([np.abs(run[f"rate/{names[module.flywheel]}_rad_s"]) for module in plant.modules])
     nominal = abs(plant.modules[0].speed)
-    off = float(np.abs(speeds - nominal).max())
+    speed_error = float(np.abs(speeds - nominal).max())
     gimbal = max(float(np.abs(run[f"rate/{names[module.gimbal]}_rad_s"]).max()) for module in plant.modules)
     tilt = float(np.abs(run["x2_rad_s"]).max())
     model = plant.reduced
     spin_up = np.gradient(speeds[0], run["time_s"], axis=0)
     D = model.J1 + model.J2 * np.sin(run["x3_rad"]) ** 2
-    left_out = model.J_d * np.sin(run["x3_rad"]) * spin_up / D
+    omitted_term = model.J_d * np.sin(run["x3_rad"]) * spin_up / D
     acceleration = np.gradient(run["x2_rad_s"], run["time_s"], axis=0)
-    share = float(rms(left_out.ravel()) / rms(acceleration.ravel()))
+    share = float(rms(omitted_term.ravel()) / rms(acceleration.ravel()))
     return Claim(
         place="Hypothesis 3",
         says="The flywheels' speed is held constant and far above the rates of tilt and gimbals.",
         found=(
-            f"With a speed loop of 0.11 s and at most 0.5 N m the speed strays by at most {off:.2f} rad/s "
-            f"({off / nominal:.2%}) under the push. It is {nominal / max(gimbal, tilt):.0f} times the fastest gimbal "
-            f"rate ({gimbal:.2f} rad/s) and {nominal / tilt:.0f} times the fastest tilt rate. The term with omega_d' "
-            f"that (3) leaves out is {share:.2%} of the tilt acceleration (RMS)."
+            f"With a speed loop of 0.11 s and at most 0.5 N m the speed strays by at most {speed_error:.2f} rad/s "
+            f"({speed_error / nominal:.2%}) under the push. It is {nominal / max(gimbal, tilt):.0f} times the fastest "
+            f"gimbal rate ({gimbal:.2f} rad/s) and {nominal / tilt:.0f} times the fastest tilt rate. The term with "
+            f"omega_d' that (3) leaves out is {share:.2%} of the tilt acceleration (RMS)."
         ),
-        holds=off / nominal < 0.01 and share < 0.01 and nominal > 10.0 * max(gimbal, tilt),
+        holds=speed_error / nominal < 0.01 and share < 0.01 and nominal > 10.0 * max(gimbal, tilt),
         otherwise="The speed strays too far.",
         figures={
-            "largest_speed_error_rad_s": off,
+            "largest_speed_error_rad_s": speed_error,
             "speed_by_fastest_gimbal_rate": nominal / gimbal,
             "speed_by_fastest_tilt_rate": nominal / tilt,
             "omitted_term_share": share,

@@ -58,52 +58,55 @@ def experiments(studies: Studies) -> Iterator[Together]:
             yield Together(push, noise, {name: level_at(study, noise) for name, study in by_name.items()})
 
 
-def listed(together: Sequence[Together]) -> str:
+def listed(joint_experiments: Sequence[Together]) -> str:
     """Experiments push by push: `1 N m, e = 0.5 deg at 100, 200; 0.3 N m, e = 0 at 100 ug/rtHz`."""
     noises: dict[str, list[str]] = {}
-    for each in together:
-        noises.setdefault(each.push, []).append(f"{each.noise_ug_rthz:g}")
-    return "; ".join(f"{push} at {', '.join(at)}" for push, at in noises.items()) + " ug/rtHz"
+    for experiment in joint_experiments:
+        noises.setdefault(experiment.push, []).append(f"{experiment.noise_ug_rthz:g}")
+    return "; ".join(f"{push} at {', '.join(densities)}" for push, densities in noises.items()) + " ug/rtHz"
 
 
 def nearest_joint(studies: Studies) -> Together:
     """The experiment at which the worst of the three loses least, of those worth tuning in if there are any."""
-    tried = list(experiments(studies))
-    return min([together for together in tried if together.worth_it] or tried, key=lambda together: together.worst)
+    candidates = list(experiments(studies))
+    return min(
+        [experiment for experiment in candidates if experiment.worth_it] or candidates,
+        key=lambda experiment: experiment.worst,
+    )
 
 
 def joint_claim(studies: Studies) -> Claim:
     """Whether one experiment has all three lines of Table 2."""
-    found, tried = nearest_joint(studies), list(experiments(studies))
-    worth = [together for together in tried if together.worth_it]
-    least = min(tried, key=lambda together: together.worst)
+    nearest, candidates = nearest_joint(studies), list(experiments(studies))
+    tunable = [experiment for experiment in candidates if experiment.worth_it]
+    least = min(candidates, key=lambda experiment: experiment.worst)
     ratios = "; ".join(
         f"{OBSERVERS[name]} {level.ratio.mean:.3f} ({level.ratio.low:.3f} to {level.ratio.high:.3f})"
-        for name, level in found.levels.items()
+        for name, level in nearest.levels.items()
     )
-    others = [OBSERVERS[name] for name in found.levels if name not in found.best]
+    misfits = [OBSERVERS[name] for name in nearest.levels if name not in nearest.best]
     return Claim(
         place="Table 2, the three together",
         says="The three observers were tuned on the same collected data: Fig. 4's one experiment.",
         found=(
-            f"{len(studies)} pushes at several noises, {len(tried)} experiments, each recorded once for all three. In "
-            f"{len(worth)} of them all three can be tuned to follow the gyro better than an estimate of zero does. Of "
-            f"these Table 2's lines come nearest to being the best together at {found.words}. There Table 2's error by "
-            f"that of the tuned is {ratios}. Zero left aside it is {least.words}, where the worst has "
-            f"{least.worst:.2f} times the error of the tuned. {_apart(studies)}"
+            f"{len(studies)} pushes at several noises, {len(candidates)} experiments, each recorded once for all "
+            f"three. In {len(tunable)} of them all three can be tuned to follow the gyro better than an estimate of "
+            f"zero does. Of these Table 2's lines come nearest to being the best together at {nearest.words}. There "
+            f"Table 2's error by that of the tuned is {ratios}. Zero left aside it is {least.words}, where the worst "
+            f"has {least.worst:.2f} times the error of the tuned. {_apart(studies)}"
         ),
-        holds=found.worth_it and not others,
-        conditions=f"At {found.words} (the bench's own noise is {DEFAULT_NOISE:g}); the paper gives neither.",
+        holds=nearest.worth_it and not misfits,
+        conditions=f"At {nearest.words} (the bench's own noise is {DEFAULT_NOISE:g}); the paper gives neither.",
         otherwise=(
-            f"No experiment tried has all three: where the worst loses least, {listed_and(others)} is not the best."
-            if others
+            f"No experiment tried has all three: where the worst loses least, {listed_and(misfits)} is not the best."
+            if misfits
             else "Where all three are the best, an estimate of zero is better still."
         )
         + " The paper gives neither its push nor its noise.",
         figures={
-            "experiment": found.words,
-            "worst_table_2_by_tuned_error": {together.words: together.worst for together in tried},
-            "worth_tuning_in": [together.words for together in worth],
+            "experiment": nearest.words,
+            "worst_table_2_by_tuned_error": {experiment.words: experiment.worst for experiment in candidates},
+            "worth_tuning_in": [experiment.words for experiment in tunable],
         },
         pictures=[_picture(studies)],
     )

@@ -38,23 +38,23 @@ def settled(method: Method, h: float = 1e-3) -> np.ndarray:
 
 def misprint(seed: int = SEED_OF_10) -> Misprint:
     """Integrate both equations, at rest and along a run, with Runge-Kutta 4."""
-    along = compared(Plain(rk4), Plain(rk4_as_printed), seed)
-    return Misprint(settled(rk4), settled(rk4_as_printed), along)
+    comparison = compared(Plain(rk4), Plain(rk4_as_printed), seed)
+    return Misprint(settled(rk4), settled(rk4_as_printed), comparison)
 
 
 def misprint_claim(seed: int = SEED_OF_10) -> Claim:
     """The Riccati equation as printed."""
-    H, printed, rate = misprint(seed)
-    asymmetry = float(abs(printed[0, 1] - printed[1, 0]) / printed[1, 0])
-    gain = float(np.abs(printed[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
+    H, printed_H, rate = misprint(seed)
+    asymmetry = float(abs(printed_H[0, 1] - printed_H[1, 0]) / printed_H[1, 0])
+    gain = float(np.abs(printed_H[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
     return Claim(
         place="After (10), the Riccati equation",
         says="The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
         found=(
-            f"With A of (6) as printed, H settles at rest with H12 = {printed[0, 1]:.1f} and H21 = "
-            f"{printed[1, 0]:.1f}: not symmetric, by {asymmetry:.1%}. With A'^T in A^T's place both are "
+            f"With A of (6) as printed, H settles at rest with H12 = {printed_H[0, 1]:.1f} and H21 = "
+            f"{printed_H[1, 0]:.1f}: not symmetric, by {asymmetry:.1%}. With A'^T in A^T's place both are "
             f"{H[1, 0]:.1f}. The observer uses H C^T alone, of which the largest change is {gain:.2%} of its largest "
-            f"entry (H11 {H[0, 0]:.2f}, printed {printed[0, 0]:.2f}). Along a closed-loop run the rate changes by "
+            f"entry (H11 {H[0, 0]:.2f}, printed {printed_H[0, 0]:.2f}). Along a closed-loop run the rate changes by "
             f"{rate.difference:.4f} rad/s RMS (H by Runge-Kutta 4, the estimate by "
             f"Euler), its error from {rate.error:.4f} to {rate.other_error:.4f} rad/s."
         ),
@@ -67,8 +67,8 @@ def misprint_claim(seed: int = SEED_OF_10) -> Claim:
         ),
         otherwise="As printed it is not symmetric, and the observer would be another one.",
         figures={
-            "H12_printed": float(printed[0, 1]),
-            "H21_printed": float(printed[1, 0]),
+            "H12_printed": float(printed_H[0, 1]),
+            "H21_printed": float(printed_H[1, 0]),
             "H12": float(H[0, 1]),
             "largest_change_of_gain_share": gain,
             "rate_changed_rad_s": rate.difference,

@@ -43,11 +43,11 @@ def count() -> dict[str, float]:
         )
         for name in OBSERVERS
     }
-    counted = {name: cost_of(run, run.axis_controller())["step_instructions"] for name, run in runs.items()}
+    counts = {name: cost_of(run, run.axis_controller())["step_instructions"] for name, run in runs.items()}
     of_10 = runs["ltv"]
     for name, method in PLAIN.items():
-        counted[name] = cost_of(of_10, of_10.axis_controller(observer=Plain(method)))["step_instructions"]
-    return counted
+        counts[name] = cost_of(of_10, of_10.axis_controller(observer=Plain(method)))["step_instructions"]
+    return counts
 
 
 def instructions() -> Instructions:

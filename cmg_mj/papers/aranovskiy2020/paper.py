@@ -73,9 +73,9 @@ def gimbal_torque(x2: float, x3: float, gimbal_acceleration: float, omega_d: flo
         The torque on one gimbal.
     """
     q_c = x3 + math.pi / 2.0
-    own = (TABLE_1["I_c"] + TABLE_1["I_d"]) * gimbal_acceleration
-    turned = 0.5 * printed_model().J2 * math.sin(2.0 * q_c) * x2**2
-    return own + TABLE_1["J_d"] * x2 * omega_d * math.sin(q_c) + turned
+    inertial_torque = (TABLE_1["I_c"] + TABLE_1["I_d"]) * gimbal_acceleration
+    tilt_torque = 0.5 * printed_model().J2 * math.sin(2.0 * q_c) * x2**2
+    return inertial_torque + TABLE_1["J_d"] * x2 * omega_d * math.sin(q_c) + tilt_torque
 
 
 def gimbal_rest(e: float) -> float:

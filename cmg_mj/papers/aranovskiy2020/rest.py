@@ -68,11 +68,13 @@ class Rest(NamedTuple):
 
 def rests_of(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list[Rest]:
     """Let the rig come to rest, without a push: a case of `CASES`, how many worlds, and settings beside its own."""
-    still = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
+    common_settings = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
     runs = []
-    for case, worlds, extra in cases:
+    for case, worlds, extra_settings in cases:
         observer, settings, *_ = CASES[case]
-        runs.append(run_of(push_recovery(observer, seed, [*still, *settings, *extra], DURATION_S), worlds))
+        runs.append(
+            run_of(push_recovery(observer, seed, [*common_settings, *settings, *extra_settings], DURATION_S), worlds)
+        )
     results = run_side_by_side(runs)
     return [
         _rest(CASES[case].observer, trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)
@@ -157,32 +159,32 @@ def observers_claim(rests: Mapping[str, Rest]) -> Claim:
     Returns:
         The claim.
     """
-    observed = {case: rest for case, rest in rests.items() if case != TRUE_RATE}
+    observer_rests = {case: rest for case, rest in rests.items() if case != TRUE_RATE}
     example = rests[TRUE_RATE].example
     sigma = float(np.std(example["y1_rad"] - example["x1_rad"]))
-    expected = {case: expected_integrator(case, BIAS_DEG, sigma) for case in observed}
+    expected_x_e = {case: expected_integrator(case, BIAS_DEG, sigma) for case in observer_rests}
     quiet = steady("homogeneous", BIAS_DEG, 0.0)[1]
-    listed = "; ".join(
+    observers_text = "; ".join(
         f"{case}: rate estimated {rest.x2_estimated.mean:+.4f} rad/s, tilt {plus_minus(rest.x1, signed=True)} "
-        f"deg, x_e {rest.x_e.mean:.3f} rad s ({expected[case]:.3f} expected)"
-        for case, rest in observed.items()
+        f"deg, x_e {rest.x_e.mean:.3f} rad s ({expected_x_e[case]:.3f} expected)"
+        for case, rest in observer_rests.items()
     )
     return Claim(
         place="After (10), the equilibrium",
         says="The integral action makes x = 0 the equilibrium even with an observer whose estimate e biases.",
         found=(
-            f"The same rig with an observer in the law, {WORLDS} seeds. {listed}. Without noise (11) would estimate "
-            f"{quiet:+.4f} rad/s: its gains fall with the size of its error, so noise adds to its bias."
+            f"The same rig with an observer in the law, {WORLDS} seeds. {observers_text}. Without noise (11) would "
+            f"estimate {quiet:+.4f} rad/s: its gains fall with the size of its error, so noise adds to its bias."
         ),
-        holds=all(rest.at_zero(expected[case]) for case, rest in observed.items()),
+        holds=all(rest.at_zero(expected_x_e[case]) for case, rest in observer_rests.items()),
         otherwise="The rest is not where it should be.",
         figures={
             key: value
-            for case, rest in observed.items()
+            for case, rest in observer_rests.items()
             for key, value in (
                 (f"tilt_rest {case}_deg", rest.x1),
                 (f"integrator_rest {case}_rad_s", rest.x_e),
-                (f"integrator_expected {case}_rad_s", expected[case]),
+                (f"integrator_expected {case}_rad_s", expected_x_e[case]),
                 (f"rate_estimated {case}_rad_s", rest.x2_estimated),
             )
         },
@@ -206,7 +208,7 @@ def _picture(rests: Mapping[str, Rest]) -> Picture:
 def claims(on_share: OnShare) -> list[Claim]:
     """The laws with the true rate, then with observers."""
     without_integrator = (TRUE_RATE, 2, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
-    *found, static = rests_of([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
+    *case_rests, static = rests_of([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
     on_share(0.9)
-    rests = dict(zip(CASES, found, strict=True))
+    rests = dict(zip(CASES, case_rests, strict=True))
     return [laws_claim(rests[TRUE_RATE], static), observers_claim(rests)]

@@ -122,18 +122,18 @@ def all_studies(
 ) -> dict[str, dict[str, TuningResult]]:
     """Tune every observer on the same recordings of every push."""
     studies: dict[str, dict[str, TuningResult]] = {}
-    wanted = [each for p in pushes for each in halves(_scenario(cases[0], p, seed), worlds, p.noise_ug_rthz)]
-    recorded, done = recorder(wanted, warm_up_s=WARM_UP_S), 0.0
+    recordings = [half for p in pushes for half in halves(_scenario(cases[0], p, seed), worlds, p.noise_ug_rthz)]
+    recorded, share_done = recorder(recordings, warm_up_s=WARM_UP_S), 0.0
     for push in pushes:
         studies[push.words] = {}
         for case in cases:
-            whole = push.share * case.share
+            case_share = push.share * case.share
 
-            def share(part: float, before: float = done, whole: float = whole) -> None:
-                on_share(before + part * whole)
+            def share(part: float, before: float = share_done, case_share: float = case_share) -> None:
+                on_share(before + part * case_share)
 
             studies[push.words][case.observer] = study_of(case, push, seed, worlds, recorded, share)
-            done += whole
+            share_done += case_share
     return studies
 
 
@@ -147,14 +147,17 @@ def worth_it(level: NoiseLevelResult) -> bool:
     return float(level.rms.mean()) < level.zero_rms
 
 
-def in_the_loop(tried: Sequence[tuple[Tuned, NoiseLevelResult, Push]], worlds: int, seed: int) -> list[Interval]:
+def in_the_loop(trials: Sequence[tuple[Tuned, NoiseLevelResult, Push]], worlds: int, seed: int) -> list[Interval]:
     """Velocity RMS error in the closed loop, Table 2's by the tuned, world by world, under that push and noise."""
     runs = []
-    for case, level, push in tried:
+    for case, level, push in trials:
         noise = f"sensors.accelerometer.noise_density_ug_rthz={level.noise_ug_rthz}"
         names = dict.fromkeys(name.partition("[")[0] for name in level.sizes)
-        tuned = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
-        for settings in ([], tuned):
+        tuned_settings = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
+        for settings in ([], tuned_settings):
             runs.append(run_of(push_recovery(case.observer, seed, [*push.settings, noise, *settings]), worlds))
-    found = [result.values("velocity_rms_error_rad_s") for result in run_side_by_side(runs, keep_trajectory=False)]
-    return [ratio_interval(given, tuned) for given, tuned in zip(found[::2], found[1::2], strict=True)]
+    errors = [result.values("velocity_rms_error_rad_s") for result in run_side_by_side(runs, keep_trajectory=False)]
+    return [
+        ratio_interval(printed_errors, tuned_settings)
+        for printed_errors, tuned_settings in zip(errors[::2], errors[1::2], strict=True)
+    ]

@@ -18,38 +18,38 @@ from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.studies.tuning import NoiseLevelResult
 
 
-def table_2_claim(case: Tuned, studies: Studies, together: Together) -> Claim:
+def table_2_claim(case: Tuned, studies: Studies, experiment: Together) -> Claim:
     """Table 2's line of one observer, judged in the experiment that all three lines come nearest to.
 
     Args:
         case: What was tuned.
         studies: Of all three, under every push.
-        together: That experiment.
+        experiment: That experiment.
 
     Returns:
         The claim.
     """
-    level = together.levels[case.observer]
-    good = worth_it(level)
+    level = experiment.levels[case.observer]
+    is_tunable = worth_it(level)
     return Claim(
         place=f"Table 2, {case.equation}",
         says=f"{case.printed}, tuned to fit the gyro best.",
         found=(
             f"Fitted on {len(level.rms)} seeds, scored on as many others, from the push to a second after it. At "
-            f"{together.words}, where the three lines come nearest to being the best together, the best is "
+            f"{experiment.words}, where the three lines come nearest to being the best together, the best is "
             f"{_sizes(level)}. Table 2's error is {level.given_rms.mean():.4f} rad/s, that of the tuned "
             f"{level.rms.mean():.4f}, the ratio {_ratio(level)}. That of an estimate of zero is {level.zero_rms:.4f}. "
             f"{_elsewhere(case, studies)}"
         ),
-        holds=is_best(level) and good,
+        holds=is_best(level) and is_tunable,
         conditions=(
-            f"At {together.words}, the same for all three lines (the bench's own noise is {DEFAULT_NOISE:g}). The "
+            f"At {experiment.words}, the same for all three lines (the bench's own noise is {DEFAULT_NOISE:g}). The "
             f"paper gives neither its push nor its noise. {_scenario(case, studies)}"
         ),
         otherwise=(
             f"In the experiment in which all three could have been tuned they have {level.ratio.mean:.2f} times the "
             f"error of the tuned. {_alone(case, studies)}"
-            if good
+            if is_tunable
             else "In the experiment nearest to one for all three an estimate of zero is closer to the gyro."
         ),
         figures={
@@ -84,10 +84,10 @@ def _scenario(case: Tuned, studies: Studies) -> str:
     """What they lose under the push of Figs 5 to 7, at the noise at which they lose least there."""
     push = next(iter(studies))
     level = least_lost(case, studies)
-    closer = "" if worth_it(level) else ", where an estimate of zero is closer than either"
+    zero_note = "" if worth_it(level) else ", where an estimate of zero is closer than either"
     return (
         f"Under {push} they lose least at {level.noise_ug_rthz:g} ug/rtHz: {level.ratio.mean:.2f} times the error of "
-        f"the tuned{closer}."
+        f"the tuned{zero_note}."
     )
 
 
@@ -114,10 +114,10 @@ def _ratio(level: NoiseLevelResult) -> str:
 def claims(on_share: OnShare) -> list[Claim]:
     """Section V's procedure, whether Table 2 is one experiment's, and a line of it an observer."""
     studies = all_studies(SEED, WORLDS, lambda share: on_share((1.0 - LOOP_SHARE) * share))
-    together = nearest_joint(studies)
-    loops = loops_of(studies, together, lambda share: on_share(1.0 - LOOP_SHARE * (1.0 - share)))
+    experiment = nearest_joint(studies)
+    loops = loops_of(studies, experiment, lambda share: on_share(1.0 - LOOP_SHARE * (1.0 - share)))
     return [
         procedure_claim(studies, loops),
         joint_claim(studies),
-        *(table_2_claim(case, studies, together) for case in CASES),
+        *(table_2_claim(case, studies, experiment) for case in CASES),
     ]

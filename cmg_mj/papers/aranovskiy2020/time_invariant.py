@@ -91,9 +91,9 @@ def fates_of(
     """
     biases = {"equilibrium_bias_deg": [e for e in biases_deg for _ in range(worlds)]}
     numbers = [*range(worlds)] * len(biases_deg)
-    prepared = [push_recovery(observer, seed, settings, duration_s) for observer, settings in observers]
+    experiments = [push_recovery(observer, seed, settings, duration_s) for observer, settings in observers]
     results = run_side_by_side(
-        [BatchJob(each.with_varied(biases), numbers) for each in prepared], keep_trajectory=False
+        [BatchJob(experiment.with_varied(biases), numbers) for experiment in experiments], keep_trajectory=False
     )
     return [
         {
@@ -144,36 +144,37 @@ class Factorial(NamedTuple):
         return [c for c in self.cells if c[0] in PRINTED and self.cells[c][JUDGED_DEG].fell == 1.0]
 
 
-def remark(found: Factorial) -> Claim:
+def remark(fates_by_cell: Factorial) -> Claim:
     """The remark, over gain, model and bias.
 
     Args:
-        found: The fates.
+        fates_by_cell: The fates.
 
     Returns:
         The claim.
     """
-    standing = [gain for gain in GAINS if all(found.stands_everywhere((gain, model)) for model in MODELS)]
+    safe_gains = [gain for gain in GAINS if all(fates_by_cell.stands_everywhere((gain, model)) for model in MODELS)]
     return Claim(
         place="Section V, the time-invariant observer",
         says="A linear time-invariant observer, which is a particular case of (10), could not stabilise the rig.",
         found=(
-            f"{len(GAINS)} constant gains by 2 models by {len(found.whole)} biases, {WORLDS} seeds each, the push of "
-            f"Figs 5 to 7, the law on measured angles. {' '.join(_of_model(found, model) for model in MODELS)} "
-            f"{_stands(standing)} Velocity RMS error of the frozen gain with gravity at y1 at {JUDGED_DEG:g} deg "
-            f"{_error(found.cells[FROZEN, MEASURED][JUDGED_DEG])} rad/s, of (10) itself "
-            f"{_error(found.whole[JUDGED_DEG])}. At rest e biases the estimated rate by "
+            f"{len(GAINS)} constant gains by 2 models by {len(fates_by_cell.whole)} biases, {WORLDS} seeds each, the "
+            "push of Figs 5 to 7, the law on measured angles. "
+            f"{' '.join(_of_model(fates_by_cell, model) for model in MODELS)} {_stands(safe_gains)} Velocity RMS error "
+            f"of the frozen gain with gravity at y1 at {JUDGED_DEG:g} deg "
+            f"{_error(fates_by_cell.cells[FROZEN, MEASURED][JUDGED_DEG])} rad/s, of (10) itself "
+            f"{_error(fates_by_cell.whole[JUDGED_DEG])}. At rest e biases the estimated rate by "
             f"{rate_bias((PREDECESSOR, LINEAR)):.1f} e/s with the predecessor's gain on the linear model, by "
             f"{rate_bias((FROZEN, MEASURED)):.1f} e/s with the frozen one and gravity at y1."
         ),
-        holds=bool(found.failing),
-        conditions=_conditions(found, standing),
+        holds=bool(fates_by_cell.failing),
+        conditions=_conditions(fates_by_cell, safe_gains),
         otherwise=(
             f"At e = {JUDGED_DEG:g} deg neither the predecessor's gain nor the frozen one of (10) falls in every "
             "world, with either model, where (10) stands."
         ),
         figures={
-            "bias_deg": list(found.whole),
+            "bias_deg": list(fates_by_cell.whole),
             **{
                 f"{gain}, {model}": {
                     "l1_1_s": GAINS[gain].l1,
@@ -182,20 +183,20 @@ def remark(found: Factorial) -> Claim:
                     "fell_fraction": [fate.fell for fate in fates.values()],
                     "velocity_rms_error_rad_s": [fate.error for fate in fates.values()],
                 }
-                for (gain, model), fates in found.cells.items()
+                for (gain, model), fates in fates_by_cell.cells.items()
             },
-            "fell_fraction (10)": [fate.fell for fate in found.whole.values()],
-            "velocity_rms_error (10)_rad_s": [fate.error for fate in found.whole.values()],
+            "fell_fraction (10)": [fate.fell for fate in fates_by_cell.whole.values()],
+            "velocity_rms_error (10)_rad_s": [fate.error for fate in fates_by_cell.whole.values()],
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(fates_by_cell)],
     )
 
 
-def _of_model(found: Factorial, model: str) -> str:
+def _of_model(fates_by_cell: Factorial, model: str) -> str:
     """From which bias on each gain falls in every world."""
     parts = []
     for gain, (_, l2) in GAINS.items():
-        falls = found.falls_at((gain, model))
+        falls = fates_by_cell.falls_at((gain, model))
         fate = f"from {min(falls):g} deg" if falls else "at none"
         parts.append(f"{gain} ({math.sqrt(l2):.0f} rad/s) {fate}")
     return f"With {model} it falls in every world: {', '.join(parts)}."
@@ -207,18 +208,18 @@ def _stands(gains: Sequence[str]) -> str:
     return f"At every bias and with both models it stands with the gains {listed_and(gains)}."
 
 
-def _conditions(found: Factorial, standing: Sequence[str]) -> str:
+def _conditions(fates_by_cell: Factorial, safe_gains: Sequence[str]) -> str:
     """What falls, and that it is not the constancy of the gain."""
-    cells = [f"the {gain} gain and {model}" for gain, model in found.failing]
+    cells = [f"the {gain} gain and {model}" for gain, model in fates_by_cell.failing]
     sentences = [f"At e = {JUDGED_DEG:g} deg, with {listed_and(cells)}." if cells else "Nowhere."]
-    if FROZEN in standing:
+    if FROZEN in safe_gains:
         sentences.append(
             "It is not that the gain is constant: frozen at the value at which the Riccati equation settles, it "
             "stands with either model at every bias tried."
         )
-    slow = [model for model in MODELS if found.falls_at((PREDECESSOR, model))]
-    if len(slow) == 2:
-        first = {model: min(found.falls_at((PREDECESSOR, model))) for model in MODELS}
+    sensitive_models = [model for model in MODELS if fates_by_cell.falls_at((PREDECESSOR, model))]
+    if len(sensitive_models) == 2:
+        first = {model: min(fates_by_cell.falls_at((PREDECESSOR, model))) for model in MODELS}
         sentences.append(
             f"It is that the gain is small, and then the model: the predecessor's falls from {first[LINEAR]:g} deg "
             f"with {LINEAR}, from {first[MEASURED]:g} deg with {MEASURED}."
@@ -230,17 +231,17 @@ def _error(fate: Fate) -> str:
     return format_figure("velocity_rms_error_rad_s", fate.error)
 
 
-def _picture(found: Factorial) -> Picture:
+def _picture(fates_by_cell: Factorial) -> Picture:
     shares, errors = [], []
     for model in MODELS:
         falls, velocities = [], []
         for color, gain in enumerate(GAINS):
-            fates = found.cells[gain, model]
-            known = {e: fate.error for e, fate in fates.items() if fate.error is not None}
+            fates = fates_by_cell.cells[gain, model]
+            known_errors = {e: fate.error for e, fate in fates.items() if fate.error is not None}
             falls.append(Line(list(fates), [100.0 * fate.fell for fate in fates.values()], gain, "o-", color))
-            velocities.append(Line(list(known), list(known.values()), style="o-", color=color))
-        stood = {e: fate.error for e, fate in found.whole.items() if fate.error is not None}
-        velocities.append(Line(list(stood), list(stood.values()), WHOLE, "k--"))
+            velocities.append(Line(list(known_errors), list(known_errors.values()), style="o-", color=color))
+        whole_errors = {e: fate.error for e, fate in fates_by_cell.whole.items() if fate.error is not None}
+        velocities.append(Line(list(whole_errors), list(whole_errors.values()), WHOLE, "k--"))
         shares.append(Panel("share of falls [%]", falls, y_range=(-5.0, 105.0)))
         label = "velocity\nRMS error [rad/s]"
         errors.append(Panel(label, velocities, "of those that stood", "equilibrium bias e [deg]", y_range=(0.0, 0.2)))
@@ -256,8 +257,8 @@ def factorial(worlds: int, seed: int, duration_s: float = DURATION_S) -> Factori
     """Run every cell, and (10)."""
     cells = [(gain, model) for gain in GAINS for model in MODELS]
     observers = [*(observer_of(cell) for cell in cells), ("ltv", [])]
-    *found, whole = fates_of(observers, BIASES_DEG, worlds, seed, duration_s)
-    return Factorial(dict(zip(cells, found, strict=True)), whole)
+    *fates, whole = fates_of(observers, BIASES_DEG, worlds, seed, duration_s)
+    return Factorial(dict(zip(cells, fates, strict=True)), whole)
 
 
 def claims(on_share: OnShare) -> list[Claim]:

@@ -36,18 +36,20 @@ class Tried(NamedTuple):
         return [OBSERVERS[name] for name, ratio in self.loop.items() if not ratio.high >= 1.0]
 
 
-def loops_of(studies: Studies, together: Together, on_share: OnShare) -> list[Tried]:
+def loops_of(studies: Studies, joint_experiment: Together, on_share: OnShare) -> list[Tried]:
     """Close the loop on the tuned and on Table 2's: at the default noise and push, and in the joint experiment."""
     default = next(
-        tried for tried in experiments(studies) if tried.push == STRONG.words and tried.noise_ug_rthz == DEFAULT_NOISE
+        experiment
+        for experiment in experiments(studies)
+        if experiment.push == STRONG.words and experiment.noise_ug_rthz == DEFAULT_NOISE
     )
-    found, chosen = [], [default] + [together] * (together.words != default.words)
-    for i, tried in enumerate(chosen):
-        push = next(push for push in PUSHES if push.words == tried.push)
-        loops = in_the_loop([(case, tried.levels[case.observer], push) for case in CASES], LOOP_WORLDS, SEED + 1)
-        found.append(Tried(tried, dict(zip((case.observer for case in CASES), loops, strict=True))))
-        on_share((i + 1) / len(chosen))
-    return found
+    trials, selection = [], [default] + [joint_experiment] * (joint_experiment.words != default.words)
+    for i, experiment in enumerate(selection):
+        push = next(push for push in PUSHES if push.words == experiment.push)
+        loops = in_the_loop([(case, experiment.levels[case.observer], push) for case in CASES], LOOP_WORLDS, SEED + 1)
+        trials.append(Tried(experiment, dict(zip((case.observer for case in CASES), loops, strict=True))))
+        on_share((i + 1) / len(selection))
+    return trials
 
 
 def procedure_claim(studies: Studies, loops: list[Tried]) -> Claim:
@@ -60,53 +62,54 @@ def procedure_claim(studies: Studies, loops: list[Tried]) -> Claim:
     Returns:
         The claim.
     """
-    carried = [
+    ratios = [
         float(level.rms.mean()) / level.fit_rms
         for by_name in studies.values()
         for study in by_name.values()
         for level in study.levels
     ]
-    tried = list(experiments(studies))
-    good = [together for together in tried if together.worth_it]
+    candidates = list(experiments(studies))
+    tunable = [experiment for experiment in candidates if experiment.worth_it]
     return Claim(
         place="Section V, tuning",
         says="Fitting an observer to the gyro's rate, recorded with the loop closed on the gyro and a push, tunes it.",
         found=(
-            f"{' '.join(_in_words(each) for each in loops)} Over {len(carried)} fits the error on other seeds is "
-            f"{min(carried):.3f} to {max(carried):.3f} times that on the fitted ones."
+            f"{' '.join(_in_words(trial) for trial in loops)} Over {len(ratios)} fits the error on other seeds is "
+            f"{min(ratios):.3f} to {max(ratios):.3f} times that on the fitted ones."
         ),
-        holds=bool(good),
+        holds=bool(tunable),
         conditions=(
-            f"In {len(good)} of the {len(tried)} experiments tried: there all three, tuned, follow the gyro better "
-            f"than an estimate of zero. These are {listed(good) if good else 'none'}. {_zero(loops)}{_worse(loops)}"
+            f"In {len(tunable)} of the {len(candidates)} experiments tried: there all three, tuned, follow the gyro "
+            f"better than an estimate of zero. These are {listed(tunable) if tunable else 'none'}. "
+            f"{_zero(loops)}{_worse(loops)}"
         ),
         otherwise="In none of the experiments tried do all three, tuned, follow the gyro better than zero does.",
         figures={
-            "held_out_by_fitted_error_largest": max(carried),
+            "held_out_by_fitted_error_largest": max(ratios),
             **{
-                each.together.words: {
-                    "fitted_error_rad_s": {n: level.fit_rms for n, level in each.together.levels.items()},
-                    "held_out_error_rad_s": {n: float(v.rms.mean()) for n, v in each.together.levels.items()},
-                    "table_2_error_rad_s": {n: float(v.given_rms.mean()) for n, v in each.together.levels.items()},
-                    "zero_estimate_error_rad_s": {n: level.zero_rms for n, level in each.together.levels.items()},
-                    "in_the_loop_table_2_by_tuned_error": dict(each.loop),
+                trial.together.words: {
+                    "fitted_error_rad_s": {n: level.fit_rms for n, level in trial.together.levels.items()},
+                    "held_out_error_rad_s": {n: float(v.rms.mean()) for n, v in trial.together.levels.items()},
+                    "table_2_error_rad_s": {n: float(v.given_rms.mean()) for n, v in trial.together.levels.items()},
+                    "zero_estimate_error_rad_s": {n: level.zero_rms for n, level in trial.together.levels.items()},
+                    "in_the_loop_table_2_by_tuned_error": dict(trial.loop),
                 }
-                for each in loops
+                for trial in loops
             },
         },
     )
 
 
-def _in_words(tried: Tried) -> str:
-    levels = tried.together.levels
-    tuned = ", ".join(f"{OBSERVERS[name]} {level.rms.mean():.4f}" for name, level in levels.items())
+def _in_words(trial: Tried) -> str:
+    levels = trial.together.levels
+    tuned_errors = ", ".join(f"{OBSERVERS[name]} {level.rms.mean():.4f}" for name, level in levels.items())
     zero = next(iter(levels.values())).zero_rms
     loop = ", ".join(
         f"{OBSERVERS[name]} {ratio.mean:.3f} ({ratio.low:.3f} to {ratio.high:.3f})"
-        for name, ratio in tried.loop.items()
+        for name, ratio in trial.loop.items()
     )
     return (
-        f"At {tried.together.words} the tuned are off the gyro by {tuned} rad/s RMS, an estimate of zero by "
+        f"At {trial.together.words} the tuned are off the gyro by {tuned_errors} rad/s RMS, an estimate of zero by "
         f"{zero:.4f}. In the loop under the same push and noise Table 2's error by that of the tuned is {loop}."
     )
 
@@ -114,16 +117,16 @@ def _in_words(tried: Tried) -> str:
 def _zero(loops: list[Tried]) -> str:
     """Where an estimate of zero does better than the tuned, of the experiments whose loop was closed."""
     return "".join(
-        f"At {each.together.words} zero is closer than {listed_and(each.beaten)} at their best, which know the "
+        f"At {trial.together.words} zero is closer than {listed_and(trial.beaten)} at their best, which know the "
         "command, but not the push. "
-        for each in loops
-        if each.beaten
+        for trial in loops
+        if trial.beaten
     )
 
 
 def _worse(loops: list[Tried]) -> str:
     """What a fit to the gyro is not."""
-    parts = [f"{listed_and(each.worse)} at {each.together.words}" for each in loops if each.worse]
+    parts = [f"{listed_and(trial.worse)} at {trial.together.words}" for trial in loops if trial.worse]
     if not parts:
         return "In the loop no tuned observer is worse than Table 2's."
     return f"It is no fit for the loop: there the tuned are worse than Table 2's for {'; '.join(parts)}."

@@ -139,15 +139,15 @@ def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Ran:
     torso = int(model.body("torso").id)
     for tick in range(round(duration_s / DT)):
         pushing = 0.2 <= tick * DT < 0.2 + PUSH_S - 1e-9
-        for axis, (at, law) in enumerate(zip(axes, laws, strict=True)):
-            pairs = zip(at.signs, at.gimbals, strict=True)
+        for axis, (places, law) in enumerate(zip(axes, laws, strict=True)):
+            pairs = zip(places.signs, places.gimbals, strict=True)
             x3 = sum(sign * float(data.qpos[gimbal] - math.pi / 2.0) for sign, gimbal in pairs) / 2.0
-            state = float(data.qpos[at.tilt]), float(data.qvel[at.tilt]), x3, integrators[axis]
+            state = float(data.qpos[places.tilt]), float(data.qvel[places.tilt]), x3, integrators[axis]
             u, integrators[axis] = law(*state)
-            for sign, servo in zip(at.signs, at.servos, strict=True):
+            for sign, servo in zip(places.signs, places.servos, strict=True):
                 data.ctrl[servo] = sign * u
-            data.qfrc_applied[at.tilt] = pushes_n_m[axis] if pushing else 0.0
-        tilts.append([float(data.qpos[at.tilt]) for at in axes])
+            data.qfrc_applied[places.tilt] = pushes_n_m[axis] if pushing else 0.0
+        tilts.append([float(data.qpos[places.tilt]) for places in axes])
         mujoco.mj_subtreeVel(model, data)
         momenta.append(float(_about_the_joint(data, torso)))
         mujoco.mj_step(model, data, steps)
@@ -183,51 +183,53 @@ class Coupling(NamedTuple):
 
 def coupling(push_n_m: float) -> Coupling:
     """Push both, then either."""
-    both = run((push_n_m, push_n_m))
+    joint_motion = run((push_n_m, push_n_m))
     pitch, roll = run((push_n_m, 0.0)).tilts, run((0.0, push_n_m)).tilts
-    return Coupling(both.tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(both.vertical).max()))
+    return Coupling(
+        joint_motion.tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(joint_motion.vertical).max())
+    )
 
 
-def axes_claim(found: dict[float, Coupling]) -> Claim:
+def axes_claim(couplings: dict[float, Coupling]) -> Claim:
     """Each axis alone."""
-    small = [push for push, c in found.items() if c.share < SMALL]
-    first = next(iter(found))
-    listed = ", ".join(f"{push:g} N m: {c.largest_deg:.1f} deg, {c.share:.2%}" for push, c in found.items())
+    separate_pushes = [push for push, c in couplings.items() if c.share < SMALL]
+    first = next(iter(couplings))
+    tilts_text = ", ".join(f"{push:g} N m: {c.largest_deg:.1f} deg, {c.share:.2%}" for push, c in couplings.items())
     return Claim(
         place="Section I, one axis at a time",
         says="With two scissored pairs at right angles each tilt axis of the robot can be stabilised by itself.",
         found=(
             "Four cubes on a body that tilts about two axes, each with a law of its own that knows only its own state. "
             "A push on both axes at once beside the same push on either alone: largest tilt, and how much of it the "
-            f"other axis changes. {listed}. The torque about the vertical is "
-            f"{', '.join(f'{c.vertical_n_m:.2f}' for c in found.values())} N m at most."
+            f"other axis changes. {tilts_text}. The torque about the vertical is "
+            f"{', '.join(f'{c.vertical_n_m:.2f}' for c in couplings.values())} N m at most."
         ),
-        holds=first in small,
+        holds=first in separate_pushes,
         conditions=(
-            f"Up to pushes of {max(small, default=0.0):g} N m for {PUSH_S:g} s, under which the other axis changes "
-            f"less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. What a pair "
+            f"Up to pushes of {max(separate_pushes, default=0.0):g} N m for {PUSH_S:g} s, under which the other axis "
+            f"changes less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. What a pair "
             "holds along its own axis makes a torque about the vertical as soon as the other axis moves; the ground "
             "must bear it."
         ),
         otherwise="The axes are felt in each other.",
         figures={
-            "push_n_m": list(found),
-            "largest_tilt_deg": [c.largest_deg for c in found.values()],
-            "vertical_torque_n_m": [c.vertical_n_m for c in found.values()],
-            "changed_by_the_other_axis_share": [c.share for c in found.values()],
+            "push_n_m": list(couplings),
+            "largest_tilt_deg": [c.largest_deg for c in couplings.values()],
+            "vertical_torque_n_m": [c.vertical_n_m for c in couplings.values()],
+            "changed_by_the_other_axis_share": [c.share for c in couplings.values()],
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(couplings)],
     )
 
 
-def _picture(found: dict[float, Coupling]) -> Picture:
+def _picture(couplings: dict[float, Coupling]) -> Picture:
     panels = []
-    push = max(found)
+    push = max(couplings)
     for axis, name in enumerate(AXES):
-        time = np.arange(len(found[push].both)) * DT
+        time = np.arange(len(couplings[push].both)) * DT
         lines = [
-            Line(time, np.degrees(found[push].alone[:, axis]), "pushed alone", color=0),
-            Line(time, np.degrees(found[push].both[:, axis]), "both pushed", "--", color=1),
+            Line(time, np.degrees(couplings[push].alone[:, axis]), "pushed alone", color=0),
+            Line(time, np.degrees(couplings[push].both[:, axis]), "both pushed", "--", color=1),
         ]
         panels.append(Panel(f"{name} [deg]", lines, shaded=[(0.2, 0.2 + PUSH_S)]))
     return Picture(
@@ -239,8 +241,8 @@ def _picture(found: dict[float, Coupling]) -> Picture:
 
 def claims(on_share: OnShare) -> list[Claim]:
     """The two axes."""
-    found = {}
+    couplings = {}
     for i, push in enumerate(PUSHES_N_M):
-        found[push] = coupling(push)
+        couplings[push] = coupling(push)
         on_share((i + 1) / len(PUSHES_N_M))
-    return [axes_claim(found)]
+    return [axes_claim(couplings)]

@@ -40,11 +40,11 @@ def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, floa
 
 def cost() -> Claim:
     """Instructions of an update of (10) beside those of (9) and (11) on the rig's processor; times on this one."""
-    one = update_times(None, turns=3, updates=200)
+    single_times = update_times(None, turns=3, updates=200)
     worlds = 4096
-    many = update_times(worlds, turns=1, updates=4)
-    ratios = {name: one[name] / one["linear"] for name in one}
-    arithmetic = {name: many[name] / many["linear"] for name in many}
+    batch_times = update_times(worlds, turns=1, updates=4)
+    ratios = {name: single_times[name] / single_times["linear"] for name in single_times}
+    arithmetic = {name: batch_times[name] / batch_times["linear"] for name in batch_times}
     board, counted_here = instructions()
     dearest = max(board[name] for name in ("ltv", *PLAIN))
     share = dearest / CLOCK_MHZ / (1e6 * DT)
@@ -71,7 +71,7 @@ def cost() -> Claim:
             "instructions": board,
             "instructions_counted_here": counted_here,
             "share_of_period": share,
-            "update_us": one,
+            "update_us": single_times,
             "update_by_linear": ratios,
             "update_by_linear_4096_worlds": arithmetic,
         },

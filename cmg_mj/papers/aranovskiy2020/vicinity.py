@@ -33,11 +33,11 @@ SEEN_RAD_S = 0.01
 def left_of_an_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, span_s: float = 3.0) -> float:
     """What is left of a wrong rate without bias, noise or motion, by its first size: largest of the last 0.5 s."""
     observer = make_observer("homogeneous", dt, printed_model(), alpha=alpha)
-    still = Measurement(0.0, 0.0)
-    state = observer.init(still)._replace(x1=0.05, x2=first_rad_s)
+    rest_measurement = Measurement(0.0, 0.0)
+    state = observer.init(rest_measurement)._replace(x1=0.05, x2=first_rad_s)
     errors = []
     for _ in range(round(span_s / dt)):
-        state, estimate = observer.step(state, still, 0.0)
+        state, estimate = observer.step(state, rest_measurement, 0.0)
         errors.append(abs(estimate.x2 / first_rad_s))
     return float(max(errors[-round(0.5 / dt) :]))
 
@@ -111,51 +111,53 @@ def vicinity(rng: np.random.Generator) -> Vicinity:
 def vicinity_claim(seed: int = SEED) -> Claim:
     """Convergence to a vicinity of the origin, and how large it is."""
     rng = np.random.default_rng(seed)
-    left, often = ({alpha: left_of_an_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
+    errors_left, errors_at_2000_hz = (
+        {alpha: left_of_an_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0)
+    )
     # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
-    converges = all(left[a] < VANISHED or often[a] < left[a] / 10.0 for a in ALPHAS)
-    found = vicinity(rng)
-    off, apart, slopes = found.relative_difference, found.difference, found.exponents
+    converges = all(errors_left[a] < VANISHED or errors_at_2000_hz[a] < errors_left[a] / 10.0 for a in ALPHAS)
+    measures = vicinity(rng)
+    relative_difference, difference, slopes = measures.relative_difference, measures.difference, measures.exponents
     gains = rng.normal(0.0, 100.0, (500, 2))
-    same = all(hurwitz(k1, k2) == hurwitz(k2, k1) for k1, k2 in gains)
+    is_equivalent = all(hurwitz(k1, k2) == hurwitz(k2, k1) for k1, k2 in gains)
     return Claim(
         place="After (11), the vicinity",
         says="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
         found=(
             "k1, k2 of Table 2, at rest. Without bias and noise a first error of 1 rad/s has fallen after 2.5 s, by "
-            f"alpha, to {_listed(left, '.0e')} rad/s at 200 Hz. At 2000 Hz it is {_listed(often, '.0e')}: near 1/2 "
-            "what is left is chatter between samples. With a bias e the rate rests off by "
-            "k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), for e from "
-            f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg: to {off:.0e} of it where that is above {SEEN_RAD_S:g} "
-            f"rad/s, else to {apart:.0e} rad/s. At 0.5 deg it is "
-            f"{_listed({a: values[2] for a, values in found.by_bias.items()}, '.4f')} rad/s. With noise in y1 and e = "
-            "0 its RMS rises with the noise to the power "
+            f"alpha, to {_listed(errors_left, '.0e')} rad/s at 200 Hz. At 2000 Hz it is "
+            f"{_listed(errors_at_2000_hz, '.0e')}: near 1/2 what is left is chatter between samples. With a bias e the "
+            "rate rests off by k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), for e from "
+            f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg: to {relative_difference:.0e} of it where that is above "
+            f"{SEEN_RAD_S:g} rad/s, else to {difference:.0e} rad/s. At 0.5 deg it is "
+            f"{_listed({a: values[2] for a, values in measures.by_bias.items()}, '.4f')} rad/s. With noise in y1 and e "
+            "= 0 its RMS rises with the noise to the power "
             f"{_listed(slopes, '.2f')}: the vicinity shrinks to the origin "
             f"with either. Of {len(gains)} random pairs of gains, of any sign, the two polynomials are Hurwitz "
-            f"together in {'all' if same else 'some'}."
+            f"together in {'all' if is_equivalent else 'some'}."
         ),
-        holds=converges and off < 0.01 and apart < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5,
+        holds=converges and relative_difference < 0.01 and difference < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5,
         conditions=(
             "With s^2 + k1 s + k2 Hurwitz; the printed s^2 + k2 s + k1 has k1 and k2 exchanged"
             + (
                 ", without consequence: either is Hurwitz just when both gains are positive."
-                if same
+                if is_equivalent
                 else ", and the two are not Hurwitz together."
             )
         ),
         otherwise="The error does not converge, or not to the vicinity foreseen.",
         figures={
-            "error_left_share": _by_name(left),
+            "error_left_share": _by_name(errors_left),
             "bias_deg": list(BIASES_DEG),
-            "rate_error_by_bias_rad_s": _by_name(found.by_bias),
-            "error_left_share_2000_hz": _by_name(often),
-            "closed_form_relative_difference": off,
-            "closed_form_difference_where_small_rad_s": apart,
+            "rate_error_by_bias_rad_s": _by_name(measures.by_bias),
+            "error_left_share_2000_hz": _by_name(errors_at_2000_hz),
+            "closed_form_relative_difference": relative_difference,
+            "closed_form_difference_where_small_rad_s": difference,
             "noise_rad": list(NOISES_RAD),
-            "rate_error_by_noise_rad_s": _by_name(found.by_noise),
+            "rate_error_by_noise_rad_s": _by_name(measures.by_noise),
             "exponent_of_noise": _by_name(slopes),
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(measures)],
     )
 
 
@@ -167,12 +169,12 @@ def _by_name(by_alpha: Mapping[float, Any]) -> dict[str, Any]:
     return {str(alpha): np.asarray(value).tolist() for alpha, value in by_alpha.items()}
 
 
-def _picture(found: Vicinity) -> Picture:
+def _picture(measures: Vicinity) -> Picture:
     biased, noisy = [], []
     for i, alpha in enumerate(SETTLING):
-        biased.append(Line(BIASES_DEG, found.by_bias[alpha], f"alpha = {alpha:g}", "o", color=i + 1))
-        biased.append(Line(BIASES_DEG, found.bound[alpha], color=i + 1, width=0.8))
-        noisy.append(Line(np.degrees(NOISES_RAD), found.by_noise[alpha], f"alpha = {alpha:g}", "o-", color=i + 1))
+        biased.append(Line(BIASES_DEG, measures.by_bias[alpha], f"alpha = {alpha:g}", "o", color=i + 1))
+        biased.append(Line(BIASES_DEG, measures.bound[alpha], color=i + 1, width=0.8))
+        noisy.append(Line(np.degrees(NOISES_RAD), measures.by_noise[alpha], f"alpha = {alpha:g}", "o-", color=i + 1))
     e, sigma = "equilibrium bias e [deg]", "standard deviation of y1's noise [deg]"
     return Picture(
         "aranovskiy2020-vicinity",

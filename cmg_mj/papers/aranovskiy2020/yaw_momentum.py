@@ -78,11 +78,11 @@ def foreseen_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajecto
     x3, turning = trajectory["x3_rad"], np.gradient(trajectory["x3_rad"], trajectory["time_s"], axis=0)
     h = parts.spin * abs(plant.modules[0].speed) * np.cos(tilt)
     if kind == "flywheel speed":
-        held = size * h * np.cos(x3)
+        momentum = size * h * np.cos(x3)
     elif kind == "gimbal offset":
         half = math.radians(size) / 2.0
-        held = h * (np.cos(x3 - half) - np.cos(x3 + half))
+        momentum = h * (np.cos(x3 - half) - np.cos(x3 + half))
     else:  # servo gain
         first = 2.0 * x3 / (2.0 + size)
-        held = h * (np.cos(first) - np.cos((1.0 + size) * first)) + parts.gimbal * size * turning * np.sin(tilt)
-    return (held[0] - held) / parts.yaw
+        momentum = h * (np.cos(first) - np.cos((1.0 + size) * first)) + parts.gimbal * size * turning * np.sin(tilt)
+    return (momentum[0] - momentum) / parts.yaw

@@ -27,9 +27,9 @@ def kalman_filter(model: ReducedModel, dt: float, sigma: float) -> tuple[np.ndar
     """
     Phi = expm(np.array([[0.0, 1.0], [model.gravity_torque / model.J1, 0.0]]) * dt)
     C, R = np.array([[1.0, 0.0]]), np.array([[sigma**2]])
-    predicted = solve_discrete_are(Phi.T, C.T, np.zeros((2, 2)), R)
-    gain = predicted @ C.T / (C @ predicted @ C.T + R)
-    return Phi, gain[:, 0], predicted - gain @ C @ predicted
+    prior = solve_discrete_are(Phi.T, C.T, np.zeros((2, 2)), R)
+    gain = prior @ C.T / (C @ prior @ C.T + R)
+    return Phi, gain[:, 0], prior - gain @ C @ prior
 
 
 def velocity_floor(model: ReducedModel, dt: float, sigma: float) -> float:

@@ -52,10 +52,10 @@ def league(
         motion = record_motion(noise_ug, min(worlds, 20), seed + 1)
         noise = f"sensors.accelerometer.noise_density_ug_rthz={noise_ug}"
         for j, kind in enumerate(kinds):
-            seen = character(kind, motion)
+            traits = character(kind, motion)
             open_loop = {
-                "push_lag_s": seen.lag_s,
-                "noise_gain_per_s": seen.noise_gain_per_s,
+                "push_lag_s": traits.lag_s,
+                "noise_gain_per_s": traits.noise_gain_per_s,
                 "update_us": update_us(kind, motion),
             }
             experiment = push_recovery(kind, seed, [noise, *settings])
@@ -71,12 +71,12 @@ def league(
 
 def _cell(result: Result, floor: float) -> dict[str, Any]:
     """What an observer does at one noise and bias."""
-    worlds, stood = len(result.stood), int(result.stood.sum())
-    share = binomtest(worlds - stood, worlds).proportion_ci(0.95)
+    worlds, n_stood = len(result.stood), int(result.stood.sum())
+    share = binomtest(worlds - n_stood, worlds).proportion_ci(0.95)
     cell: dict[str, Any] = {
         "worlds": worlds,
-        "stood": stood,
-        "fell_fraction": (worlds - stood) / worlds,
+        "stood": n_stood,
+        "fell_fraction": (worlds - n_stood) / worlds,
         "fell_fraction_low": float(share.low),
         "fell_fraction_high": float(share.high),
     }

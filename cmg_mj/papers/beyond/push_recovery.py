@@ -41,11 +41,11 @@ def on_rigs(experiment: Experiment, worlds: int, field: str, values: Sequence[fl
     Returns:
         A result a rig.
     """
-    each = [value for value in values for _ in range(worlds)]
+    values_by_world = [value for value in values for _ in range(worlds)]
     numbers = [*range(worlds)] * len(values)
-    return experiment.run_many(numbers, vary={field: each}, keep_trajectory=False).split(len(values))
+    return experiment.run_many(numbers, vary={field: values_by_world}, keep_trajectory=False).split(len(values))
 
 
-def gain(before: np.ndarray, after: np.ndarray) -> Interval | None:
+def gain(errors_before: np.ndarray, errors_after: np.ndarray) -> Interval | None:
     """By how much an error shrank, world by world, in those that stood both times; None if fewer than two did."""
-    return known_interval(before - after)
+    return known_interval(errors_before - errors_after)

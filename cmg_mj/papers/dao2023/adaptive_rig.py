@@ -95,11 +95,13 @@ def velocity_errors(
     Returns:
         Observer -> errors, (n_biases, worlds) [rad/s].
     """
-    each = np.repeat(biases_deg, worlds).tolist()
+    biases_by_world = np.repeat(biases_deg, worlds).tolist()
     runs = []
     for name in observers:
-        prepared = prepare(without_push(seed, f"observer.kind={name}"))
-        runs.append(BatchJob(prepared.with_varied({"equilibrium_bias_deg": each}), range(len(each))))
+        experiment = prepare(without_push(seed, f"observer.kind={name}"))
+        runs.append(
+            BatchJob(experiment.with_varied({"equilibrium_bias_deg": biases_by_world}), range(len(biases_by_world)))
+        )
     return {
         name: errors(result, "velocity_rms_error_rad_s").reshape(len(biases_deg), worlds)
         for name, result in zip(observers, run_side_by_side(runs, keep_trajectory=False), strict=True)
@@ -132,16 +134,18 @@ def learnt_gait(
         `disturbance_n_m` and `bias_deg` of what the first finds.
     """
     pushes = gait(amplitude_n_m, frequency_hz)
-    knowing, blind = (
+    with_frequency, without_frequency = (
         record(without_push(seed, "observer.kind=adaptive", f"observer.sinusoid_hz={hertz}", pushes=pushes), biases_deg)
         for hertz in (frequency_hz, 0.0)
     )
-    torque = amplitude_n_m * np.sin(2.0 * math.pi * frequency_hz * knowing["time_s"][:, None])
+    torque = amplitude_n_m * np.sin(2.0 * math.pi * frequency_hz * with_frequency["time_s"][:, None])
     return {
-        "knowing_rad_s": rms_in_time(knowing["estimate/adaptive/x2_rad_s"] - knowing["x2_rad_s"]),
-        "disturbance_n_m": rms_in_time(knowing["estimate/adaptive/disturbance_n_m"] - torque),
-        "bias_deg": np.degrees(rms_in_time(knowing["estimate/adaptive/bias_rad"] - np.radians(biases_deg))),
-        "not_knowing_rad_s": rms_in_time(blind["estimate/adaptive/x2_rad_s"] - blind["x2_rad_s"]),
+        "knowing_rad_s": rms_in_time(with_frequency["estimate/adaptive/x2_rad_s"] - with_frequency["x2_rad_s"]),
+        "disturbance_n_m": rms_in_time(with_frequency["estimate/adaptive/disturbance_n_m"] - torque),
+        "bias_deg": np.degrees(rms_in_time(with_frequency["estimate/adaptive/bias_rad"] - np.radians(biases_deg))),
+        "not_knowing_rad_s": rms_in_time(
+            without_frequency["estimate/adaptive/x2_rad_s"] - without_frequency["x2_rad_s"]
+        ),
     }
 
 
@@ -155,5 +159,5 @@ def learnt_torque(seed: int, worlds: int, torque_n_m: float = 0.1, bias_deg: flo
         f"observer.known_bias_deg={bias_deg}",
         pushes=[Push(start_s=0.0, duration_s=DURATION_S, torque_n_m=torque_n_m)],
     )
-    recorded = record(scenario, [bias_deg] * worlds)
-    return rms_in_time(recorded["estimate/adaptive/torque_n_m"] - torque_n_m)
+    trajectory = record(scenario, [bias_deg] * worlds)
+    return rms_in_time(trajectory["estimate/adaptive/torque_n_m"] - torque_n_m)

@@ -55,8 +55,8 @@ def explicit_escape(sigma: float, dt: float, duration: float, seed: int = 0) -> 
     q = motion(starts(seed, 1), t)[:, 0, 0]
 
     def slope(time: float, s: np.ndarray, y: float) -> np.ndarray:
-        here = paper.system(y, paper.torque(time))
-        parts = observer.slope(time, s[:2], s[2:6], s[6:].reshape(2, 4), here, np.zeros(1), np.array([y]))
+        system = paper.system(y, paper.torque(time))
+        parts = observer.slope(time, s[:2], s[2:6], s[6:].reshape(2, 4), system, np.zeros(1), np.array([y]))
         return np.concatenate([part.ravel() for part in parts])
 
     s = np.zeros(14)

@@ -221,8 +221,8 @@ class FriedlandTacker:
 
         half = h / 2.0 * (system.A + L @ system.C2)
         W = (system.B0 + L @ system.D20) @ Cm_middle
-        known = times(system.B2, u) - times(L, (y_before + y) / 2.0)
-        right_x = x + times(half, x) + h * (times(W, xm) + known)
+        input_terms = times(system.B2, u) - times(L, (y_before + y) / 2.0)
+        right_x = x + times(half, x) + h * (times(W, xm) + input_terms)
         right_T = T + half @ T + h * W
         x = solve(I_n - half, right_x)
         T = np.linalg.solve(I_n - half, right_T) @ F_back
@@ -252,9 +252,9 @@ class FriedlandTacker:
         require_shape("A", system.A, (n, n), "(n, n), n the rows of L")
         require_shape("C2", system.C2, (p, n), "(p, n), the shape of L transposed")
         poles = np.linalg.eigvals(system.A + self.L @ system.C2)
-        worst = poles.ravel()[np.argmax(poles.real)]
+        rightmost = poles.ravel()[np.argmax(poles.real)]
         if not is_hurwitz(poles):
-            raise InputError(f"L: A + L C2 must be Hurwitz; it has the eigenvalue {worst:.3g}")
+            raise InputError(f"L: A + L C2 must be Hurwitz; it has the eigenvalue {rightmost:.3g}")
 
     def slope(
         self, t: float, x: np.ndarray, xm: np.ndarray, T: np.ndarray, system: System, u: np.ndarray, y: np.ndarray
@@ -282,9 +282,9 @@ class FriedlandTacker:
         augmented_B = np.vstack([B2, np.zeros((nm, B2.shape[1]))])
         augmented_C = np.hstack([C2, D20 @ Cm])
         augmented_L = np.vstack([L + T @ Lm, Lm])
-        both = np.concatenate([x, xm])
-        both = augmented_A @ both + augmented_B @ u + augmented_L @ (augmented_C @ both - y)  # (7)
-        return both[:n], both[n:], (A + L @ C2) @ T - T @ Am + (B0 + L @ D20) @ Cm  # (8)
+        estimates = np.concatenate([x, xm])
+        estimates = augmented_A @ estimates + augmented_B @ u + augmented_L @ (augmented_C @ estimates - y)  # (7)
+        return estimates[:n], estimates[n:], (A + L @ C2) @ T - T @ Am + (B0 + L @ D20) @ Cm  # (8)
 
     def _check(
         self,

@@ -28,14 +28,14 @@ def separated_errors(on_share: OnShare) -> Claim:
         sizes.append(size)
         on_share(0.2 * (i + 1))
     errors["200_hz_sigma_1000"], size = sampled_deviation(1000.0, 0.005, 40.0)
-    worst = max(errors.values())
+    largest = max(errors.values())
     return Claim(
         place="Equations (7) to (9)",
         says="With T from (8), the error of the state parts from that of the exosystem.",
         found="z = (x^ - x) - T (xm^ - xm) obeys z' = (A + L C2) z whatever Gamma and Sigma, along a motion that is "
-        f"chaotic, to {worst:.0e} at worst. It does so in continuous time for 6 s (1.5 s at Sigma = 1000) and, sampled "
-        "at 200 Hz, for 40 s.",
-        holds=worst < 1e-8,
+        f"chaotic, to {largest:.0e} at worst. It does so in continuous time for 6 s (1.5 s at Sigma = 1000) and, "
+        "sampled at 200 Hz, for 40 s.",
+        holds=largest < 1e-8,
         figures={"identity_error": errors, "largest_z": max(*sizes, size)},
     )
 
@@ -59,8 +59,8 @@ def continuous_run(
     no_input = np.zeros(1)
 
     def slope(time: float, s: np.ndarray) -> np.ndarray:
-        here = paper.system(s[0], paper.torque(time))
-        parts = observer.slope(time, s[2:4], s[4:8], s[8:].reshape(2, 4), here, no_input, s[:1])
+        system = paper.system(s[0], paper.torque(time))
+        parts = observer.slope(time, s[2:4], s[4:8], s[8:].reshape(2, 4), system, no_input, s[:1])
         return np.concatenate([[s[1], paper.acceleration(s[0], time)], *(part.ravel() for part in parts)])
 
     begin = np.concatenate([start, state, np.zeros(8)])
@@ -82,10 +82,10 @@ def continuous_deviation(sigma: float, duration: float, seed: int = 0, tolerance
     """
     rng = np.random.default_rng(seed)
     t = np.linspace(0.0, duration, 21)
-    x, guessed, xm, T = continuous_run(sigma, starts(seed, 1)[0], rng.normal(0.0, 1.0, 6), t, tolerance)
-    z = guessed - x - np.einsum("kij,kj->ki", T, xm - paper.exosystem_state(t))
-    expected = np.array([expm(paper.error_matrix() * time) @ z[0] for time in t])
-    return float(np.abs(z - expected).max()), float(np.abs(z).max())
+    x, x_hat, xm, T = continuous_run(sigma, starts(seed, 1)[0], rng.normal(0.0, 1.0, 6), t, tolerance)
+    z = x_hat - x - np.einsum("kij,kj->ki", T, xm - paper.exosystem_state(t))
+    exact_z = np.array([expm(paper.error_matrix() * time) @ z[0] for time in t])
+    return float(np.abs(z - exact_z).max()), float(np.abs(z).max())
 
 
 def sampled_deviation(sigma: float, dt: float, duration: float, seed: int = 0) -> tuple[float, float]:
@@ -108,23 +108,23 @@ def sampled_deviation(sigma: float, dt: float, duration: float, seed: int = 0) -
     onward = np.linalg.solve(np.eye(2) - half, np.eye(2) + half)
     xm = paper.exosystem_state(0.0)
     z = state.x - [q, rate] - state.T @ (state.xm - xm)
-    worst, size = 0.0, float(np.abs(z).max())
+    largest, size = 0.0, float(np.abs(z).max())
     for k in range(round(duration / dt)):
         u = float(paper.torque((k + 0.5) * dt))
-        pushed = paper.THETA[1] * u + float((paper.C_M @ (xm + F @ xm))[2]) / 2.0
-        q_next, rate_next = _midpoint_step(q, rate, pushed, dt)
+        input_acceleration = paper.THETA[1] * u + float((paper.C_M @ (xm + F @ xm))[2]) / 2.0
+        q_next, rate_next = _midpoint_step(q, rate, input_acceleration, dt)
         state = observer.step(state, paper.system((q + q_next) / 2.0, u), np.zeros(1), np.array([q_next]))
         q, rate, xm = q_next, rate_next, F @ xm
         z = onward @ z
-        worst = max(worst, float(np.abs(state.x - [q, rate] - state.T @ (state.xm - xm) - z).max()))
-    return worst, size
+        largest = max(largest, float(np.abs(state.x - [q, rate] - state.T @ (state.xm - xm) - z).max()))
+    return largest, size
 
 
-def _midpoint_step(q: float, rate: float, pushed: float, dt: float) -> tuple[float, float]:
+def _midpoint_step(q: float, rate: float, input_acceleration: float, dt: float) -> tuple[float, float]:
     """The arm after one step of the implicit midpoint rule, its input's share of the acceleration held."""
     q_next, rate_next = q, rate
     for _ in range(12):  # a contraction by dt^2 theta1/4 each time
-        rate_next = rate + dt * (pushed - paper.THETA[0] * math.sin((q + q_next) / 2.0))
+        rate_next = rate + dt * (input_acceleration - paper.THETA[0] * math.sin((q + q_next) / 2.0))
         q_next = q + dt * (rate + rate_next) / 2.0
     return q_next, rate_next
 
@@ -132,7 +132,7 @@ def _midpoint_step(q: float, rate: float, pushed: float, dt: float) -> tuple[flo
 def upsilon() -> Claim:
     """The relation between Upsilon and T."""
     matrix_gap, estimate_gap = upsilon_gaps(10.0, 0.005, 15.0)
-    corrected = (
+    correction = (
         "Upsilon's equation must have (B0 + L D20) Cm exp(Am t), not (B0 + L D20), unless Am = 0. So read, the "
         "proposed observer is the conventional one of the constant xm(0): its estimate of x is the same."
     )
@@ -142,8 +142,8 @@ def upsilon() -> Claim:
         found=f"To {matrix_gap:.0e} over 15 s at 200 Hz; the estimates of x of both observers agree to "
         f"{estimate_gap:.0e}.",
         holds=matrix_gap < 1e-9 and estimate_gap < 1e-9,
-        conditions=corrected,
-        otherwise=corrected,
+        conditions=correction,
+        otherwise=correction,
         figures={"upsilon_gap": matrix_gap, "state_gap": estimate_gap},
     )
 
@@ -162,15 +162,15 @@ def upsilon_gaps(sigma: float, dt: float, duration: float, seed: int = 0) -> tup
     """
     t = dt * np.arange(round(duration / dt) + 1)
     y = motion(starts(seed, 1), t)[:, 0, :1]
-    ours = one(dt, sigma)
-    plain = FriedlandTacker.conventional(dt, paper.L, paper.GAMMA, ours.Sigma)
-    a, b = ours.init(y[0]), plain.init(y[0])
+    proposed = one(dt, sigma)
+    plain = FriedlandTacker.conventional(dt, paper.L, paper.GAMMA, proposed.Sigma)
+    a, b = proposed.init(y[0]), plain.init(y[0])
     mean = paper.C_M @ (expm(paper.A_M * dt) + np.eye(4)) / 2.0
-    worst = [0.0, 0.0]
+    largest = [0.0, 0.0]
     for k in range(1, len(t)):
-        here = paper.system((y[k - 1, 0] + y[k, 0]) / 2.0, paper.torque(t[k] - dt / 2.0))
-        turned = replace(here, B0=here.B0 @ mean @ expm(paper.A_M * t[k - 1]), D20=np.zeros((1, 4)))
-        a, b = ours.step(a, here, np.zeros(1), y[k]), plain.step(b, turned, np.zeros(1), y[k])
+        system = paper.system((y[k - 1, 0] + y[k, 0]) / 2.0, paper.torque(t[k] - dt / 2.0))
+        turned_system = replace(system, B0=system.B0 @ mean @ expm(paper.A_M * t[k - 1]), D20=np.zeros((1, 4)))
+        a, b = proposed.step(a, system, np.zeros(1), y[k]), plain.step(b, turned_system, np.zeros(1), y[k])
         gaps = np.abs(b.T - a.T @ expm(paper.A_M * t[k])).max(), np.abs(a.x - b.x).max()
-        worst = [max(old, float(new)) for old, new in zip(worst, gaps, strict=True)]
-    return worst[0], worst[1]
+        largest = [max(old, float(new)) for old, new in zip(largest, gaps, strict=True)]
+    return largest[0], largest[1]

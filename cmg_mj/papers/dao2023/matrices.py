@@ -33,8 +33,8 @@ def real_matrix(name: str, value: Any) -> np.ndarray:
     """The same with at least two dimensions, and finite."""
     matrix = real(name, value)
     if matrix.ndim < 2 or not np.isfinite(matrix).all():
-        what = f"not of shape {matrix.shape}" if matrix.ndim else f"not a scalar; for one number write [[{matrix:g}]]"
-        raise InputError(f"{name}: must be a matrix of finite numbers, {what}")
+        fault = f"not of shape {matrix.shape}" if matrix.ndim else f"not a scalar; for one number write [[{matrix:g}]]"
+        raise InputError(f"{name}: must be a matrix of finite numbers, {fault}")
     return matrix
 
 

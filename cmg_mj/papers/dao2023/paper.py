@@ -78,5 +78,5 @@ def system(q: np.ndarray | float, u: np.ndarray | float, *, with_disturbance: bo
 
 def error_matrix() -> np.ndarray:
     """A + L C2, (2, 2)."""
-    here = system(0.0, 0.0)
-    return here.A + L @ here.C2
+    matrices = system(0.0, 0.0)
+    return matrices.A + L @ matrices.C2

@@ -100,8 +100,8 @@ def follow(
     exogenous = np.zeros((len(t), n_sigmas, x.shape[1], r))
     state_errors[0], exogenous[0] = -x[0], -truth[0, :r]
     for k in range(1, len(t)):
-        here = System(all_times.A, all_times.B0[k - 1], all_times.B2, all_times.C2, all_times.D20)
-        state = observer.step(state, here, inputs[k - 1 : k], y[k])
+        system = System(all_times.A, all_times.B0[k - 1], all_times.B2, all_times.C2, all_times.D20)
+        state = observer.step(state, system, inputs[k - 1 : k], y[k])
         state_errors[k] = state.x - x[k]
         exogenous[k] = state.xm @ observer.Cm.T - truth[k, :r]
         if k % 1000 == 0:
@@ -120,7 +120,7 @@ def settle_times(size: np.ndarray, t: np.ndarray, band: float) -> np.ndarray:
     Returns:
         The times, (...) [s].
     """
-    outside = size > band
-    after_last = len(t) - np.argmax(outside[::-1], axis=0)  # the sample after the last one outside
-    found = np.append(t, np.inf)[after_last]
-    return np.where(outside.any(axis=0), found, t[0])
+    is_outside = size > band
+    index = len(t) - np.argmax(is_outside[::-1], axis=0)  # the sample after the last one outside
+    times = np.append(t, np.inf)[index]
+    return np.where(is_outside.any(axis=0), times, t[0])

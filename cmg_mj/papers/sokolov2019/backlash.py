@@ -49,14 +49,14 @@ def released(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Ex
     Returns:
         The experiment.
     """
-    changed = [f"observer.{name}={value}" for name, value in parameters.items()]
+    observer_settings = [f"observer.{name}={value}" for name, value in parameters.items()]
     gap = f"plant.gimbal_backlash_arcmin={arcmin}"
-    return experiment([*RELEASE, f"duration_s={RELEASE_S}", gap, *changed], observer)
+    return experiment([*RELEASE, f"duration_s={RELEASE_S}", gap, *observer_settings], observer)
 
 
 def cycles_of(releases: Sequence[Experiment]) -> list[Cycle]:
     """The cycles that rigs let go end in, one world each."""
-    return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(each, 1) for each in releases])]
+    return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(release, 1) for release in releases])]
 
 
 def _cycle(trajectory: Trajectory) -> Cycle:

@@ -106,28 +106,29 @@ def y2_reaches_the_rate(prepared: Experiment, seed: int = 0) -> float:
 
 def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
     """Fig. 3."""
-    others = {name: relative[name] for name in OBSERVERS if name != "luenberger"}
+    other_errors = {name: relative[name] for name in OBSERVERS if name != "luenberger"}
     at_end = int(np.argmin(np.abs(tuning.trajectory["time_s"] - tuning.push.end_s)))
     ends = {name: mean_interval(rates[at_end]) for name, rates in tuning.rates.items()}
     truth = mean_interval(tuning.trajectory["fog_rad_s"][at_end])
     wrong_sign = ends["luenberger"].mean * truth.mean < 0.0
     worlds = tuning.rates["luenberger"].shape[1]
-    listed = ", ".join(f"{equation} {plus_minus(relative[name], 2)}" for name, equation in OBSERVERS.items())
-    shown = ", ".join(f"{equation} {ends[name].mean:+.2f}" for name, equation in OBSERVERS.items())
-    also = " and ".join(OBSERVERS[name] for name, error in others.items() if error.low > 1.0)
+    errors_text = ", ".join(f"{equation} {plus_minus(relative[name], 2)}" for name, equation in OBSERVERS.items())
+    rates_text = ", ".join(f"{equation} {ends[name].mean:+.2f}" for name, equation in OBSERVERS.items())
+    other_failures = " and ".join(OBSERVERS[name] for name, error in other_errors.items() if error.low > 1.0)
     return Claim(
         place="Fig. 3",
         says="At the push, (9) fails completely to estimate x2.",
         found=(
             f"The law fed by the gyro, {tuning.push.torque_n_m:g} N m for {tuning.push.duration_s:g} s, {worlds} seeds "
             f"with 95 % intervals. From the push to half a second after it, RMS of estimate less gyro by the gyro's "
-            f"own RMS (an estimate of zero has 1): {listed}. When the push ends the gyro shows {truth.mean:+.2f} "
-            f"rad/s, {shown}{': (9) has the wrong sign' if wrong_sign else ''}."
+            f"own RMS (an estimate of zero has 1): {errors_text}. When the push ends the gyro shows {truth.mean:+.2f} "
+            f"rad/s, {rates_text}{': (9) has the wrong sign' if wrong_sign else ''}."
         ),
-        holds=relative["luenberger"].low > max(1.0, *(error.high for error in others.values())),
+        holds=relative["luenberger"].low > max(1.0, *(error.high for error in other_errors.values())),
         conditions=(
-            f"{also} fails there too, if less: so does every estimator that takes the command's effect for motion."
-            if also
+            f"{other_failures} fails there too, if less: so does every estimator that takes the command's effect for "
+            "motion."
+            if other_failures
             else ""
         ),
         otherwise="Its error is no larger than that of an estimate of zero, or than the others'.",
@@ -144,18 +145,18 @@ def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
 def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
     """What Section V says is the reason."""
     reach = y2_reaches_the_rate(tuning.prepared)
-    error, with_y2, without = tuning.error_of_9, relative[WITH_Y2], relative["luenberger"]
-    before = error[tuning.trajectory["time_s"] < tuning.push.start_s][-20:].mean()
-    explained = 1.0 - np.var((error - predicted_error(tuning))[tuning.window]) / np.var(error[tuning.window])
+    error, with_y2, without_y2 = tuning.error_of_9, relative[WITH_Y2], relative["luenberger"]
+    bias_error = error[tuning.trajectory["time_s"] < tuning.push.start_s][-20:].mean()
+    explained_share = 1.0 - np.var((error - predicted_error(tuning))[tuning.window]) / np.var(error[tuning.window])
     return Claim(
         place="Section V, (9) and y2",
         says="(9) ignores y2 completely, and thus is not robust against external disturbances.",
         found=(
             f"y2 does not reach its rate: noise of 1 rad on y2 changes it by {reach:.0e} rad/s. But with every "
             f"term in y2 put back in its relative error at the push is {with_y2.mean:.2f} instead of "
-            f"{without.mean:.2f}. What (9) lacks is the push: d/J1 through (s + 20)/(s^2 + 20 s + "
-            f"{stiffness(tuning.prepared.plant.reduced):.1f}) explains {explained:.0%} of its error's variance there "
-            f"(and the bias e the {before:+.3f} rad/s before)."
+            f"{without_y2.mean:.2f}. What (9) lacks is the push: d/J1 through (s + 20)/(s^2 + 20 s + "
+            f"{stiffness(tuning.prepared.plant.reduced):.1f}) explains {explained_share:.0%} of its error's variance "
+            f"there (and the bias e the {bias_error:+.3f} rad/s before)."
         ),
         holds=reach == 0.0 and with_y2.high < 1.0,
         otherwise=(
@@ -166,24 +167,26 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
         figures={
             "effect_of_y2_rad_s": reach,
             "relative_error_with_y2": list(with_y2),
-            "relative_error_without_y2": list(without),
-            "gain_by_y2": without.mean - with_y2.mean,
-            "variance_explained_by_the_unknown_push": float(explained),
+            "relative_error_without_y2": list(without_y2),
+            "gain_by_y2": without_y2.mean - with_y2.mean,
+            "variance_explained_by_the_unknown_push": float(explained_share),
         },
     )
 
 
 def _picture(tuning: Tuning) -> Picture:
-    one = tuning.trajectory.world(0).between(0.0, 3.0)
-    t, shaded, push = one["time_s"], pushed(one), tuning.push
+    example = tuning.trajectory.world(0).between(0.0, 3.0)
+    t, shaded, push = example["time_s"], pushed(example), tuning.push
     panels = [
-        Panel("tilt y1 [deg]", [Line(t, np.degrees(one["y1_rad"]), "y1", color=7, width=0.8)], "(a)", shaded=shaded),
-        Panel("command u [rad/s]", [Line(t, one["u_rad_s"], "u", color=3, width=0.8)], shaded=shaded),
+        Panel(
+            "tilt y1 [deg]", [Line(t, np.degrees(example["y1_rad"]), "y1", color=7, width=0.8)], "(a)", shaded=shaded
+        ),
+        Panel("command u [rad/s]", [Line(t, example["u_rad_s"], "u", color=3, width=0.8)], shaded=shaded),
     ]
     for i, (name, equation) in enumerate(OBSERVERS.items()):
         lines = [
             Line(t, tuning.rates[name][: len(t), 0], f"{equation} {name}", color=name, width=0.8),
-            Line(t, one["fog_rad_s"], "gyro", "k-", width=1.0),
+            Line(t, example["fog_rad_s"], "gyro", "k-", width=1.0),
         ]
         panels.append(Panel("tilt rate [rad/s]", lines, "(b)" if i == 0 else "", shaded=shaded, y_range=(-1.0, 0.6)))
     title = (

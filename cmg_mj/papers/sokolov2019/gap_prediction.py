@@ -47,8 +47,8 @@ def foreseen_cycle(observer: str, points: int = 60) -> Foreseen | None:
         """The least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
         factors, shapes = np.linalg.eig(loop(servo, share=share_of(c)))
         forward = np.angle(factors) > dt
-        best = int(np.argmax(np.where(forward, np.abs(factors), 0.0)))
-        return complex(factors[best]), shapes[:, best]
+        index = int(np.argmax(np.where(forward, np.abs(factors), 0.0)))
+        return complex(factors[index]), shapes[:, index]
 
     def growth(c: float) -> float:
         return math.log(abs(turning(c)[0])) / dt

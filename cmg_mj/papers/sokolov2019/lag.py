@@ -89,8 +89,8 @@ def predicted(observer: str | None) -> Predicted:
     """What the linearised loop does with a linear observer, or with the true rate (None)."""
     loop, servo, dt = linearised(observer)
 
-    def growth(varied: Servo, age_steps: int = 0) -> float:
-        return float(modes(loop(varied, age_steps), dt)[0].real)
+    def growth(changed_servo: Servo, age_steps: int = 0) -> float:
+        return float(modes(loop(changed_servo, age_steps), dt)[0].real)
 
     latencies = range(LARGEST_LATENCY_STEPS + 1) if observer else ()
     return Predicted(
@@ -126,14 +126,14 @@ class Lags(NamedTuple):
 
 def lags(on_share: OnShare) -> Lags:
     """Sweep, sharpen, and predict."""
-    swept = sweeps(list(OBSERVERS))
-    thresholds = lag_thresholds(swept)
+    lag_sweeps = sweeps(list(OBSERVERS))
+    thresholds = lag_thresholds(lag_sweeps)
     latencies: dict[str, Threshold] = {}
     for i, name in enumerate(OBSERVERS):
         latencies[name] = latency_threshold(name)
         on_share((i + 1) / 4.0)
     predictions = {name: predicted(name) for name in ("linear", "luenberger")} | {"truth": predicted(None)}
-    return Lags(swept, thresholds, latencies, predictions, largest_tau(), float(swept["linear"].lags_s[0]))
+    return Lags(lag_sweeps, thresholds, latencies, predictions, largest_tau(), float(lag_sweeps["linear"].lags_s[0]))
 
 
 def in_ms(seconds: float | None, otherwise: str = "none") -> str:
@@ -141,35 +141,38 @@ def in_ms(seconds: float | None, otherwise: str = "none") -> str:
     return otherwise if seconds is None else f"{1e3 * seconds:.1f} ms"
 
 
-def claim(found: Lags) -> Claim:
+def claim(results: Lags) -> Claim:
     """Section V: the differentiator's lag."""
-    own, lag, latency = found.own_lag_s, found.thresholds, found.latencies
-    linear = found.predictions["linear"]
-    begins, others = lag["linear"], min(lag[name].low for name in ("luenberger", "homogeneous"))
+    own_lag, lag_thresholds, latencies = results.own_lag_s, results.thresholds, results.latencies
+    linear = results.predictions["linear"]
+    linear_threshold, other_lags = (
+        lag_thresholds["linear"],
+        min(lag_thresholds[name].low for name in ("luenberger", "homogeneous")),
+    )
     return Claim(
         place="Section V, the lag",
         says="Finite differences lag, and the lag brings the loop into sustained oscillations.",
         found=(
             "Let go without noise, the rig oscillates by itself from the lags and latencies of the table on. With the "
-            f"model's servo, {in_ms(own)}, the loop of (8) has poles {linear.pole.real:.1f} +- {linear.pole.imag:.1f}j "
-            f"1/s, a damping ratio of {linear.damping:.2f} at {linear.frequency_hz:.1f} Hz. From tau = "
-            f"{in_ms(found.tau)} on it would oscillate as it is. A servo that lags because it is soft never makes it "
-            f"oscillate ({in_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the flywheel then "
-            "turns the gimbal back, which damps the tilt."
+            f"model's servo, {in_ms(own_lag)}, the loop of (8) has poles {linear.pole.real:.1f} +- "
+            f"{linear.pole.imag:.1f}j 1/s, a damping ratio of {linear.damping:.2f} at {linear.frequency_hz:.1f} Hz. "
+            f"From tau = {in_ms(results.tau)} on it would oscillate as it is. A servo that lags because it is soft "
+            f"never makes it oscillate ({in_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the "
+            "flywheel then turns the gimbal back, which damps the tilt."
         ),
-        table=_table(found),
-        holds=begins.high is not None and begins.high < others,
+        table=_table(results),
+        holds=linear_threshold.high is not None and linear_threshold.high < other_lags,
         conditions=(
-            f"It does with a servo lag from {in_ms(begins.middle)} or a latency of y1 from "
-            f"{in_ms(latency['linear'].high)}; at the model's servo lag of {in_ms(own)} the oscillation decays."
-            if begins.middle is not None and begins.middle > own
+            f"It does with a servo lag from {in_ms(linear_threshold.middle)} or a latency of y1 from "
+            f"{in_ms(latencies['linear'].high)}; at the model's servo lag of {in_ms(own_lag)} the oscillation decays."
+            if linear_threshold.middle is not None and linear_threshold.middle > own_lag
             else ""
         ),
         otherwise="The loop of (8) is not the first to oscillate.",
         figures={
-            "servo_lag_of_the_model_s": own,
-            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in lag.items()},
-            "latency_threshold_s": {name: list(threshold) for name, threshold in latency.items()},
+            "servo_lag_of_the_model_s": own_lag,
+            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in lag_thresholds.items()},
+            "latency_threshold_s": {name: list(threshold) for name, threshold in latencies.items()},
             "predicted": {
                 name: {
                     "servo_lag_s": p.servo_lag_s,
@@ -178,25 +181,29 @@ def claim(found: Lags) -> Claim:
                     "pole_1_s": [p.pole.real, p.pole.imag],
                     "damping_ratio": p.damping,
                 }
-                for name, p in found.predictions.items()
+                for name, p in results.predictions.items()
             },
-            "tau_threshold_s": found.tau,
+            "tau_threshold_s": results.tau,
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(results)],
     )
 
 
-def _table(found: Lags) -> str:
+def _table(results: Lags) -> str:
     rows = []
     for name, equation in (OBSERVERS | {"truth": "true rate in the law"}).items():
-        lag, latency, of = found.thresholds.get(name), found.latencies.get(name), found.predictions.get(name)
+        lag, latency, prediction = (
+            results.thresholds.get(name),
+            results.latencies.get(name),
+            results.predictions.get(name),
+        )
         rows.append(
             (
                 equation,
                 "-" if lag is None else in_ms(lag.middle, f"none up to {1e3 * LAGS_S[-1]:.0f} ms"),
-                "-" if of is None else in_ms(of.servo_lag_s),
+                "-" if prediction is None else in_ms(prediction.servo_lag_s),
                 "-" if latency is None else in_ms(latency.high, f"none up to {LARGEST_LATENCY_STEPS} ms"),
-                "-" if of is None or name == "truth" else in_ms(of.latency_s),
+                "-" if prediction is None or name == "truth" else in_ms(prediction.latency_s),
             )
         )
     headings = ("", "servo lag, MuJoCo", "by eigenvalues", "latency of y1, MuJoCo", "by eigenvalues")
@@ -209,7 +216,7 @@ def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
     return [oscillation(loop(servo.damped(float(lag))), dt).real for lag in lags_s]
 
 
-def _picture(found: Lags) -> Picture:
+def _picture(results: Lags) -> Picture:
     grid = np.linspace(5e-3, 0.07, 66)
     rates = [
         Line(1e3 * grid, _growth(name, grid), f"{OBSERVERS[name]} {name}", color=name)
@@ -218,7 +225,7 @@ def _picture(found: Lags) -> Picture:
     rates.append(Line([5.0, 70.0], [0.0, 0.0], style="k:", width=0.8))
     tilts = [
         Line(1e3 * s.lags_s, s.amplitude_deg, f"{OBSERVERS[name]} {name}", "os^"[i] + "-", color=name)
-        for i, (name, s) in enumerate(found.sweeps.items())
+        for i, (name, s) in enumerate(results.sweeps.items())
     ]
     panels = [
         Panel("growth of the tilt's\noscillation [1/s]", rates, "linearised and sampled", x_label="servo lag [ms]"),

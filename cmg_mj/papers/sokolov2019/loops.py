@@ -44,8 +44,8 @@ class Loops(NamedTuple):
     @property
     def everywhere(self) -> dict[str, Mapping[str, Result]]:
         """All but the gyro's: where, in words -> observer -> runs."""
-        by: dict[str, Mapping[str, Result]] = {f"e = {e:g} deg": by_name for e, by_name in self.by_bias.items()}
-        return by | {BEHIND_A_GAP: self.gap}
+        by_setting: dict[str, Mapping[str, Result]] = {f"e = {e:g} deg": by_name for e, by_name in self.by_bias.items()}
+        return by_setting | {BEHIND_A_GAP: self.gap}
 
 
 def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s: float = DURATION_S) -> Loops:
@@ -56,12 +56,14 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
     quiet: dict[str, Result] = {}
     cases = len(BIASES_DEG) + 1
     gaps = np.repeat([*[0.0] * len(BIASES_DEG), GAP_ARCMIN], worlds)
-    varied = {"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds), "gimbal_backlash_arcmin": gaps}
-    runs = [BatchJob(experiment(settings, name).with_varied(varied), [*range(worlds)] * cases) for name in OBSERVERS]
+    variations = {"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds), "gimbal_backlash_arcmin": gaps}
+    runs = [
+        BatchJob(experiment(settings, name).with_varied(variations), [*range(worlds)] * cases) for name in OBSERVERS
+    ]
     for name, result in zip(OBSERVERS, run_side_by_side(runs), strict=True):
-        *own, gap[name] = result.split(cases)
-        for e, found in zip(BIASES_DEG, own, strict=True):
-            by_bias[e][name] = found
+        *no_gap, gap[name] = result.split(cases)
+        for e, bias_result in zip(BIASES_DEG, no_gap, strict=True):
+            by_bias[e][name] = bias_result
     on_share(0.8)
     for name in OBSERVERS:
         quiet[name] = experiment([*settings, *NO_NOISE], name).run()

@@ -13,30 +13,30 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 NUMBERS = {"linear": 4, "luenberger": 5, "homogeneous": 6}
 
 
-def picture(name: str, found: Loops) -> Picture:
+def picture(name: str, loops: Loops) -> Picture:
     """World 0 without backlash and with it, side by side."""
     runs = {
-        "without backlash": found.by_bias[SHOWN_DEG][name],
-        f"{GAP_ARCMIN:g} arcmin of backlash": found.gap[name],
+        "without backlash": loops.by_bias[SHOWN_DEG][name],
+        f"{GAP_ARCMIN:g} arcmin of backlash": loops.gap[name],
     }
     rows: list[list[Panel]] = [[], [], []]
     for title, result in runs.items():
-        one = trajectory_of(result).world(0)
-        t, shaded = one["time_s"], pushed(one)
+        example = trajectory_of(result).world(0)
+        t, shaded = example["time_s"], pushed(example)
         tilt = [
-            Line(t, np.degrees(one["y1_rad"]), "measured y1", color=7, width=0.5),
-            Line(t, np.degrees(one["x1_rad"]), "true x1", color=0),
+            Line(t, np.degrees(example["y1_rad"]), "measured y1", color=7, width=0.5),
+            Line(t, np.degrees(example["x1_rad"]), "true x1", color=0),
         ]
         rates = [
-            Line(t, one[f"estimate/{name}/x2_rad_s"], f"estimate of {OBSERVERS[name]}", color=1, width=0.6),
-            Line(t, one["x2_rad_s"], "true x2", color=0),
+            Line(t, example[f"estimate/{name}/x2_rad_s"], f"estimate of {OBSERVERS[name]}", color=1, width=0.6),
+            Line(t, example["x2_rad_s"], "true x2", color=0),
         ]
         rows[0].append(Panel("tilt [deg]", tilt, title, shaded=shaded))
         rows[1].append(Panel("tilt rate [rad/s]", rates, shaded=shaded))
         rows[2].append(
             Panel(
                 "command u [rad/s]",
-                [Line(t, one["u_rad_s"], "u", color=3, width=0.6)],
+                [Line(t, example["u_rad_s"], "u", color=3, width=0.6)],
                 shaded=shaded,
             )
         )

@@ -40,14 +40,14 @@ def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feed
     Returns:
         The experiment, ready to run.
     """
-    printed = {"controller.gains": K_E} | {f"observer.{key}": value for key, value in TABLE_II[observer].items()}
-    fields = [f"{key}={json.dumps(value)}" for key, value in printed.items()]
+    table_settings = {"controller.gains": K_E} | {f"observer.{key}": value for key, value in TABLE_II[observer].items()}
+    fields = [f"{key}={json.dumps(value)}" for key, value in table_settings.items()]
     return prepare(load_scenario("single_gimbal", [*fields, f"controller.feedback={feedback}", *settings], observer))
 
 
-def estimator(name: str, prepared: Experiment, **changed: Any) -> Observer:
+def estimator(name: str, prepared: Experiment, **changes: Any) -> Observer:
     """An observer with Table II's parameters or others, for the rig and control period of an experiment."""
-    return make_observer(name, prepared.law.dt, prepared.plant.reduced, **TABLE_II[name] | changed)
+    return make_observer(name, prepared.law.dt, prepared.plant.reduced, **TABLE_II[name] | changes)
 
 
 def servo_of(plant: Plant) -> Servo:
@@ -68,8 +68,8 @@ def rig_with(settings: PlantSettings, servo: Servo) -> Plant:
     Raises:
         ValueError: The servo is too stiffly damped for RK4 at this timestep: it would chatter by itself.
     """
-    of_its_own = {"servo_stiffness_n_m_rad": servo.kp, "servo_damping_n_m_s_rad": servo.kv}
-    plant = load_plant(dataclasses.replace(settings, **of_its_own))
+    servo_settings = {"servo_stiffness_n_m_rad": servo.kp, "servo_damping_n_m_s_rad": servo.kv}
+    plant = load_plant(dataclasses.replace(settings, **servo_settings))
     decay = servo.kv * plant.timestep / servo.inertia
     if decay > RK4_LIMIT:
         raise ValueError(

@@ -103,17 +103,17 @@ def period_map(
     parts = np.cumsum([5, age_steps, n_observer])
 
     def period(v: np.ndarray) -> np.ndarray:
-        rig, seen, inside, (x_e, u) = np.split(v, parts)
-        y1, y2 = (seen[-1] if age_steps else rig[0]), rig[2]
+        rig, pending_tilts, observer_state, (x_e, u) = np.split(v, parts)
+        y1, y2 = (pending_tilts[-1] if age_steps else rig[0]), rig[2]
         x2 = rig[1]
         if observer:
-            state, estimate = observer.step(state_type(*inside), Measurement(y1, y2), u)
-            inside, x2 = np.array(state), estimate.x2
+            state, estimate = observer.step(state_type(*observer_state), Measurement(y1, y2), u)
+            observer_state, x2 = np.array(state), estimate.x2
         u, x_e = law(y1, x2, y2, x_e)
         for _ in range(steps):
-            seen = np.concatenate([rig[:1], seen])[:age_steps]
+            pending_tilts = np.concatenate([rig[:1], pending_tilts])[:age_steps]
             rig = Phi @ rig + gamma * (share * u)
-        return np.concatenate([rig, seen, inside, [x_e, u]])
+        return np.concatenate([rig, pending_tilts, observer_state, [x_e, u]])
 
     return np.column_stack([period(unit) for unit in np.eye(parts[-1] + 2)])
 

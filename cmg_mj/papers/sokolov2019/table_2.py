@@ -57,18 +57,18 @@ def tuned(
     on_share: OnShare, worlds: int = WORLDS, seed: int = SEED
 ) -> dict[str, dict[str, Sequence[NoiseLevelResult]]]:
     """Tune all three under both pushes."""
-    found: dict[str, dict[str, Sequence[NoiseLevelResult]]] = {push: {} for push in PUSHES}
-    wanted = [
-        each
+    results: dict[str, dict[str, Sequence[NoiseLevelResult]]] = {push: {} for push in PUSHES}
+    recordings = [
+        half
         for settings, noises in PUSHES.values()
-        for each in halves(scenario_of(next(iter(OBSERVERS)), settings, seed), worlds, noises)
+        for half in halves(scenario_of(next(iter(OBSERVERS)), settings, seed), worlds, noises)
     ]
-    recorded = recorder(wanted, warm_up_s=WARM_UP_S)
+    recorded = recorder(recordings, warm_up_s=WARM_UP_S)
     for i, (push, (settings, noises)) in enumerate(PUSHES.items()):
         for j, name in enumerate(OBSERVERS):
-            found[push][name] = levels_of(name, settings, worlds, seed, noises, recorded)
+            results[push][name] = levels_of(name, settings, worlds, seed, noises, recorded)
             on_share((3 * i + j + 1) / 6.0)
-    return found
+    return results
 
 
 def none_better(levels: Sequence[NoiseLevelResult]) -> bool:
@@ -76,36 +76,46 @@ def none_better(levels: Sequence[NoiseLevelResult]) -> bool:
     return all(level.verdict != "better" for level in levels)
 
 
-def claim(found: Tuned) -> Claim:
+def claim(results: Tuned) -> Claim:
     """The printed values beside the best ones."""
-    settings = [(push, i, level.noise_ug_rthz) for push, of in found.items() for i, level in enumerate(of["linear"])]
-    best = [
+    settings = [
+        (push, i, level.noise_ug_rthz)
+        for push, by_observer in results.items()
+        for i, level in enumerate(by_observer["linear"])
+    ]
+    best_settings = [
         f"{push} at {noise:g} ug/rtHz"
         for push, i, noise in settings
-        if none_better([levels[i] for levels in found[push].values()])
+        if none_better([levels[i] for levels in results[push].values()])
     ]
-    alone = {
-        name: [f"{noise:g} ({push})" for push, i, noise in settings if none_better([found[push][name][i]])]
+    settings_by_observer = {
+        name: [f"{noise:g} ({push})" for push, i, noise in settings if none_better([results[push][name][i]])]
         for name in OBSERVERS
     }
-    worse = [
+    worse_than_zero = [
         OBSERVERS[name]
         for name in OBSERVERS
-        if all(level.rms.mean() > level.zero_rms for of in found.values() for level in of[name])
+        if all(level.rms.mean() > level.zero_rms for by_observer in results.values() for level in by_observer[name])
     ]
-    each = "; ".join(f"{OBSERVERS[name]} at {', '.join(at) or 'none'}" for name, at in alone.items())
+    settings_text = "; ".join(
+        f"{OBSERVERS[name]} at {', '.join(places) or 'none'}" for name, places in settings_by_observer.items()
+    )
     return Claim(
         place="Table II, tuning",
         says="tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
         found=(
             f"Fitted on {WORLDS} seeds and scored on as many others, from the push's start to a second after it. The "
-            f"printed values are not beaten, by noise in ug/rtHz: {each}."
+            f"printed values are not beaten, by noise in ug/rtHz: {settings_text}."
         ),
-        table=_table(found),
-        holds=bool(best),
+        table=_table(results),
+        holds=bool(best_settings),
         conditions=(
-            f"For a push of {'; '.join(best)}. The paper gives neither push nor noise."
-            + (f" The best {' and '.join(worse)} are farther from the gyro than zero is." if worse else "")
+            f"For a push of {'; '.join(best_settings)}. The paper gives neither push nor noise."
+            + (
+                f" The best {' and '.join(worse_than_zero)} are farther from the gyro than zero is."
+                if worse_than_zero
+                else ""
+            )
         ),
         otherwise=(
             "In none of these settings are all three printed lines the best: they were not found on such a recording."
@@ -120,14 +130,14 @@ def claim(found: Tuned) -> Claim:
                     "zero_estimate_error_rad_s": [level.zero_rms for level in levels],
                     "tuned_is": [level.verdict for level in levels],
                 }
-                for name, levels in of.items()
+                for name, levels in by_observer.items()
             }
-            for push, of in found.items()
+            for push, by_observer in results.items()
         },
     )
 
 
-def _table(found: Tuned) -> str:
+def _table(results: Tuned) -> str:
     rows = [
         (
             push,
@@ -137,8 +147,8 @@ def _table(found: Tuned) -> str:
             f"{level.ratio.mean:.3f} +- {level.ratio.half:.3f}",
             f"{level.rms.mean() / level.zero_rms:.2f}",
         )
-        for push, of in found.items()
-        for name, levels in of.items()
+        for push, by_observer in results.items()
+        for name, levels in by_observer.items()
         for level in levels
     ]
     headings = ("push", "", "noise [ug/rtHz]", "tuned", "printed by tuned error", "tuned error by zero's")

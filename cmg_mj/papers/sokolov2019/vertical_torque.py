@@ -73,7 +73,7 @@ def locked_run(prepared: Experiment, world: int = 0) -> Locked:
     free = load_plant(replace(scenario.plant, lock_thrust_bearing=False))
     controller = prepared.controller(world)
     half_a_step = plant.model.opt.timestep / 2.0
-    data, there, inverse = plant.new_data(), mujoco.MjData(plant.model), mujoco.MjData(free.model)
+    data, tick_data, inverse = plant.new_data(), mujoco.MjData(plant.model), mujoco.MjData(free.model)
     times, rows, torques = [], [], []
     while data.time < scenario.duration_s - half_a_step:
         data.qfrc_applied[plant.tilt] = sum(
@@ -82,13 +82,13 @@ def locked_run(prepared: Experiment, world: int = 0) -> Locked:
             if push.start_s - half_a_step < data.time < push.end_s - half_a_step
         )
         if control(plant, controller, data):
-            mujoco.mj_copyData(there, plant.model, data)
-            mujoco.mj_forward(plant.model, there)
+            mujoco.mj_copyData(tick_data, plant.model, data)
+            mujoco.mj_forward(plant.model, tick_data)
             for name in ("qpos", "qvel", "qacc"):
-                getattr(inverse, name)[:] = [0.0, *getattr(there, name)]
+                getattr(inverse, name)[:] = [0.0, *getattr(tick_data, name)]
             mujoco.mj_inverse(free.model, inverse)
             times.append(data.time)
-            rows.append([there.qpos.copy(), there.qvel.copy(), there.qacc.copy()])
+            rows.append([tick_data.qpos.copy(), tick_data.qvel.copy(), tick_data.qacc.copy()])
             torques.append(float(inverse.qfrc_inverse[free.yaw]))
         mujoco.mj_step(plant.model, data)
     return Locked(np.array(times), Motion(*np.swapaxes(np.array(rows), 0, 1)), np.array(torques))
