@@ -32,7 +32,7 @@ NEEDS = {"aranovskiy2020": ("sympy",), "sokolov2019": ("sympy",)}
 
 
 @dataclass
-class Reproduced:
+class Reproduction:
     """What was obtained for one paper.
 
     Attributes:
@@ -70,7 +70,7 @@ def sections_of(paper: str) -> list[Section]:
     return importlib.import_module(f"cmg_mj.papers.{paper}").SECTIONS
 
 
-def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) -> list[Reproduced]:
+def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) -> list[Reproduction]:
     """Obtain every claim of the papers.
 
     Args:
@@ -85,7 +85,7 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
     """
     check_installed(papers)
     sections = {paper: sections_of(paper) for paper in papers}
-    entries = [Reproduced(paper) for paper in papers]
+    entries = [Reproduction(paper) for paper in papers]
     total = sum(section.seconds for paper_sections in sections.values() for section in paper_sections)
     seconds_before = 0.0
     try:

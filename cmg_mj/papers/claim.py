@@ -20,27 +20,27 @@ class Claim:
 
     Attributes:
         place: Where in the paper: `Fig. 2`, `Remark 1`, `Section V`.
-        says: What the paper says there, in our words.
-        found: What was obtained, with its figures, in words.
+        statement: What the paper says there, in our words.
+        result: What was obtained, with its figures, in words.
         table: More figures than a sentence bears, as a Markdown table below the words.
         holds: Whether what was obtained bears the paper out, computed from the figures.
         conditions: Under which conditions it holds, a whole sentence; empty if it holds outright.
         otherwise: What to make of it where it does not hold, a whole sentence.
-        figures: The numbers behind `found`, by names that end in their unit, as JSON can hold them.
+        figures: The numbers behind `result`, by names that end in their unit, as JSON can hold them.
         pictures: Plots.
-        ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
+        is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
     """
 
     place: str
-    says: str
-    found: str
+    statement: str
+    result: str
     table: str = ""
     holds: bool
     conditions: str = ""
     otherwise: str = "The figures above do not bear it out."
     figures: Mapping[str, Any] = field(default_factory=dict)
     pictures: Sequence[Picture] = ()
-    ours: bool = False
+    is_ours: bool = False
 
     def __post_init__(self) -> None:
         for name in ("conditions", "otherwise"):
@@ -59,7 +59,7 @@ class Claim:
         return "reproduced within stated conditions" if self.conditions else "reproduced"
 
     @property
-    def why(self) -> str:
+    def reason(self) -> str:
         """The conditions under which it holds, or why it does not; empty if it holds outright."""
         return self.conditions if self.holds else self.otherwise
 

@@ -26,7 +26,7 @@ from cmg_mj.papers.plvcc_geometry import (
 Paper = Literal["aranovskiy2020", "sokolov2019"]
 
 
-class Printed(NamedTuple):
+class PrintedInertia(NamedTuple):
     """What a paper prints of its inertia.
 
     Attributes:
@@ -42,9 +42,9 @@ class Printed(NamedTuple):
     arm: str
 
 
-PRINTED: dict[Paper, Printed] = {
-    "aranovskiy2020": Printed("Appendix", 2, 2, "0.19"),
-    "sokolov2019": Printed("Proposition 1", 1, 1, "0.13"),
+PRINTED: dict[Paper, PrintedInertia] = {
+    "aranovskiy2020": PrintedInertia("Appendix", 2, 2, "0.19"),
+    "sokolov2019": PrintedInertia("Proposition 1", 1, 1, "0.13"),
 }
 
 
@@ -162,20 +162,22 @@ class Proof:
 
     Attributes:
         steps: Step in words -> whether it was found so.
-        no: The decisions on the paper's m1, with symbols and with the numbers of its table.
-        yes: The decisions on inertias that are PLvCC, constant m1 first.
+        paper_decisions: The decisions on the paper's m1, with symbols and with the numbers of its table.
+        counter_checks: The decisions on inertias that are PLvCC, constant m1 first.
     """
 
     steps: Mapping[str, bool]
-    no: tuple[Decision, Decision]
-    yes: tuple[Decision, ...]
+    paper_decisions: tuple[Decision, Decision]
+    counter_checks: tuple[Decision, ...]
 
     @property
-    def wrong(self) -> list[str]:
+    def failures(self) -> list[str]:
         """What was not found so: a step, a Psi for the paper's m1, no Psi for an m1 that has one."""
         failures = [name for name, right in self.steps.items() if not right]
-        failures += [f"m1 = {decision.m1}: a Psi was found" for decision in self.no if decision.plvcc]
-        return failures + [f"m1 = {decision.m1}: no Psi was found" for decision in self.yes if not decision.plvcc]
+        failures += [f"m1 = {decision.m1}: a Psi was found" for decision in self.paper_decisions if decision.plvcc]
+        return failures + [
+            f"m1 = {decision.m1}: no Psi was found" for decision in self.counter_checks if not decision.plvcc
+        ]
 
 
 def proof(paper: Paper) -> Proof:
@@ -195,9 +197,11 @@ def proof(paper: Paper) -> Proof:
         sp.diff(condition(f**2), q2) - 2 * f**2 * sp.diff(sp.diff(f, q2, 2) / f, q2)
     )
     steps["it is 8 A D k^2 for f = A exp(k q2) + D exp(-k q2)"] = vanishes(condition(family) - 8 * A * D * k**2)
-    no = (decide(papers_m1(paper)), decide(papers_m1(paper, numbers=True)))
-    yes = tuple(decide(m1) for m1 in (sp.Symbol("J1", positive=True), sp.exp(2 * k * q2), sp.cosh(k * q2) ** 2))
-    return Proof(steps, no, yes)
+    paper_decisions = (decide(papers_m1(paper)), decide(papers_m1(paper, numbers=True)))
+    counter_checks = tuple(
+        decide(m1) for m1 in (sp.Symbol("J1", positive=True), sp.exp(2 * k * q2), sp.cosh(k * q2) ** 2)
+    )
+    return Proof(steps, paper_decisions, counter_checks)
 
 
 # --- the claim ----------------------------------------------------------------------------------------------
@@ -206,8 +210,8 @@ def proof(paper: Paper) -> Proof:
 def claim(paper: Paper) -> Claim:
     """The appendix of aranovskiy2020, or Proposition 1 of sokolov2019, whose proof is not printed there."""
     result = proof(paper)
-    symbolic, numeric = result.no
-    constant, *other_decisions = result.yes
+    symbolic, numeric = result.paper_decisions
+    constant, *other_decisions = result.counter_checks
     condition_values = ", ".join(f"{value} at q2 = {angle}" for angle, value in symbolic.values.items())
     gap, factor, printed_factor = not zero_d_is_singular(), inertia_factor(paper), PRINTED[paper].factor
     remarks = {
@@ -221,23 +225,23 @@ def claim(paper: Paper) -> Claim:
     on_printed_proof = " ".join(remark for remark, is_so in remarks.items() if is_so)
     return Claim(
         place=PRINTED[paper].place,
-        says="No full-rank Psi(q) makes B_(1) and B_(2) skew-symmetric: the system is not partially linearisable via "
-        "coordinate changes.",
-        found=f"No such Psi exists: m1 (m1'/m1)' is {condition_values} (I_cd = I_c + I_d), which differ for every J2 "
+        statement="No full-rank Psi(q) makes B_(1) and B_(2) skew-symmetric: the system is not partially linearisable "
+        "via coordinate changes.",
+        result=f"No such Psi exists: m1 (m1'/m1)' is {condition_values} (I_cd = I_c + I_d), which differ for every J2 "
         f"other than 0. The checker can say yes: constant m1 has Psi = {_text(constant.Psi)}, "
         + ", ".join(f"m1 = {decision.m1} has Psi = {_text(decision.Psi)}" for decision in other_decisions)
         + ", their B_(i) skew-symmetric by substitution in the definition. The paper's necessary condition is also "
         "sufficient: a column of Psi serves exactly if it is a Killing field of M. An m1 > 0 on the whole line has "
         "two independent ones exactly if m1 = (A exp(k q2) + D exp(-k q2))^2 with A, D >= 0."
         + (" The paper prints no proof; this is one." if paper == "sokolov2019" else ""),
-        holds=not result.wrong,
+        holds=not result.failures,
         conditions=on_printed_proof if paper == "aranovskiy2020" else "",
-        otherwise=f"Not found so: {'; '.join(result.wrong)}.",
+        otherwise=f"Not found so: {'; '.join(result.failures)}.",
         figures={
             "steps": dict(result.steps),
             "papers_m1": _plain(symbolic),
             "table_numbers": _plain(numeric),
-            "counter_checks": [_plain(decision) | {"Psi": _text(decision.Psi)} for decision in result.yes],
+            "counter_checks": [_plain(decision) | {"Psi": _text(decision.Psi)} for decision in result.counter_checks],
             "d_zero_alone_is_singular": not gap,
             "factor_of_m1_by_the_equations": int(factor),
             "factor_of_m1_printed": printed_factor,

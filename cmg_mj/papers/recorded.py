@@ -14,7 +14,7 @@ def trajectory_of(result: Result) -> Trajectory:
     return result.trajectory
 
 
-def pushed(trajectory: Trajectory) -> list[tuple[float, float]]:
+def push_intervals(trajectory: Trajectory) -> list[tuple[float, float]]:
     """When the push acted on one world, as panels shade it [s]."""
     times = trajectory["time_s"][trajectory["push_n_m"] != 0.0]
     return [(float(times[0]), float(times[-1]))] if len(times) else []

@@ -17,7 +17,7 @@ def _short_sentences() -> Iterator[None]:
 
     def checked(claim: Claim) -> None:
         given(claim)
-        for text in (claim.says, claim.found, claim.conditions, claim.otherwise):
+        for text in (claim.statement, claim.result, claim.conditions, claim.otherwise):
             for sentence in too_long(text):
                 raise AssertionError(f"{claim.place}: a sentence is too long: {sentence}")
 

@@ -53,7 +53,7 @@ def done() -> Study:
 def of_json(claim: Claim) -> Claim:
     """A claim whose figures JSON can hold and whose words are whole."""
     json.dumps(dict(claim.figures), allow_nan=False)
-    for text in (claim.says, claim.found, claim.why):
+    for text in (claim.statement, claim.result, claim.reason):
         assert "{" not in text.replace("{eta1 >=", "")
         assert "  " not in text
     return claim
@@ -119,7 +119,7 @@ def test_closed_forms_of_the_bounds_are_the_maxima(hbar: float) -> None:
         printed = np.abs(m1 + hat**p * (inner + m2 * x2 ** (2.0 - p))).max()
         assert reactor.Omega1(u, x1, hat) == pytest.approx(first, rel=1e-5)
         assert reactor.Omega2(u, x1, hat, p) == pytest.approx(second, rel=1e-5)
-        assert reactor.Omega2(u, x1, hat, p, as_printed=True) == pytest.approx(printed, rel=1e-5)
+        assert reactor.Omega2(u, x1, hat, p, with_misprint=True) == pytest.approx(printed, rel=1e-5)
 
 
 def test_input_is_the_papers() -> None:
@@ -194,10 +194,10 @@ def test_rates_are_in_order_in_every_window(done: Study) -> None:
 
 
 def test_errors_are_in_order_in_every_seed(done: Study) -> None:
-    for replays in (done.found, done.loud):
+    for replays in (done.nominal, done.loud):
         rms = rms_by_kind(done.run, replays)
         assert figure_2.share_in_order(rms) >= 0.95
-    assert rms_by_kind(done.run, done.found).mean(axis=1) == pytest.approx([0.255, 0.071, 0.056], rel=0.08)
+    assert rms_by_kind(done.run, done.nominal).mean(axis=1) == pytest.approx([0.255, 0.071, 0.056], rel=0.08)
 
 
 def test_claims_on_the_figures(done: Study) -> None:
@@ -217,12 +217,12 @@ def test_claims_on_the_figures(done: Study) -> None:
 
 def test_claims_can_fail(done: Study) -> None:
     """The observers' names exchanged."""
-    swapped = {CONSTANT: done.found[UPDATED], UPDATED: done.found[CONSTANT], HOMOGENEOUS: done.found[HOMOGENEOUS]}
-    other = done._replace(found=swapped)
+    swapped = {CONSTANT: done.nominal[UPDATED], UPDATED: done.nominal[CONSTANT], HOMOGENEOUS: done.nominal[HOMOGENEOUS]}
+    other = done._replace(nominal=swapped)
     for make in (figure_1.figure_1, figure_2.figure_2, figure_2.bias):
         claim = make(other)
         assert claim.verdict == "not reproduced"
-        assert claim.why
+        assert claim.reason
 
 
 def test_cause_of_a_bias_is_judged_by_what_is_left_without_it(done: Study) -> None:
@@ -232,47 +232,47 @@ def test_cause_of_a_bias_is_judged_by_what_is_left_without_it(done: Study) -> No
     claim = figure_2.bias_of_constant_gain(done)
     assert claim.figures["share_left_with_exact_hbar"] == left[0].tolist()
     assert left[1:, [0, 2]].max() < 0.4
-    shown = done.found[CONSTANT].eta2_error
+    shown = done.nominal[CONSTANT].eta2_error
     gone = done.exact | {CONSTANT: dataclasses.replace(done.exact[CONSTANT], eta2_error=0.1 * shown)}
     assert figure_2.bias_of_constant_gain(done._replace(exact=gone)).verdict == "reproduced"
-    assert figure_2.bias_of_updated_gains(done._replace(exact=done.found)).verdict == "not reproduced"
+    assert figure_2.bias_of_updated_gains(done._replace(exact=done.nominal)).verdict == "not reproduced"
 
 
 def test_order_of_figure_2_is_needed_in_nearly_every_seed(done: Study) -> None:
     """With the second and third exchanged in one seed of six it is in order in five."""
-    second, third = (np.array(done.found[kind].eta2_error) for kind in (UPDATED, HOMOGENEOUS))
+    second, third = (np.array(done.nominal[kind].eta2_error) for kind in (UPDATED, HOMOGENEOUS))
     second[:, 0], third[:, 0] = third[:, 0].copy(), second[:, 0].copy()
     swapped = {
-        UPDATED: dataclasses.replace(done.found[UPDATED], eta2_error=second),
-        HOMOGENEOUS: dataclasses.replace(done.found[HOMOGENEOUS], eta2_error=third),
+        UPDATED: dataclasses.replace(done.nominal[UPDATED], eta2_error=second),
+        HOMOGENEOUS: dataclasses.replace(done.nominal[HOMOGENEOUS], eta2_error=third),
     }
-    claim = figure_2.figure_2(done._replace(found=done.found | swapped))
+    claim = figure_2.figure_2(done._replace(nominal=done.nominal | swapped))
     assert claim.figures["share_of_seeds_in_order"] == pytest.approx(5.0 / 6.0)
     assert claim.verdict == "not reproduced"
 
 
 def test_spread_must_go_with_the_rate(done: Study) -> None:
     """The errors of the noisiest given to the one with the least rate."""
-    other = dataclasses.replace(done.found[HOMOGENEOUS], eta2_error=10.0 * done.found[CONSTANT].eta2_error)
-    assert figure_2.spread(done._replace(found=done.found | {HOMOGENEOUS: other})).verdict == "not reproduced"
+    other = dataclasses.replace(done.nominal[HOMOGENEOUS], eta2_error=10.0 * done.nominal[CONSTANT].eta2_error)
+    assert figure_2.spread(done._replace(nominal=done.nominal | {HOMOGENEOUS: other})).verdict == "not reproduced"
 
 
 def test_gain_follows_its_rate(done: Study) -> None:
     """L is phi2 + (phi3/phi1) Omega = 1 + 100 Omega in the mean."""
     for kind in (UPDATED, HOMOGENEOUS):
         L, rate = (
-            window_means(done.run, values).mean(axis=1) for values in (done.found[kind].L, done.found[kind].rate)
+            window_means(done.run, values).mean(axis=1) for values in (done.nominal[kind].L, done.nominal[kind].rate)
         )
         assert L / (1.0 + 100.0 * rate) == pytest.approx(1.0, abs=0.03)
     constant = 1.0 + 100.0 * Bioreactor(0.8).df2_max
-    assert np.ptp(done.found[CONSTANT].L) == 0.0
-    assert done.found[CONSTANT].L[0, 0] / constant == pytest.approx(1.0)
-    assert min(replayed.L.min() for replayed in done.found.values()) >= 1.0
+    assert np.ptp(done.nominal[CONSTANT].L) == 0.0
+    assert done.nominal[CONSTANT].L[0, 0] / constant == pytest.approx(1.0)
+    assert min(replayed.L.min() for replayed in done.nominal.values()) >= 1.0
 
 
 def test_the_homogeneous_terms_are_inert(done: Study) -> None:
-    claim = of_json(correction(done.run, done.found[HOMOGENEOUS]))
-    assert claim.ours
+    claim = of_json(correction(done.run, done.nominal[HOMOGENEOUS]))
+    assert claim.is_ours
     assert claim.verdict == "reproduced within stated conditions"
     assert claim.figures["largest_argument"] < 1e-3
     assert claim.figures["largest_difference_eta2"] < 1e-4
@@ -285,7 +285,7 @@ def test_the_result_does_not_hang_on_the_step(done: Study) -> None:
     coarse = first_half(done.run)
     for kind in (UPDATED, HOMOGENEOUS):
         found = rms_late(fine, replay(kind, fine, Bioreactor(0.8)).eta2_error)
-        expected = rms_late(coarse, done.found[kind].eta2_error[: len(coarse.t), :2])
+        expected = rms_late(coarse, done.nominal[kind].eta2_error[: len(coarse.t), :2])
         assert found == pytest.approx(expected, rel=0.02)
 
 
@@ -345,11 +345,11 @@ def test_escape_is_found_below_1_and_missed_beyond() -> None:
 
 def test_on_the_rig() -> None:
     """Three worlds of `high_gain` in the loop: it stands, and its gain does not move."""
-    result = on_the_rig.in_the_loop(["high_gain"], 3, 90_000)["high_gain"]
+    result = on_the_rig.run_kinds(["high_gain"], 3, 90_000)["high_gain"]
     errors = result.values("velocity_rms_error_rad_s")
     assert np.isfinite(errors).all()
     assert 0.05 < errors.mean() < 0.085
-    claim = of_json(on_the_rig.idle(result))
+    claim = of_json(on_the_rig.idle_claim(result))
     assert claim.verdict == "reproduced"
     assert 1e-4 < claim.figures["largest_Omega_1_s"] < 0.015
 
@@ -363,20 +363,20 @@ def ended(errors: list[float], *, fell: int = 0) -> Result:
 
 def test_a_fall_on_the_rig_is_not_hidden() -> None:
     found = dict.fromkeys(on_the_rig.KINDS, ended([0.07, 0.071, 0.072, 0.073]))
-    claim = of_json(on_the_rig.compared(found | {"high_gain": ended([0.06, 0.061, 0.059, 0.08], fell=1)}))
+    claim = of_json(on_the_rig.comparison_claim(found | {"high_gain": ended([0.06, 0.061, 0.059, 0.08], fell=1)}))
     assert claim.verdict == "not reproduced"
-    assert "3 of 4" in claim.found
-    assert "high_gain 0.0600" in claim.found
+    assert "3 of 4" in claim.result
+    assert "high_gain 0.0600" in claim.result
 
 
 def test_differences_on_the_rig_are_beyond_chance() -> None:
     """High gain less theirs, world by world: the word follows the interval's ends."""
     low, high, mixed = [0.07, 0.08, 0.09], [0.08, 0.09, 0.1], [0.06, 0.09, 0.091]
     found = dict.fromkeys(on_the_rig.KINDS, ended(high)) | {"high_gain": ended(low)}
-    claim = on_the_rig.compared(found | {"linear": ended(mixed), "ltv": ended([0.06, 0.07, 0.08])})
-    assert "homogeneous -0.0100 +- 0.0000 (smaller)" in claim.found
-    assert "ltv +0.0100 +- 0.0000 (larger)" in claim.found
-    assert "(not different)" in claim.found.partition("linear ")[2].partition("linear ")[2]
+    claim = on_the_rig.comparison_claim(found | {"linear": ended(mixed), "ltv": ended([0.06, 0.07, 0.08])})
+    assert "homogeneous -0.0100 +- 0.0000 (smaller)" in claim.result
+    assert "ltv +0.0100 +- 0.0000 (larger)" in claim.result
+    assert "(not different)" in claim.result.partition("linear ")[2].partition("linear ")[2]
 
 
 def test_pictures_have_names(done: Study) -> None:

@@ -182,7 +182,7 @@ def test_exponent_of_6() -> None:
     claim = increments.exponent_of_6()
     assert claim.verdict == WITHIN
     assert increments.exponent_of_section_2_1(2, 2, 2, 0.4) == pytest.approx(1.4)
-    assert increments.exponent_printed(2, 2, 2, 0.4) == pytest.approx(1.0)
+    assert increments.printed_exponent(2, 2, 2, 0.4) == pytest.approx(1.0)
     assert increments.exponent_of_section_2_1(4, 3, 2, 0.2) == pytest.approx(1.0 / 0.6)
     grown = [increments.quotient_of_6(1.0, 0.5, size) for size in (1e2, 1e4, 1e6)]
     assert grown[1] / grown[0] == pytest.approx(10.0, rel=0.1)
@@ -190,7 +190,7 @@ def test_exponent_of_6() -> None:
 
 
 def test_exponent_of_6_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(increments, "exponent_printed", increments.exponent_of_section_2_1)
+    monkeypatch.setattr(increments, "printed_exponent", increments.exponent_of_section_2_1)
     assert increments.exponent_of_6().verdict == "reproduced"
     monkeypatch.setattr(increments, "exponent_of_section_2_1", lambda *args: 1.0)
     assert increments.exponent_of_6().verdict == "not reproduced"

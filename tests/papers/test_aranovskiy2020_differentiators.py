@@ -14,7 +14,7 @@ SEED = 910_000
 
 @pytest.mark.parametrize("tau", [0.01, 0.02, 0.05])
 def test_lag_and_noise_of_the_linear_differentiator(tau: float) -> None:
-    found, expected = lag.trade(tau, SEED), lag.foreseen(tau)
+    found, expected = lag.trade(tau, SEED), lag.predict_trade(tau)
     assert found.lag_s == pytest.approx(2.0 * tau, rel=1e-3)
     assert found.noise_gain_1_s == pytest.approx(expected.noise_gain_1_s, rel=0.04)
 
@@ -24,7 +24,7 @@ def test_the_trade_is_reproduced() -> None:
 
 
 def test_noise_of_a_long_time_constant() -> None:
-    assert lag.foreseen(1.0).noise_gain_1_s == pytest.approx(math.sqrt(DT / 4.0), rel=0.01)
+    assert lag.predict_trade(1.0).noise_gain_1_s == pytest.approx(math.sqrt(DT / 4.0), rel=0.01)
 
 
 def test_vicinity_of_the_homogeneous_differentiator() -> None:
@@ -53,6 +53,6 @@ def test_decay_of_the_linear_observer_in_closed_form() -> None:
 
 
 def test_an_observer_that_is_late_is_not_reproduced(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = finite_time.of_the_observer
-    monkeypatch.setattr(finite_time, "of_the_observer", lambda alpha: 1.05 * right(alpha))
+    right = finite_time.observer_decay_time
+    monkeypatch.setattr(finite_time, "observer_decay_time", lambda alpha: 1.05 * right(alpha))
     assert finite_time.finite_time_claim().verdict == "not reproduced"

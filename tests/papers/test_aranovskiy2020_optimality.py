@@ -68,4 +68,4 @@ def test_to_more_digits_no_diagonal_cost_gives_them(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(optimality, "K_E_ROUNDING", (0.05, 0.05, 0.05, 0.005))
     claim = optimality.lqr_gains()
     assert claim.verdict == "reproduced within stated conditions"
-    assert "not even to the digits printed" in claim.why
+    assert "not even to the digits printed" in claim.reason

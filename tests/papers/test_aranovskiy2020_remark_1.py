@@ -62,7 +62,7 @@ def test_the_lowest_rate_lies_between_one_that_fails_and_one_that_does_not() -> 
 
 
 def test_single_precision_does_no_harm_to_runge_kutta() -> None:
-    double, single = (transient("Runge-Kutta 4", 200.0, single=s) for s in (False, True))
+    double, single = (transient("Runge-Kutta 4", 200.0, single_precision=s) for s in (False, True))
     assert single.error == pytest.approx(double.error, rel=0.2)
     assert single.error != double.error
     assert single.least > 0.0
@@ -72,7 +72,7 @@ def test_plain_form_agrees_with_ours_at_a_small_step() -> None:
     """(10) written out with 3x3 matrices is the same observer: the difference fades with the step."""
     differences = []
     for dt in (1e-3, 5e-4):
-        plain, ours = forms_of_10.Plain(forms_of_10.euler, dt), forms_of_10.ours(dt)
+        plain, ours = forms_of_10.Plain(forms_of_10.euler, dt), forms_of_10.make_exact(dt)
         y = Measurement(0.01, 0.2)
         a, b = plain.init(y), ours.init(y)
         x, estimate = a[0], Estimate(0.0, 0.0, 0.0)
@@ -87,7 +87,7 @@ def test_plain_form_agrees_with_ours_at_a_small_step() -> None:
 
 
 def test_euler_makes_the_estimate_worse() -> None:
-    found = forms_of_10.euler_against_exact(SEED)
+    found = forms_of_10.compare_euler(SEED)
     assert found.other_error > 1.1 * found.error
 
 
@@ -111,7 +111,7 @@ def test_the_misprint_is_one_that_does_not_matter(monkeypatch: pytest.MonkeyPatc
     mattering = right.rate._replace(difference=0.1 * right.rate.error)
     monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(rate=mattering))
     assert misprint.misprint_claim(SEED).verdict == "not reproduced"
-    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(printed=right.corrected, rate=mattering))
+    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(printed_H=right.corrected_H, rate=mattering))
     assert misprint.misprint_claim(SEED).verdict == "reproduced"
 
 
@@ -130,7 +130,7 @@ def test_ten_by_euler_on_floats_and_arrays_is_the_plain_one(exact_gain: bool) ->
 def test_with_the_exact_gain_h_is_the_benchs() -> None:
     """A step of H at rest, from H_0 and half settled."""
     y, form = Measurement(0.0, 0.0), by_euler.TenByEuler(0.005, printed_model(), exact_gain=True)
-    state, ours = form.init(y), forms_of_10.ours(0.005)
+    state, ours = form.init(y), forms_of_10.make_exact(0.005)
     theirs = ours.init(y)
     for _ in range(20):
         state, theirs = form.step(state, y, 0.0)[0], ours.step(theirs, y, 0.0)[0]
@@ -168,7 +168,7 @@ def test_the_verdict_on_the_cost_follows_from_the_instructions(monkeypatch: pyte
         monkeypatch.setattr(update_cost, "instructions", lambda board=board: on_the_board.Instructions(board, False))
         claim = update_cost.cost()
         assert claim.verdict == verdict
-        assert "; recorded" in claim.found
+        assert "; recorded" in claim.result
 
 
 @pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")

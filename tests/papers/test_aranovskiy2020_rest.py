@@ -14,11 +14,11 @@ SEED = 910_000
 
 def test_the_rig_rests_at_zero_with_a_biased_observer() -> None:
     case = "(10), estimated angles"
-    (found,) = rest.rests_of([(case, 4, ())], SEED)
+    (found,) = rest.find_rests([(case, 4, ())], SEED)
     expected = rest.expected_integrator(case, rest.BIAS_DEG, math.radians(0.4), SEED)
     assert found.x2_estimated.high < -0.01  # biased it is
-    assert found.at_zero(expected)
-    assert not found.at_zero(-expected)  # the printed sign
+    assert found.is_at_zero(expected)
+    assert not found.is_at_zero(-expected)  # the printed sign
     assert abs(found.x3.mean) < 2.0
     # The law with the true rate and the measured angles rests where (8) says.
     x_e = rest.expected_integrator(rest.TRUE_RATE, rest.BIAS_DEG, math.radians(0.4), SEED)

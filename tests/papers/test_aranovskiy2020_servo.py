@@ -67,7 +67,7 @@ def test_tracking_is_the_rate_less_the_command(servos: servo.Servos) -> None:
     angle = 0.9 * np.vstack([np.zeros((1, 2)), np.cumsum(command, axis=0)[:-1]]) * (time[1] - time[0])
     columns = dict(run.columns) | {"u_rad_s": command, "x3_rad": angle}
     made = Result(servos.soft.outcomes, servos.soft.summaries, dataclasses.replace(run, columns=columns))
-    found = servo.tracking(made)
+    found = servo.measure_tracking(made)
     assert found is not None
     assert found.mean == pytest.approx(0.1, rel=1e-6)
 

@@ -10,7 +10,7 @@ import pytest
 from cmg_mj.papers.aranovskiy2020 import joint, retuned, table_2
 from cmg_mj.papers.aranovskiy2020.joint import nearest_joint
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, TABLE_2
-from cmg_mj.papers.aranovskiy2020.tuning_procedure import Tried, loops_of, procedure_claim
+from cmg_mj.papers.aranovskiy2020.tuning_procedure import Trial, procedure_claim, run_trials
 from cmg_mj.results.intervals import Interval
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.tuning import NoiseLevelResult, TuningResult
@@ -45,7 +45,7 @@ def test_the_tuned_are_set_in_the_loop() -> None:
     """Table 2's own gains are as good as Table 2's, and slower ones worse by far."""
     same = dataclasses.replace(level(200.0, 1.0), parameters=TABLE_2["linear"])
     slow = dataclasses.replace(same, sizes={"tau": 0.04}, parameters={"tau": 0.04})
-    found = retuned.in_the_loop([(retuned.LINEAR, each, STRONG) for each in (same, slow)], 3, SEED)
+    found = retuned.compare_in_loop([(retuned.LINEAR, each, STRONG) for each in (same, slow)], 3, SEED)
     assert found[0] == pytest.approx((1.0, 1.0, 1.0))
     assert found[1].high < 0.5  # Table 2's by that of the slow
 
@@ -83,11 +83,11 @@ GOOD, BAD = ratios(1.04, 1.0, 1.03), ratios(1.02, 1.04, 1.3)
 def test_the_joint_experiment_is_the_one_whose_worst_loses_least() -> None:
     found = nearest_joint(made((100.0, ratios(1.0, 1.0, 1.4), 0.1), (200.0, ratios(1.2, 1.2, 1.2), 0.1)))
     assert found.words == "a push, 200 ug/rtHz"
-    assert found.worst == pytest.approx(1.2, rel=1e-3)
+    assert found.largest_ratio == pytest.approx(1.2, rel=1e-3)
     # Where zero is closer than the tuned nobody would tune, however good the given ones.
     found = nearest_joint(made((100.0, BAD, 0.1), (200.0, GOOD, 0.049)))
     assert found.noise_ug_rthz == 100.0
-    assert not nearest_joint(made((100.0, BAD, 0.01), (200.0, GOOD, 0.01))).worth_it
+    assert not nearest_joint(made((100.0, BAD, 0.01), (200.0, GOOD, 0.01))).beats_zero
 
 
 def test_three_lines_of_one_experiment() -> None:
@@ -104,7 +104,7 @@ def test_two_lines_of_one_experiment() -> None:
     found = made((100.0, BAD, 0.1))
     claim = joint.joint_claim(found)
     assert claim.verdict == "not reproduced"
-    assert "(11) is not the best" in claim.why
+    assert "(11) is not the best" in claim.reason
     verdicts = [table_2.table_2_claim(case, found, nearest_joint(found)).verdict for case in retuned.CASES]
     assert verdicts == ["reproduced within stated conditions"] * 2 + ["not reproduced"]
 
@@ -113,7 +113,7 @@ def test_nothing_is_tuned_where_zero_is_closer() -> None:
     found = made((100.0, GOOD, 0.04))
     claim = joint.joint_claim(found)
     assert claim.verdict == "not reproduced"
-    assert "zero is better still" in claim.why
+    assert "zero is better still" in claim.reason
     assert table_2.table_2_claim(retuned.LINEAR, found, nearest_joint(found)).verdict == "not reproduced"
     assert procedure_claim(found, []).verdict == "not reproduced"
 
@@ -128,31 +128,31 @@ def test_a_fit_to_the_gyro_need_not_be_one_for_the_loop() -> None:
     found = made((100.0, GOOD, 0.1), (200.0, GOOD, 0.04))
     at, beaten = joint.experiments(found)
     loop = {"linear": Interval(0.8, 0.7, 0.9), "ltv": ONE, "homogeneous": Interval(1.2, 1.1, 1.3)}
-    claim = procedure_claim(found, [Tried(at, loop), Tried(beaten, dict.fromkeys(OBSERVERS, ONE))])
+    claim = procedure_claim(found, [Trial(at, loop), Trial(beaten, dict.fromkeys(OBSERVERS, ONE))])
     assert claim.verdict == "reproduced within stated conditions"
-    assert "In 1 of the 2 experiments tried" in claim.why
-    assert "the tuned are worse than Table 2's for (9) at a push, 100 ug/rtHz." in claim.why
-    assert "At a push, 200 ug/rtHz zero is closer than (9), (10) and (11) at their best" in claim.why
-    assert Tried(at, loop).worse == ["(9)"]
-    assert Tried(at, loop).beaten == []
-    fallen = Tried(at, dict.fromkeys(OBSERVERS, Interval(float("nan"), float("-inf"), float("inf"))))
-    assert fallen.worse == []
-    assert procedure_claim(found, [Tried(at, dict.fromkeys(OBSERVERS, ONE))]).why.endswith("worse than Table 2's.")
+    assert "In 1 of the 2 experiments tried" in claim.reason
+    assert "the tuned are worse than Table 2's for (9) at a push, 100 ug/rtHz." in claim.reason
+    assert "At a push, 200 ug/rtHz zero is closer than (9), (10) and (11) at their best" in claim.reason
+    assert Trial(at, loop).worse_in_loop == ["(9)"]
+    assert Trial(at, loop).worse_than_zero == []
+    fallen = Trial(at, dict.fromkeys(OBSERVERS, Interval(float("nan"), float("-inf"), float("inf"))))
+    assert fallen.worse_in_loop == []
+    assert procedure_claim(found, [Trial(at, dict.fromkeys(OBSERVERS, ONE))]).reason.endswith("worse than Table 2's.")
 
 
 def test_the_loops_are_those_of_the_default_and_of_the_joint_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
     def looped(
-        tried: list[tuple[retuned.Tuned, NoiseLevelResult, retuned.Push]], worlds: int, seed: int
+        tried: list[tuple[retuned.TuningCase, NoiseLevelResult, retuned.Push]], worlds: int, seed: int
     ) -> list[Interval]:
         asked.extend((case.observer, level.noise_ug_rthz, push.words) for case, level, push in tried)
         return [ONE] * len(tried)
 
-    monkeypatch.setattr("cmg_mj.papers.aranovskiy2020.tuning_procedure.in_the_loop", looped)
+    monkeypatch.setattr("cmg_mj.papers.aranovskiy2020.tuning_procedure.compare_in_loop", looped)
     found = {STRONG.words: made((200.0, GOOD, 0.1), (400.0, BAD, 0.1))["a push"]}
     first = next(joint.experiments(found))
-    default, other = loops_of(found, first, lambda share: None)
-    assert default.together.words == "1 N m, e = 0.5 deg, 400 ug/rtHz"
-    assert other.together.words == first.words
+    default, other = run_trials(found, first, lambda share: None)
+    assert default.experiment.words == "1 N m, e = 0.5 deg, 400 ug/rtHz"
+    assert other.experiment.words == first.words
     assert asked == [(name, noise, STRONG.words) for noise in (400.0, 200.0) for name in OBSERVERS]

@@ -136,7 +136,7 @@ def test_nothing_is_better_than_the_floor(rows: list[dict[str, Any]], shares: li
 
 def test_the_papers_order_holds_where_noise_is_high(rows: list[dict[str, Any]]) -> None:
     claim = order_claim(rows)
-    assert "The paper's order holds at 800 ug/rtHz and 0 deg, 800 ug/rtHz and 1 deg. " in claim.found
+    assert "The paper's order holds at 800 ug/rtHz and 0 deg, 800 ug/rtHz and 1 deg. " in claim.result
     assert claim.verdict == "reproduced within stated conditions"
     assert order_claim([row for row in rows if row["noise_ug_rthz"] == 800.0]).verdict == "reproduced"
     assert order_claim([row for row in rows if row["noise_ug_rthz"] == 200.0]).verdict == "not reproduced"
@@ -178,7 +178,7 @@ def test_the_bias_fed_in_helps_where_it_is_large() -> None:
     assert claim.verdict == "reproduced"
     assert "- [100% fell]" in claim.table
     worse = large | {"gain_rad_s": Interval(-0.01, -0.02, -0.005)}
-    assert fed_bias_claim([worse, larger]).why == "It helps at e = 1.5 deg of those tried."
+    assert fed_bias_claim([worse, larger]).reason == "It helps at e = 1.5 deg of those tried."
     assert fed_bias_claim([worse]).verdict == "not reproduced"
 
 

@@ -21,17 +21,24 @@ from tests.command import cmg_mj
 PICTURE = Picture("a-fig-1", "a Fig. 1", [Panel("tilt [deg]", [Line([0.0, 1.0], [0.0, 2.0], "true")])])
 GOOD = Claim(
     place="Fig. 1",
-    says="it falls | or not",
-    found="it fell at 3 s",
+    statement="it falls | or not",
+    result="it fell at 3 s",
     holds=True,
     figures={"time_s": 3.0},
     pictures=[PICTURE],
 )
-PARTLY = Claim(place="Remark 1", says="always", found="above 100 Hz", holds=True, conditions="It is above 100 Hz.")
-OURS = Claim(
-    place="On the rig", says="it stands", found="it falls", holds=False, otherwise="It is too light.", ours=True
+PARTLY = Claim(
+    place="Remark 1", statement="always", result="above 100 Hz", holds=True, conditions="It is above 100 Hz."
 )
-NOT = Claim(place="Section V", says="best", found="worst", holds=False, otherwise="The noise is another.")
+OURS = Claim(
+    place="On the rig",
+    statement="it stands",
+    result="it falls",
+    holds=False,
+    otherwise="It is too light.",
+    is_ours=True,
+)
+NOT = Claim(place="Section V", statement="best", result="worst", holds=False, otherwise="The noise is another.")
 
 
 def sections(*claims: Claim) -> list[Section]:
@@ -139,17 +146,17 @@ def test_the_verdict_follows_from_what_was_found() -> None:
     def claim(holds: bool, conditions: str = "") -> Claim:
         return Claim(
             place="Fig. 9",
-            says="it is so",
-            found="it is",
+            statement="it is so",
+            result="it is",
             holds=holds,
             conditions=conditions,
             otherwise="It is far off.",
         )
 
     outright, within, failed = claim(True), claim(True, "It is so at 200 Hz."), claim(False, "It is so at 200 Hz.")
-    assert (outright.verdict, outright.why) == ("reproduced", "")
-    assert (within.verdict, within.why) == ("reproduced within stated conditions", "It is so at 200 Hz.")
-    assert (failed.verdict, failed.why) == ("not reproduced", "It is far off.")
+    assert (outright.verdict, outright.reason) == ("reproduced", "")
+    assert (within.verdict, within.reason) == ("reproduced within stated conditions", "It is so at 200 Hz.")
+    assert (failed.verdict, failed.reason) == ("not reproduced", "It is far off.")
     assert type(claim(np.float64(1.0) > 0.5).holds) is bool  # type: ignore[arg-type]
 
 
@@ -160,12 +167,12 @@ def test_conditions_and_otherwise_are_whole_sentences(name: str, text: str, hold
     """Wrong even where it would not be printed: the next seed may print it."""
     given: Any = {name: text}
     with pytest.raises(ValueError, match=rf"Fig\. 9: {name} = .*: must be a whole sentence"):
-        Claim(place="Fig. 9", says="it is so", found="it is", holds=holds, **given)
+        Claim(place="Fig. 9", statement="it is so", result="it is", holds=holds, **given)
 
 
 def test_what_does_not_hold_is_explained() -> None:
     with pytest.raises(ValueError, match=r"Fig\. 9: otherwise: say what to make of it"):
-        Claim(place="Fig. 9", says="it is so", found="it is", holds=True, otherwise="")
+        Claim(place="Fig. 9", statement="it is so", result="it is", holds=True, otherwise="")
 
 
 # --- without the packages of the extra [papers] ---------------------------------------------------------------

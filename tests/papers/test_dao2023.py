@@ -59,7 +59,7 @@ def test_too_large_a_gain_is_slow_at_a_finer_step_too(found: Study) -> None:
     assert SIGMAS[1::2] == (1000.0, 10_000.0)
     t = np.arange(40_001) / 1000.0
     x = robot.motion(robot.starts(SEED, 10), t)
-    finer = robot.follow(robot.proposed(0.001, SIGMAS[1::2]), t, x)
+    finer = robot.follow(robot.make_proposed(0.001, SIGMAS[1::2]), t, x)
 
     def medians(errors: robot.Errors) -> np.ndarray:
         late = (errors.t > 30.0) & (errors.t <= 40.0)
@@ -103,7 +103,7 @@ def test_stable_at_200_hz() -> None:
     sigmas = (10.0, 1000.0, 1e6)
     t = np.arange(20_001) * 0.005
     x = robot.motion(np.array([[0.5, 0.0], [-2.0, 1.0]]), t)
-    errors = robot.follow(robot.proposed(0.005, sigmas), t, x)
+    errors = robot.follow(robot.make_proposed(0.005, sigmas), t, x)
     assert np.isfinite(errors.state).all()
     tail = np.sqrt(np.mean(errors.state[16_000:] ** 2, axis=(0, 3)))
     print(f"at 200 Hz: state error RMS over 80-100 s {dict(zip(sigmas, tail.tolist(), strict=True))}")

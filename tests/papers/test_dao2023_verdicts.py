@@ -90,8 +90,8 @@ def test_parameters_at_the_end() -> None:
 def test_what_the_observer_finds_decides_what_is_meant(monkeypatch: pytest.MonkeyPatch) -> None:
     """(10) or (14): both are seen, a third is not."""
     for amplitude, verdict, scaled in ((2.0, WITHIN, True), (1.0, WITHIN, False), (1.5, "not reproduced", True)):
-        monkeypatch.setattr(as_printed, "amplitude_found_if_10_holds", lambda a=amplitude: np.array([a, a]))
-        claim = as_printed.printed()
+        monkeypatch.setattr(as_printed, "amplitude_under_10", lambda a=amplitude: np.array([a, a]))
+        claim = as_printed.misprint_claim()
         assert claim.verdict == verdict
         assert ("(14), not (10), scales d." in claim.conditions) is scaled
 
@@ -99,7 +99,7 @@ def test_what_the_observer_finds_decides_what_is_meant(monkeypatch: pytest.Monke
 def test_an_explicit_step_that_stays_bounded_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(as_printed, "explicit_escape", lambda *args: np.inf)
     monkeypatch.setattr(as_printed, "DURATION_S", 80.0)
-    claim = as_printed.sampled(lambda share: None)
+    claim = as_printed.sampling_claim(lambda share: None)
     assert claim.verdict == "reproduced"
     assert claim.figures["explicit_step_escapes_after_s"] is None
-    assert "stays bounded" in claim.found
+    assert "stays bounded" in claim.result

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from cmg_mj.errors import InputError
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, State, System
-from cmg_mj.papers.dao2023.pendulum_robot import one
+from cmg_mj.papers.dao2023.pendulum_robot import make_single
 
 N, NM, R, M, P = 3, 4, 2, 2, 2
 """n, nm, r, m, p of the random plants."""
@@ -277,7 +277,7 @@ def test_lists_are_taken() -> None:
 def test_a_gain_that_is_not_hurwitz_is_refused_on_demand() -> None:
     """The pendulum robot's A + L C2 has s^2 + s + 1; with the sign of L turned, s^2 - s - 1."""
     here = paper.system(0.0, 0.0)
-    one(0.005, 10.0).require_hurwitz(here)
+    make_single(0.005, 10.0).require_hurwitz(here)
     wrong = FriedlandTacker(0.005, paper.A_M, paper.C_M, -paper.L, paper.GAMMA, np.eye(1))
     with pytest.raises(InputError, match=r"^L: A \+ L C2 must be Hurwitz; it has the eigenvalue 1\.62"):
         wrong.require_hurwitz(here)

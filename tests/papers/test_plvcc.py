@@ -176,4 +176,4 @@ def test_a_broken_proof_is_not_reproduced(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(plvcc, "condition", lambda m1: right(m1) + sp.diff(m1, q2))
     claim = plvcc.claim("sokolov2019")
     assert claim.verdict == "not reproduced"
-    assert "mixed derivatives" in claim.why
+    assert "mixed derivatives" in claim.reason

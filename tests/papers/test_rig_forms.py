@@ -13,7 +13,7 @@ import pytest
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, violated_conditions
+from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, list_violations
 from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, System
 from tests.observers.reference import DT, HEAVY, rough_signals, run
@@ -122,6 +122,6 @@ def test_high_gain_equals_updated_high_gain(parameters: dict, model: ReducedMode
 
 def test_the_defaults_of_high_gain_are_inside_the_theorem() -> None:
     of = high_gain()
-    assert violated_conditions(2, of.d_inf, of.b) == []
+    assert list_violations(2, of.d_inf, of.b) == []
     assert BiLimitCorrection((of.l1, of.l2), of.d_inf) == BiLimitCorrection((29.5, 12.4), 0.6)
     assert np.roots([1.0, of.l1, of.l1 * of.l2]).real.max() < -10.0

@@ -19,9 +19,9 @@ from cmg_mj.papers.sokolov2019.figures_4_to_6 import (
     figure_6,
     figure_6_at_rest,
 )
-from cmg_mj.papers.sokolov2019.gap_prediction import Foreseen
-from cmg_mj.papers.sokolov2019.lag import Lags, predicted
-from cmg_mj.papers.sokolov2019.loops import Loops, better, deviation, loops, numbers, smaller, tail
+from cmg_mj.papers.sokolov2019.gap_prediction import PredictedCycle
+from cmg_mj.papers.sokolov2019.lag import Lags, predict
+from cmg_mj.papers.sokolov2019.loops import Loops, deviation, is_better, is_smaller, loops, numbers, tail
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.release import LAGS_S, Sweep, Threshold
 from cmg_mj.results.result import Outcome, Result
@@ -48,7 +48,7 @@ def lags() -> Lags:
         },
         thresholds={"linear": Threshold(0.0194, 0.0196), "luenberger": never, "homogeneous": never},
         latencies={},
-        predictions={name: predicted(name) for name in ("linear", "luenberger")},
+        predictions={name: predict(name) for name in ("linear", "luenberger")},
         tau=None,
         own_lag_s=0.0085,
     )
@@ -58,7 +58,10 @@ def lags() -> Lags:
 def cycles() -> Cycles:
     """What test_sokolov2019_backlash.py sees MuJoCo do."""
     ends = {"linear": 0.166, "luenberger": 0.219, "homogeneous": 0.097, WITH_Y2: 0.219}
-    foreseen: dict[str, Foreseen | None] = {"linear": Foreseen(0.155, 3.2), "luenberger": Foreseen(0.205, 0.8)}
+    foreseen: dict[str, PredictedCycle | None] = {
+        "linear": PredictedCycle(0.155, 3.2),
+        "luenberger": PredictedCycle(0.205, 0.8),
+    }
     return Cycles({name: Cycle(True, size, 1.0) for name, size in ends.items()}, foreseen)
 
 
@@ -68,7 +71,7 @@ def test_the_figures_on_other_seeds(found: Loops, lags: Lags, cycles: Cycles) ->
     assert cause_of_figure_5(cycles).verdict == "not reproduced"
     assert figure_6(found, cycles).verdict == "reproduced"
     assert figure_6_at_rest(lags, cycles).verdict == "not reproduced"
-    assert comparison.best(found).verdict == WITHIN
+    assert comparison.best_claim(found).verdict == WITHIN
     assert comparison.model_based(found).verdict == WITHIN
 
 
@@ -178,25 +181,26 @@ def replaced(result: Result, errors: np.ndarray, *, fell: int = 0) -> Result:
 
 def test_smaller_is_beyond_chance_and_world_by_world() -> None:
     low, high = made([1.0, 1.1, 1.2, 1.3]), made([1.1, 1.2, 1.3, 1.41])
-    assert smaller(low, high) is True
-    assert smaller(high, low) is False
+    assert is_smaller(low, high) is True
+    assert is_smaller(high, low) is False
     mixed = made([1.3, 0.9, 1.5, 1.2])  # larger in the mean, but not in every world: its interval holds zero
     assert np.mean(mixed.values(VELOCITY)) > np.mean(low.values(VELOCITY))
-    assert smaller(low, mixed) is False
-    assert smaller(low, made([2.0] * 4, fell=3)) is None
+    assert is_smaller(low, mixed) is False
+    assert is_smaller(low, made([2.0] * 4, fell=3)) is None
     assert (
-        smaller(made([9.0] * 4, tilts=[1.0, 1.1, 1.0, 1.1]), made([1.0] * 4, tilts=[2.0] * 4), "tilt_rms_deg") is True
+        is_smaller(made([9.0] * 4, tilts=[1.0, 1.1, 1.0, 1.1]), made([1.0] * 4, tilts=[2.0] * 4), "tilt_rms_deg")
+        is True
     )
 
 
 def test_better_counts_falls() -> None:
     low, high = made([1.0, 1.1, 1.2, 1.3]), made([1.1, 1.2, 1.3, 1.41])
-    assert better(low, high)
-    assert not better(high, low)
-    assert better(high, made([1.0] * 4, fell=4))
-    assert not better(made([1.0] * 4, fell=4), made([1.0] * 4, fell=4))
-    assert not better(made([1.0] * 4, fell=3), made([2.0] * 4, fell=4))  # it does not stand itself
-    assert not better(made([1.0, 1.1, 1.2, 0.0], fell=1), high)
+    assert is_better(low, high)
+    assert not is_better(high, low)
+    assert is_better(high, made([1.0] * 4, fell=4))
+    assert not is_better(made([1.0] * 4, fell=4), made([1.0] * 4, fell=4))
+    assert not is_better(made([1.0] * 4, fell=3), made([2.0] * 4, fell=4))  # it does not stand itself
+    assert not is_better(made([1.0, 1.1, 1.2, 0.0], fell=1), high)
 
 
 def ranking(linear: Result, luenberger: Result, homogeneous: Result) -> Mapping[str, Result]:
@@ -205,10 +209,10 @@ def ranking(linear: Result, luenberger: Result, homogeneous: Result) -> Mapping[
 
 def test_section_6_needs_both_steps_and_no_fall() -> None:
     worst, middle, best = (made([size, size + 0.1, size + 0.2, size + 0.31]) for size in (3.0, 2.0, 1.0))
-    assert comparison.ranked(ranking(worst, middle, best))
-    assert not comparison.ranked(ranking(middle, worst, best))  # without a model it is better than (9)
-    assert not comparison.ranked(ranking(worst, best, middle))  # (9) is better than (10)
-    assert not comparison.ranked(ranking(made([1.0] * 4, fell=4), made([2.0, 2.1, 2.0, 2.1], fell=1), best))
+    assert comparison.is_ranked(ranking(worst, middle, best))
+    assert not comparison.is_ranked(ranking(middle, worst, best))  # without a model it is better than (9)
+    assert not comparison.is_ranked(ranking(worst, best, middle))  # (9) is better than (10)
+    assert not comparison.is_ranked(ranking(made([1.0] * 4, fell=4), made([2.0, 2.1, 2.0, 2.1], fell=1), best))
 
 
 def test_verdict_of_the_comparison_follows_the_errors(found: Loops) -> None:
@@ -217,7 +221,7 @@ def test_verdict_of_the_comparison_follows_the_errors(found: Loops) -> None:
         return {**by_name, "homogeneous": replaced(by_name["homogeneous"], errors)}
 
     one_setting = found.by_bias | {0.25: spoilt(found.by_bias[0.25])}
-    assert comparison.best(found._replace(by_bias=one_setting)).verdict == "not reproduced"
+    assert comparison.best_claim(found._replace(by_bias=one_setting)).verdict == "not reproduced"
     everywhere = {e: spoilt(by_name) for e, by_name in found.by_bias.items()}
     worse = found._replace(by_bias=everywhere, gap=spoilt(found.gap))
     assert comparison.model_based(worse).verdict == "not reproduced"

@@ -33,11 +33,11 @@ def test_figure_3_on_other_seeds(tuning: figure_3.Tuning) -> None:
 
 def test_the_push_explains_the_error_of_9(tuning: figure_3.Tuning) -> None:
     error = tuning.error_of_9[tuning.window]
-    predicted = figure_3.predicted_error(tuning)[tuning.window]
-    assert 1.0 - np.var(error - predicted) / np.var(error) > 0.95
-    assert 1.0 - np.var(error + predicted) / np.var(error) < 0.0
+    predict = figure_3.predict_error(tuning)[tuning.window]
+    assert 1.0 - np.var(error - predict) / np.var(error) > 0.95
+    assert 1.0 - np.var(error + predict) / np.var(error) < 0.0
     # The observer also takes the commanded gimbal rate for the real one, which lags: a tenth of the error.
-    assert np.ptp(predicted) == pytest.approx(np.ptp(error), rel=0.15)
+    assert np.ptp(predict) == pytest.approx(np.ptp(error), rel=0.15)
 
 
 def test_9_and_its_form_with_y2_are_one_at_small_angles(tuning: figure_3.Tuning) -> None:

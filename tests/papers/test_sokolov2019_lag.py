@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.papers.sokolov2019 import lag, paper, release
-from cmg_mj.papers.sokolov2019.rig import experiment, servo_of
+from cmg_mj.papers.sokolov2019.rig import experiment, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, rig_matrices
 from cmg_mj.results.trajectory import Trajectory
 from tests.plant import paper_model
@@ -27,28 +27,28 @@ def test_what_counts_as_sustained() -> None:
 
 
 def servo() -> Servo:
-    return servo_of(experiment().plant)
+    return read_servo(experiment().plant)
 
 
 def test_servo_is_the_models() -> None:
     found = servo()
     assert (found.kp, found.kv) == (85.6, 0.731)
     assert found.inertia == pytest.approx(paper_model.I_c + paper_model.I_d, rel=1e-12)
-    assert found.damped(0.02).lag_s == found.softened(0.02).lag_s == pytest.approx(0.02)
-    soft = found.softened(0.02)
+    assert found.damp(0.02).lag_s == found.soften(0.02).lag_s == pytest.approx(0.02)
+    soft = found.soften(0.02)
     assert soft.kv == pytest.approx(2.0 * math.sqrt(soft.kp * soft.inertia))
 
 
 def test_a_servo_too_fast_for_the_integrator_is_refused() -> None:
     with pytest.raises(ValueError, match=r"kv h/I = 3\.\d+ must be at most 2\.7"):
-        release.release("linear", [servo().damped(0.06)])
+        release.release("linear", [servo().damp(0.06)])
 
 
 @pytest.mark.parametrize("lag_ms", [8.5, 15.0, 22.0])
 def test_pole_of_the_sampled_loop_is_mujocos(lag_ms: float) -> None:
     """Decay and frequency of a small release of the compiled bodies, against the eigenvalue."""
-    loop, own, dt = lag.linearised("linear")
-    varied = own.damped(1e-3 * lag_ms)
+    loop, own, dt = lag.linearise("linear")
+    varied = own.damp(1e-3 * lag_ms)
     pole = oscillation(loop(varied), dt)
     settings = ["plant.initial_tilt_deg=0.02", "duration_s=3.0"]
     trajectory = release.release("linear", [varied], settings)
@@ -107,9 +107,9 @@ def test_the_flywheels_torque_on_the_gimbal_counts(lags: lag.Lags, monkeypatch: 
         return A, B
 
     monkeypatch.setattr(sampled_loop, "rig_matrices", without)
-    predicted = lag.predicted("linear").servo_lag_s
-    assert predicted is not None
-    assert abs(predicted - (lags.thresholds["linear"].middle or 0.0)) > 1e-3
+    prediction = lag.predict("linear").servo_lag_s
+    assert prediction is not None
+    assert abs(prediction - (lags.thresholds["linear"].middle or 0.0)) > 1e-3
 
 
 def test_claim_of_the_lag(lags: lag.Lags) -> None:
@@ -122,12 +122,12 @@ def test_claim_of_the_lag(lags: lag.Lags) -> None:
 
 def test_a_soft_servo_does_not_make_it_oscillate() -> None:
     """As the linearised loop says: on MuJoCo, up to 100 ms."""
-    servos = [servo().softened(lag_s) for lag_s in (0.02, 0.04, 0.07, 0.1)]
+    servos = [servo().soften(lag_s) for lag_s in (0.02, 0.04, 0.07, 0.1)]
     assert not release.is_sustained(release.release("linear", servos)).any()
 
 
 def test_luenberger_oscillates_from_64_ms_on() -> None:
     """Beyond what RK4 takes at 1 ms."""
     settings = ["plant.timestep_s=0.0005"]
-    servos = [servo().damped(lag_s) for lag_s in (0.060, 0.069)]
+    servos = [servo().damp(lag_s) for lag_s in (0.060, 0.069)]
     assert release.is_sustained(release.release("luenberger", servos, settings)).tolist() == [False, True]

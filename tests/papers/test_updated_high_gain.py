@@ -168,7 +168,7 @@ def test_updated_is_the_general_form_without_degree() -> None:
     updated = UpdatedHighGain.updated(
         dt=0.01, f=general.f, a=general.a, l=(2.0, 1.0), Omega=general.Omega, **PHI, v=(0.4,)
     )
-    assert updated.violated_conditions() == []
+    assert updated.list_violations() == []
     states = [of.init((0.1,)) for of in (general, updated)]
     for k in range(50):
         states = [
@@ -251,7 +251,7 @@ def test_finds_the_state_of_a_third_order_system(error: float) -> None:
         2.0,
         v=(0.0, d),
     )
-    assert of.violated_conditions() == []
+    assert of.list_violations() == []
 
     def measured(t: float) -> tuple[float, float]:
         return math.sin(t), -math.cos(t) - power(-math.sin(t), 1.0 + d)
@@ -374,5 +374,5 @@ def test_the_step_is_stable_up_to_where_it_is_refused() -> None:
 
 def test_violated_conditions_are_reported_not_refused() -> None:
     of = example(2, 0.01, correction=BiLimitCorrection((1.0, 1.0), 0.9), b=0.41, v=(0.9,))
-    assert len(of.violated_conditions()) == 4
-    assert example(2, 0.01, b=0.3).violated_conditions() == []
+    assert len(of.list_violations()) == 4
+    assert example(2, 0.01, b=0.3).list_violations() == []

@@ -115,7 +115,7 @@ def largest_b(n: int, d_inf: float, v: Sequence[float] = ()) -> float:
     return min(bounds)
 
 
-def violated_conditions(n: int, d_inf: float, b: float, v: Sequence[float] = ()) -> list[str]:
+def list_violations(n: int, d_inf: float, b: float, v: Sequence[float] = ()) -> list[str]:
     """Which of the inequalities (21), (22) that the proof of Theorem 1 needs do not hold.
 
     Args:

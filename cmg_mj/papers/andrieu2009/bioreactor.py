@@ -120,7 +120,7 @@ class Bioreactor:
         vertex = np.minimum(np.maximum(-0.5 * m / _not_zero(m3), low), high)
         return _largest(lambda x2: m1 + m * (x2_hat + x2) + m3 * x2**2, low, high, vertex)
 
-    def Omega2(self, u: Array, x1: Array, x2_hat: Array, p: float, *, as_printed: bool = False) -> Array:
+    def Omega2(self, u: Array, x1: Array, x2_hat: Array, p: float, *, with_misprint: bool = False) -> Array:
         """Omega_2, for the updated gain and the homogeneous correction.
 
         Its last term is m3 x2^(2-p); the paper prints m2 there, which is not what its inequality needs. Its derivative
@@ -131,14 +131,14 @@ class Bioreactor:
             x1: x_1s.
             x2_hat: Estimate, limited.
             p: Power of the error term.
-            as_printed: Take m2 in the last term.
+            with_misprint: Take m2 in the last term.
 
         Returns:
             The bound.
         """
         _, m1, m2, m3 = self.coefficients(x1, u)
         low, high = self.x2_bounds(x1)
-        m, last_coefficient = m2 + m3 * x2_hat, m2 if as_printed else m3
+        m, last_coefficient = m2 + m3 * x2_hat, m2 if with_misprint else m3
         stationary = -m * (1.0 - p) / (_not_zero(last_coefficient) * (2.0 - p))
         stationary = np.minimum(np.maximum(stationary, low), high)
         rate_at_estimate = m1 + m * x2_hat

@@ -43,8 +43,9 @@ def invariance() -> Claim:
     reactor = Bioreactor(HBAR)
     return Claim(
         place="Section 3, (14), M_eta",
-        says="M_eta = {eta1 >= eps1, eta2 >= eps2, eta1 + eta2 <= 1} is forward invariant for u in [u_min, u_max].",
-        found="On its boundary the flow points inward or along it for hbar = 1 and 0.8 (least inflow "
+        statement="M_eta = {eta1 >= eps1, eta2 >= eps2, eta1 + eta2 <= 1} is forward invariant for u in [u_min, "
+        "u_max].",
+        result="On its boundary the flow points inward or along it for hbar = 1 and 0.8 (least inflow "
         f"{inflow[HBAR]:.1g} and {inflow[HBAR_OF_OBSERVERS]:.1g}, zero up to rounding at the corners for which eps1, "
         f"eps2 are made). Inputs 10 % above u_max lead out: {inflow_at_larger_input:.2g}. With u_min = 0.01, u_max = "
         f"0.7: eps1 = {reactor.eps1:.5f}, eps2 = {reactor.eps2:.5f}.",
@@ -80,9 +81,9 @@ def coordinates() -> Claim:
     slope, inverse = (max(column) for column in zip(*errors, strict=True))
     return Claim(
         place="Section 3, (15)",
-        says="In the coordinates x = F(eta) the system has the explicit observability canonical form, with f2 a "
+        statement="In the coordinates x = F(eta) the system has the explicit observability canonical form, with f2 a "
         "cubic in x2.",
-        found=f"At 2000 random states and inputs x2' along (14) equals (15) to {slope:.1e} of its largest value "
+        result=f"At 2000 random states and inputs x2' along (14) equals (15) to {slope:.1e} of its largest value "
         f"(central differences), for hbar = 1 and 0.8; F's inverse returns eta2 to {inverse:.1e}.",
         holds=slope < 1e-6 and inverse < 1e-9,
         figures={"largest_f2_error_ratio": slope, "largest_inverse_error_ratio": inverse},
@@ -125,7 +126,7 @@ def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> Incre
     point = x1[:, :1], x2_hat[:, :1], u[:, :1]
     Omega1 = reactor.Omega1(point[2], point[0], point[1])
     Omega2, Omega2_printed = (
-        reactor.Omega2(point[2], point[0], point[1], p, as_printed=flag) for flag in (False, True)
+        reactor.Omega2(point[2], point[0], point[1], p, with_misprint=flag) for flag in (False, True)
     )
     slope = np.abs(reactor.f2_slope(point[0], point[1], point[2]))
 
@@ -161,9 +162,9 @@ def increments() -> Claim:
     )
     return Claim(
         place="Section 3, Omega_1, Omega_2, c_inf",
-        says="|f2(x2) - f2(x2_hat)| is at most Omega_1 |x2 - x2_hat|, and at most Omega_2 |x2 - x2_hat| + c_inf |x2 "
-        "- x2_hat|^(1+p).",
-        found="Over a grid of 32^4 points of the domain (hbar = 0.8, p = 0.9) the left side is at most "
+        statement="|f2(x2) - f2(x2_hat)| is at most Omega_1 |x2 - x2_hat|, and at most Omega_2 |x2 - x2_hat| + c_inf "
+        "|x2 - x2_hat|^(1+p).",
+        result="Over a grid of 32^4 points of the domain (hbar = 0.8, p = 0.9) the left side is at most "
         f"{quotients.by_Omega1:.4f} and {quotients.by_Omega2:.4f} of the right sides, c_inf being "
         f"{quotients.c_inf:.0f}. With m2 in Omega_2, as printed, the second inequality holds as well "
         f"({quotients.by_Omega2_printed:.4f}), because so large a c_inf covers everything. With c_inf taken at each "
@@ -191,8 +192,8 @@ def order_of_bounds() -> Claim:
     )
     return Claim(
         place="Section 3, order of the bounds",
-        says="df2/dx2 <= Omega_2 <= Omega_1 <= df2_max over the whole domain.",
-        found=f"df2_max = {df2_max:.2f}. Largest quotients on the grid: |df2/dx2|/Omega_2 "
+        statement="df2/dx2 <= Omega_2 <= Omega_1 <= df2_max over the whole domain.",
+        result=f"df2_max = {df2_max:.2f}. Largest quotients on the grid: |df2/dx2|/Omega_2 "
         f"{quotients.slope_over_Omega2:.6f}, Omega_2/Omega_1 {quotients.Omega2_over_Omega1:.6f}, Omega_1/df2_max "
         f"{quotients.Omega1_over_largest:.4f}.",
         holds=other_bounds_hold and excess < 0.01,
@@ -214,8 +215,8 @@ def noise_level() -> Claim:
     tenth = 0.1 * (1.0 - reactor.eps2 - reactor.eps1)
     return Claim(
         place="Section 3.1, the noise",
-        says=f"The noise on eta1 has the standard deviation {NOISE}, said to be a tenth of the range of eta1.",
-        found=f"With eps1, eps2 from the paper's own formulas 10 % of [eps1, 1 - eps2] is {tenth:.4f}; {NOISE} is "
+        statement=f"The noise on eta1 has the standard deviation {NOISE}, said to be a tenth of the range of eta1.",
+        result=f"With eps1, eps2 from the paper's own formulas 10 % of [eps1, 1 - eps2] is {tenth:.4f}; {NOISE} is "
         f"{100.0 * 0.1 * NOISE / tenth:.1f} % of it.",
         holds=abs(tenth - NOISE) < 0.005,
         otherwise=f"The two figures do not agree. All else here uses {NOISE}; Fig. 2's order holds with either.",

@@ -31,9 +31,9 @@ def correction(run: Run, reference: Replay) -> Claim:
     difference = float(np.abs(reference.eta2_error - linear.eta2_error)[late].max())
     return Claim(
         place="Section 3.1, the homogeneous correction",
-        says="In Fig. 2 the homogeneous correction is linear for all that matters: the third observer is the best "
+        statement="In Fig. 2 the homogeneous correction is linear for all that matters: the third observer is the best "
         "because of Omega_2.",
-        found=f"The argument of q1 is at most {largest:.1e} after t = 5: its power 1/(1-p) = 10 adds {share_q1:.0e} "
+        result=f"The argument of q1 is at most {largest:.1e} after t = 5: its power 1/(1-p) = 10 adds {share_q1:.0e} "
         f"of the linear term, and q2's power 1.9 adds {share_q2:.1e}. With a linear correction and the same Omega_2 "
         f"the RMS error is {rms_linear:.5f} against {rms:.5f}, and no error differs by more than {difference:.1e}. "
         f"With b = {b_inside:.4f}, inside (21) and (22), it is {rms_inside:.5f}.",
@@ -41,7 +41,7 @@ def correction(run: Run, reference: Replay) -> Claim:
         conditions="With the parameters of section 3.1. What homogeneity gives is the right to use Omega_2; where the "
         "correction matters is large errors, as in Theorem 1 on system (1).",
         otherwise="The correction has its part in it.",
-        ours=True,
+        is_ours=True,
         figures={
             "largest_argument": largest,
             "q1_power_term_ratio": share_q1,
@@ -61,12 +61,12 @@ def simple_copy(study: Study) -> Claim:
     errors = copy_errors(study.run, Bioreactor(HBAR_OF_OBSERVERS))
     copy = errors[1]
     error = float(rms_late(study.run, copy).mean())
-    best_rms = float(rms_by_kind(study.run, study.found)[2].mean())
+    best_rms = float(rms_by_kind(study.run, study.nominal)[2].mean())
     # What the noise does: the same seed with noise and without.
     late = study.run.t > 5.0
     by_noise = {
         kind: float(np.sqrt(np.mean((part.eta2_error[late, 0] - study.quiet[kind].eta2_error[late, 0]) ** 2)))
-        for kind, part in study.found.items()
+        for kind, part in study.nominal.items()
     }
     least = min(by_noise.values())
     # (eta1 + eta2)' = u (1 - eta1 - eta2) whatever hbar is.
@@ -76,10 +76,10 @@ def simple_copy(study: Study) -> Claim:
     expected_share = float(np.exp(-0.02 * 10.0))
     return Claim(
         place="Footnote 1",
-        says="A model of the plant that just runs along feels no noise, but how fast its error fades is not ours to "
-        "choose.",
-        found="A copy of (14) with hbar = 0.8 does not use the measurement; the noise changes the observers' estimates "
-        f"by {least:.4f} RMS and more. From t = 10 to 20, at u = 0.02, the copy's error of eta1 + eta2 keeps "
+        statement="A model of the plant that just runs along feels no noise, but how fast its error fades is not ours "
+        "to choose.",
+        result="A copy of (14) with hbar = 0.8 does not use the measurement; the noise changes the observers' "
+        f"estimates by {least:.4f} RMS and more. From t = 10 to 20, at u = 0.02, the copy's error of eta1 + eta2 keeps "
         f"{share_left:.3f} of its size, as exp(-0.02 * 10) = {expected_share:.3f} demands, whatever one would like. In "
         f"this example it does no harm: after t = 5 the copy's RMS error is {error:.3f}, the best observer's "
         f"{best_rms:.3f}.",

@@ -97,9 +97,9 @@ def scaled_error(balls: np.ndarray, from_errors: np.ndarray) -> Claim:
     rows = [(kind, *(f"{ball:.1e}" for ball in row)) for kind, row in zip(KINDS, balls, strict=True)]
     return Claim(
         place="Section 2, (11)",
-        says="The scaled error is bounded by a function of its start that fades, plus one of the disturbances that is "
-        "zero at zero.",
-        found=f"From errors of x2 of {ERRORS[0]:g} to {ERRORS[-1]:g} it ends at {ends.max():.0e} at most. Under a "
+        statement="The scaled error is bounded by a function of its start that fades, plus one of the disturbances "
+        "that is zero at zero.",
+        result=f"From errors of x2 of {ERRORS[0]:g} to {ERRORS[-1]:g} it ends at {ends.max():.0e} at most. Under a "
         f"disturbance of amplitude 0.1, 0.01, 0.001 at {TURNS:g} rad per time its largest value after t = {LATE:g} "
         "shrinks with the amplitude, in f as well as in y.",
         table=markdown.table(("disturbance", *(f"{size:g}" for size in SIZES)), rows),
@@ -126,10 +126,11 @@ def gain_bound(from_errors: np.ndarray, from_gains: np.ndarray, of_solutions: np
     relative_spread = max(np.ptp(ends) / ends[0], np.ptp(from_gains) / from_gains[0])
     return Claim(
         place="Section 2, (12)",
-        says="L is bounded by 4 phi2, a function of the start that fades, and one of the disturbances, Gamma and x.",
-        found=f"From errors of x2 of {ERRORS[0]:g} to {ERRORS[-1]:g} L rises to {peaks[0]:.0f} to {peaks[-1]:.0f}, but "
-        f"its largest late value differs by {relative_spread:.0e} of itself only, from L(0) up to {GAINS[-1]:g} phi2 "
-        f"too. It follows the solution: {', '.join(f'{value:.0f}' for value in of_solutions)} for x1 of amplitude "
+        statement="L is bounded by 4 phi2, a function of the start that fades, and one of the disturbances, Gamma and "
+        "x.",
+        result=f"From errors of x2 of {ERRORS[0]:g} to {ERRORS[-1]:g} L rises to {peaks[0]:.0f} to {peaks[-1]:.0f}, "
+        f"but its largest late value differs by {relative_spread:.0e} of itself only, from L(0) up to {GAINS[-1]:g} "
+        f"phi2 too. It follows the solution: {', '.join(f'{value:.0f}' for value in of_solutions)} for x1 of amplitude "
         f"{', '.join(f'{a:g}' for a in SOLUTIONS)}.",
         holds=bool(relative_spread < 1e-3 and np.isfinite(peaks).all() and np.isfinite(of_solutions).all()),
         conditions="By simulation of system (1), p = 0.5, x1 = sin t, one observer: see Theorem 1.",

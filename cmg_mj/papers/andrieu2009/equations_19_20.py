@@ -24,7 +24,7 @@ MARGIN = 0.02
 """c1 and c2 must be at least so large, because the states tried leave some out."""
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """The first pair with which both hold."""
 
     d_inf: float
@@ -39,14 +39,14 @@ def exponent_of_scaling(d_inf: float) -> float:
     return min(1.0, 0.5 * largest_b(2, d_inf, (d_inf,)))
 
 
-def search(d_inf: float) -> Found | None:
+def search(d_inf: float) -> SearchResult | None:
     """Look for K and W with d_W = 2 + d_inf."""
     b = exponent_of_scaling(d_inf)
     for l1 in L1:
         for sigma in SIGMAS:
             W = Lyapunov(BiLimitCorrection((l1, 1.0), d_inf), sigma, 2.0 + d_inf)
             if min(decay(W, b, SPREAD)) > MARGIN:
-                return Found(d_inf, b, l1, sigma, decay(W, b, SPREAD, states(FINE, ANGLES)))
+                return SearchResult(d_inf, b, l1, sigma, decay(W, b, SPREAD, states(FINE, ANGLES)))
     return None
 
 
@@ -66,9 +66,9 @@ def claim() -> Claim:
     ]
     return Claim(
         place="Section 4.2, (19) and (20)",
-        says="There are K and a proper W, homogeneous in the bi-limit, that satisfy (19) and (20) for all A(t) within "
-        "(17) and the B of section 4.3.",
-        found=f"For n = 2, A1 and A2 within {SPREAD:g} of 1 and d_W = 2 + d_inf, a K and a W are found for "
+        statement="There are K and a proper W, homogeneous in the bi-limit, that satisfy (19) and (20) for all A(t) "
+        "within (17) and the B of section 4.3.",
+        result=f"For n = 2, A1 and A2 within {SPREAD:g} of 1 and d_W = 2 + d_inf, a K and a W are found for "
         f"{len(successes)} of {len(results)} d_inf. c1 and c2 are the largest constants at {len(FINE)} scales from "
         f"{FINE[0]:.0e} to {FINE[-1]:.0e}, {ANGLES} directions and more each.",
         table=markdown.table(("d_inf", "b", "l1", "sigma", "c1", "c2"), rows, text_columns=0),

@@ -15,7 +15,7 @@ RATES = ("df2_max", "Omega_1", "Omega_2", "df2/dx2")
 
 def ordered_rates(study: Study) -> tuple[np.ndarray, np.ndarray]:
     """Means of df2_max, Omega_1, Omega_2, df2/dx2 over windows and seeds, (4 rates, 4 windows); whether in order."""
-    rates = [study.found[kind].rate for kind in KINDS]
+    rates = [study.nominal[kind].rate for kind in KINDS]
     means = np.array([window_means(study.run, rate).mean(axis=1) for rate in (*rates, study.rate)])
     return means, np.asarray(np.all(np.diff(means, axis=0) <= 0.0, axis=0))
 
@@ -23,7 +23,7 @@ def ordered_rates(study: Study) -> tuple[np.ndarray, np.ndarray]:
 def figure_1(study: Study) -> Claim:
     """The estimates of the local incremental rate."""
     means, in_order = ordered_rates(study)
-    gains = {kind: window_means(study.run, study.found[kind].L).mean(axis=1) for kind in (UPDATED, HOMOGENEOUS)}
+    gains = {kind: window_means(study.run, study.nominal[kind].L).mean(axis=1) for kind in (UPDATED, HOMOGENEOUS)}
     gain_ratios = [
         gains[kind] / (PHI2 + PHI3 / PHI1 * means[i]) for i, kind in enumerate((UPDATED, HOMOGENEOUS), start=1)
     ]
@@ -33,10 +33,10 @@ def figure_1(study: Study) -> Claim:
 
     return Claim(
         place="Fig. 1",
-        says="With noise, too, the means come as df2_max >= Omega_1 >= Omega_2 >= df2/dx2.",
-        found=f"Means over t = 5-10, 15-20, 28-35, 42-50 and {study.run.y.shape[1]} seeds: df2_max {words(means[0])}; "
-        f"Omega_1 {words(means[1])}; Omega_2 {words(means[2])}; df2/dx2 {words(means[3])}: in order in "
-        f"{in_order.sum()} of 4 windows. L is {min(map(np.min, gain_ratios)):.3f} to "
+        statement="With noise, too, the means come as df2_max >= Omega_1 >= Omega_2 >= df2/dx2.",
+        result=f"Means over t = 5-10, 15-20, 28-35, 42-50 and {study.run.y.shape[1]} seeds: df2_max "
+        f"{words(means[0])}; Omega_1 {words(means[1])}; Omega_2 {words(means[2])}; df2/dx2 {words(means[3])}: in order "
+        f"in {in_order.sum()} of 4 windows. L is {min(map(np.min, gain_ratios)):.3f} to "
         f"{max(map(np.max, gain_ratios)):.3f} times phi2 + (phi3/phi1) Omega, as (13) says.",
         holds=bool(in_order.all()),
         otherwise="The means are not in order in every window.",
@@ -48,7 +48,7 @@ def figure_1(study: Study) -> Claim:
 
 def _picture(study: Study, means: np.ndarray) -> Picture:
     t = study.run.t
-    curves = [study.found[kind].rate[:, 0] for kind in KINDS] + [study.rate[:, 0]]
+    curves = [study.nominal[kind].rate[:, 0] for kind in KINDS] + [study.rate[:, 0]]
     middles = [(start + end) / 2.0 for start, end in WINDOWS]
 
     def lines(indices: tuple[int, ...]) -> list[Line]:

@@ -37,7 +37,7 @@ def share_in_order(rms: np.ndarray) -> float:
 
 def figure_2(study: Study) -> Claim:
     """The estimation errors."""
-    rms, loud = rms_by_kind(study.run, study.found), rms_by_kind(study.run, study.loud)
+    rms, loud = rms_by_kind(study.run, study.nominal), rms_by_kind(study.run, study.loud)
     share, share_loud = share_in_order(rms), share_in_order(loud)
     n = rms.shape[1]
     means, loud_means = rms.mean(axis=1), loud.mean(axis=1)
@@ -48,9 +48,9 @@ def figure_2(study: Study) -> Claim:
     )
     return Claim(
         place="Fig. 2",
-        says="The observer with Omega_2 and homogeneity gives the best estimate of eta2, the updated gain with "
+        statement="The observer with Omega_2 and homogeneity gives the best estimate of eta2, the updated gain with "
         "Omega_1 the second, the constant gain the worst.",
-        found=f"RMS error of eta2 after t = 5, mean of {n} seeds: {means[0]:.3f}, {means[1]:.3f}, {means[2]:.3f} "
+        result=f"RMS error of eta2 after t = 5, mean of {n} seeds: {means[0]:.3f}, {means[1]:.3f}, {means[2]:.3f} "
         f"(constant, updated, updated and homogeneous); in this order in {round(share * n)} of {n} seeds. With noise "
         f"of 10 % of the domain ({LOUD}): {loud_means[0]:.3f}, {loud_means[1]:.3f}, {loud_means[2]:.3f}; "
         f"{round(share_loud * n)} of {n}.",
@@ -69,7 +69,7 @@ def figure_2(study: Study) -> Claim:
 
 
 def _picture(study: Study) -> Picture:
-    mean_of_first = running_mean(study.run.t, study.found[CONSTANT].eta2_error[:, 0])
+    mean_of_first = running_mean(study.run.t, study.nominal[CONSTANT].eta2_error[:, 0])
     return Picture(
         "andrieu2009-fig-2",
         "andrieu2009, Fig. 2: error of eta2 given by each observer (one seed; black in (a): running mean over 1)",
@@ -77,7 +77,7 @@ def _picture(study: Study) -> Picture:
             Panel(
                 "eta2 error [-]",
                 [
-                    Line(study.run.t, study.found[kind].eta2_error[:, 0], kind, color=i, width=0.8 if i else 0.25),
+                    Line(study.run.t, study.nominal[kind].eta2_error[:, 0], kind, color=i, width=0.8 if i else 0.25),
                     *([] if i else [Line(study.run.t, mean_of_first, "mean over 1", "k-")]),
                 ],
                 f"({'abc'[i]})",
@@ -101,7 +101,7 @@ def biases(run: Run, replays: dict[str, Replay]) -> np.ndarray:
 
 def bias(study: Study) -> Claim:
     """The order of the biases in Fig. 2."""
-    noisy, quiet = biases(study.run, study.found), biases(study.quiet_run, study.quiet)
+    noisy, quiet = biases(study.run, study.nominal), biases(study.quiet_run, study.quiet)
     in_order = [(np.diff(values, axis=0) <= 0.0).all(axis=0) for values in (noisy, quiet)]
     rows = [
         (kind, noise, *(f"{value:.4f}" for value in row))
@@ -110,8 +110,8 @@ def bias(study: Study) -> Claim:
     ]
     return Claim(
         place="Section 3.1, bias in Fig. 2",
-        says="The larger an observer's estimate of the rate, the larger the bias of its error.",
-        found="A larger estimate goes with a larger mean error of eta2 in "
+        statement="The larger an observer's estimate of the rate, the larger the bias of its error.",
+        result="A larger estimate goes with a larger mean error of eta2 in "
         f"{in_order[0].sum()} of 4 windows with noise, {in_order[1].sum()} of 4 without.",
         table=markdown.table(("observer", "noise", *WINDOW_NAMES), rows, text_columns=2),
         holds=bool(np.all(in_order)),
@@ -122,7 +122,7 @@ def bias(study: Study) -> Claim:
 
 def bias_left(study: Study) -> np.ndarray:
     """Share of the bias that is left where the observers know hbar, (3 observers, 4 windows)."""
-    return np.abs(biases(study.run, study.exact) / biases(study.run, study.found))
+    return np.abs(biases(study.run, study.exact) / biases(study.run, study.nominal))
 
 
 def bias_of_constant_gain(study: Study) -> Claim:
@@ -130,8 +130,8 @@ def bias_of_constant_gain(study: Study) -> Claim:
     shares_left = bias_left(study)[0]
     return Claim(
         place="Section 3.1, bias of the constant gain",
-        says="The bias of the observer with constant gain in Fig. 2 is due to the error in hbar.",
-        found=f"With hbar exact {shares_left.min():.0%} to {shares_left.max():.0%} of it remain in the four windows.",
+        statement="The bias of the observer with constant gain in Fig. 2 is due to the error in hbar.",
+        result=f"With hbar exact {shares_left.min():.0%} to {shares_left.max():.0%} of it remain in the four windows.",
         holds=bool((shares_left < HALF).all()),
         otherwise="It is made by the noise, which sends the estimate from end to end of the domain, where the limits "
         "cut off one side more than the other.",
@@ -147,8 +147,8 @@ def bias_of_updated_gains(study: Study) -> Claim:
     other_windows = [name for name, is_due in zip(WINDOW_NAMES, due, strict=True) if not is_due]
     return Claim(
         place="Section 3.1, bias of the updated gains",
-        says="The biases of the observers with updated gain in Fig. 2 are due to the error in hbar.",
-        found="With hbar exact there remain "
+        statement="The biases of the observers with updated gain in Fig. 2 are due to the error in hbar.",
+        result="With hbar exact there remain "
         + "; ".join(
             f"{', '.join(f'{value:.0%}' for value in row)} ({kind})"
             for kind, row in zip(KINDS[1:], shares_left, strict=True)
@@ -171,8 +171,8 @@ def spread_correlation(study: Study) -> tuple[np.ndarray, np.ndarray, float, flo
         Spreads (3 observers, 4 windows), rates (3, 4), the rank correlation over all twelve, the least over the three
         observers of one window.
     """
-    spreads = np.array([window_spreads(study.run, study.found[kind].eta2_error).mean(axis=1) for kind in KINDS])
-    rates = np.array([window_means(study.run, study.found[kind].rate).mean(axis=1) for kind in KINDS])
+    spreads = np.array([window_spreads(study.run, study.nominal[kind].eta2_error).mean(axis=1) for kind in KINDS])
+    rates = np.array([window_means(study.run, study.nominal[kind].rate).mean(axis=1) for kind in KINDS])
 
     def correlation(a: np.ndarray, b: np.ndarray) -> float:
         return float(np.asarray(spearmanr(a.round(6), b)[0]))
@@ -191,8 +191,8 @@ def spread(study: Study) -> Claim:
     )
     return Claim(
         place="Section 3.1, standard deviation in Fig. 2",
-        says="The larger an observer's estimate of the rate, the more its error scatters.",
-        found="Standard deviation about a straight line in each window. Its rank correlation with the estimate is at "
+        statement="The larger an observer's estimate of the rate, the more its error scatters.",
+        result="Standard deviation about a straight line in each window. Its rank correlation with the estimate is at "
         f"least {in_window:.2f} over the observers of a window, {overall:.2f} over all twelve.",
         table=markdown.table(
             ("observer", *WINDOW_NAMES),

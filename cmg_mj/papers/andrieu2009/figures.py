@@ -18,6 +18,6 @@ def claims(on_share: OnShare) -> list[Claim]:
     on_share(0.7)
     figure_claims = [figure_1(results), figure_2(results), bias(results), bias_of_constant_gain(results)]
     figure_claims += [bias_of_updated_gains(results), spread(results)]
-    figure_claims.append(correction(results.run, results.found[HOMOGENEOUS]))
+    figure_claims.append(correction(results.run, results.nominal[HOMOGENEOUS]))
     on_share(0.95)
     return [*figure_claims, simple_copy(results)]

@@ -114,9 +114,9 @@ def no_observer_beyond_1() -> Claim:
     first = f" From x2(0) = {STARTS[misses.index(True)]:g} on it is missed." if count else ""
     return Claim(
         place="Section 2.1",
-        says="Once p exceeds 1, and with u = 0, no observer whatever can be sure to find x2 before the solution of (1) "
-        "ends.",
-        found=f"With p = {BEYOND} a solution from x2(0) = {STARTS[0]:g} to {STARTS[-1]:g} escapes at t = "
+        statement="Once p exceeds 1, and with u = 0, no observer whatever can be sure to find x2 before the solution "
+        "of (1) ends.",
+        result=f"With p = {BEYOND} a solution from x2(0) = {STARTS[0]:g} to {STARTS[-1]:g} escapes at t = "
         f"{runs[BEYOND][0].end_time:.2g} to {runs[BEYOND][-1].end_time:.2g}, by when y has moved by "
         f"{moved[0]:.2g} to {moved[-1]:.2g} only. A millionth of that time before the end the relative error of x2 is "
         f"above {MISSED} in {count} of {len(STARTS)}, {max(ends[BEYOND]):.2f} at worst.{first} With p = {INSIDE} "

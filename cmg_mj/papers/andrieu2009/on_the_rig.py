@@ -36,8 +36,8 @@ VELOCITY, TILT = "velocity_rms_error_rad_s", "tilt_rms_deg"
 def claims(on_share: OnShare) -> list[Claim]:
     """Velocity RMS errors beside those of aranovskiy2020's observers; how idle the update of the gain is."""
     on_share(0.0)
-    results = in_the_loop(list(KINDS), WORLDS, SEED)
-    return [compared(results), idle(results["high_gain"])]
+    results = run_kinds(list(KINDS), WORLDS, SEED)
+    return [comparison_claim(results), idle_claim(results["high_gain"])]
 
 
 def experiment(label: str, seed: int) -> Experiment:
@@ -46,14 +46,14 @@ def experiment(label: str, seed: int) -> Experiment:
     return prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], kind))
 
 
-def in_the_loop(labels: Sequence[str], worlds: int, seed: int) -> dict[str, Result]:
+def run_kinds(labels: Sequence[str], worlds: int, seed: int) -> dict[str, Result]:
     """Run some of `KINDS`."""
     return dict(
         zip(labels, run_side_by_side([run_of(experiment(label, seed), worlds) for label in labels]), strict=True)
     )
 
 
-def compared(results: dict[str, Result]) -> Claim:
+def comparison_claim(results: dict[str, Result]) -> Claim:
     """Who is how good."""
     errors = {label: result.values(VELOCITY) for label, result in results.items()}
     standing_counts = {label: int(result.stood.sum()) for label, result in results.items()}
@@ -66,7 +66,7 @@ def compared(results: dict[str, Result]) -> Claim:
         if difference is None:
             return f"{label} not comparable"
         word = "larger" if difference.low > 0.0 else "smaller" if difference.high < 0.0 else "not different"
-        return f"{label} {plus_minus(difference, signed=True)} ({word})"
+        return f"{label} {plus_minus(difference, with_sign=True)} ({word})"
 
     def means(key: str) -> str:
         return "; ".join(f"{label} {format_figure(key, result.mean(key))}" for label, result in results.items())
@@ -78,8 +78,8 @@ def compared(results: dict[str, Result]) -> Claim:
     )
     return Claim(
         place="On the rig",
-        says="The observer, as `high_gain`, holds the scissored pair through the push.",
-        found=f"high_gain holds it in {standing_counts['high_gain']} of {worlds} worlds. Velocity RMS error [rad/s]: "
+        statement="The observer, as `high_gain`, holds the scissored pair through the push.",
+        result=f"high_gain holds it in {standing_counts['high_gain']} of {worlds} worlds. Velocity RMS error [rad/s]: "
         f"{means(VELOCITY)}. Less theirs, over the worlds in which both stand: "
         + "; ".join(words(label, difference) for label, difference in differences.items())
         + f". Tilt RMS [deg]: {means(TILT)}.",
@@ -93,7 +93,7 @@ def compared(results: dict[str, Result]) -> Claim:
             "high_gain_less_other_rad_s": {label: d and list(d) for label, d in differences.items()},
         },
         pictures=[_picture(errors)],
-        ours=True,
+        is_ours=True,
     )
 
 
@@ -109,7 +109,7 @@ def _picture(errors: dict[str, np.ndarray]) -> Picture:
     return Picture("andrieu2009-rig", title, [panel])
 
 
-def idle(result: Result) -> Claim:
+def idle_claim(result: Result) -> Claim:
     """The update of the gain has nothing to do."""
     trajectory = trajectory_of(result)
     rig = experiment("high_gain", SEED)
@@ -122,14 +122,14 @@ def idle(result: Result) -> Claim:
     fastest = float(np.abs(np.roots([1.0, observer.l1, observer.l1 * observer.l2])).max())
     return Claim(
         place="On the rig, the gain",
-        says="On the scissored pair, whose f2 hardly depends on the rate, the update of the gain is idle.",
-        found=f"Along the {Omega.shape[1]} runs Omega = |u damping| is at most {largest:.5f} 1/s, RMS {rms:.5f} "
+        statement="On the scissored pair, whose f2 hardly depends on the rate, the update of the gain is idle.",
+        result=f"Along the {Omega.shape[1]} runs Omega = |u damping| is at most {largest:.5f} 1/s, RMS {rms:.5f} "
         f"1/s, against {fastest:.0f} 1/s of the observer's linear part; L stays between {observer.phi2:g} and "
         f"{gain:.4f}.",
         holds=gain < 1.05 * observer.phi2,
         otherwise="L moves by more than 5 %.",
         figures={"largest_Omega_1_s": largest, "rms_Omega_1_s": rms, "largest_L": gain, "linear_rate_1_s": fastest},
-        ours=True,
+        is_ours=True,
     )
 
 

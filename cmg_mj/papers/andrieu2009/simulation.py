@@ -86,11 +86,11 @@ def run_plant(seeds: Sequence[int], noise: float | Sequence[float] = NOISE, dt: 
         starts.append([np.array([plant.eps1, plant.eps2]) + room * rng.dirichlet((1.0, 1.0, 1.0))[:2] for _ in "ab"])
         disturbances.append(np.interp(t, np.arange(coarse + 1) * NOISE_PERIOD, rng.normal(size=coarse + 1)))
     start, estimate = np.moveaxis(np.array(starts), 0, -1)
-    eta = _integrated(plant, start, u, dt)
+    eta = _integrate(plant, start, u, dt)
     return Run(t, u, eta, eta[0] + noise * np.array(disturbances).T, estimate)
 
 
-def _integrated(model: Bioreactor, start: np.ndarray, u: np.ndarray, dt: float) -> np.ndarray:
+def _integrate(model: Bioreactor, start: np.ndarray, u: np.ndarray, dt: float) -> np.ndarray:
     """(14) from a start (2, runs) with inputs held from sample to sample, (2, n, runs)."""
     eta = np.empty((2, len(u), start.shape[1]))
     eta[:, 0] = state = start
@@ -101,7 +101,7 @@ def _integrated(model: Bioreactor, start: np.ndarray, u: np.ndarray, dt: float) 
 
 def copy_errors(run: Run, model: Bioreactor) -> np.ndarray:
     """Error of a copy of (14) without correction, from the observers' start, (2, n, seeds)."""
-    return run.eta - _integrated(model, run.start, run.u, float(run.t[1]))
+    return run.eta - _integrate(model, run.start, run.u, float(run.t[1]))
 
 
 def runge_kutta(slope: Callable[[np.ndarray], np.ndarray], state: np.ndarray, dt: float) -> np.ndarray:
@@ -181,7 +181,7 @@ def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B
     return Replay(x[1], run.eta[1] - eta2, rate, L, argument)
 
 
-def of_seeds(part: Run | Replay, columns: slice) -> Any:
+def select_seeds(part: Run | Replay, columns: slice) -> Any:
     """The same of some of the seeds."""
     common_fields = ("t", "u")
     return replace(
@@ -201,19 +201,19 @@ def incremental_rate(run: Run, model: Bioreactor) -> np.ndarray:
     return model.f2_slope(x1, x2, run.u)
 
 
-def in_windows(run: Run, values: np.ndarray) -> list[np.ndarray]:
+def split_windows(run: Run, values: np.ndarray) -> list[np.ndarray]:
     """The samples in each window, (samples, seeds)."""
     return [values[(run.t >= start) & (run.t < end)] for start, end in WINDOWS]
 
 
 def window_means(run: Run, values: np.ndarray) -> np.ndarray:
     """Mean over each window, (4, seeds)."""
-    return np.array([part.mean(axis=0) for part in in_windows(run, values)])
+    return np.array([part.mean(axis=0) for part in split_windows(run, values)])
 
 
 def window_spreads(run: Run, values: np.ndarray) -> np.ndarray:
     """Standard deviation over each window about a straight line through it, (4, seeds)."""
-    return np.array([detrend(part, axis=0).std(axis=0) for part in in_windows(run, values)])
+    return np.array([detrend(part, axis=0).std(axis=0) for part in split_windows(run, values)])
 
 
 def rms_late(run: Run, values: np.ndarray) -> np.ndarray:

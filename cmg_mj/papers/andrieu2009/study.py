@@ -13,10 +13,10 @@ from cmg_mj.papers.andrieu2009.simulation import (
     Replay,
     Run,
     incremental_rate,
-    of_seeds,
     replays,
     rms_late,
     run_plant,
+    select_seeds,
 )
 
 LOUD = 0.0986
@@ -27,7 +27,7 @@ class Study(NamedTuple):
     """All simulations of the bioreactor: columns are seeds."""
 
     run: Run
-    found: dict[str, Replay]
+    nominal: dict[str, Replay]
     """With the paper's noise and error of hbar."""
     loud: dict[str, Replay]
     """With noise of 10 % of the domain."""
@@ -57,10 +57,10 @@ def study(seeds: int, seed: int = 0, dt: float = 0.01) -> Study:
     model = Bioreactor(HBAR_OF_OBSERVERS)
     whole_replays = replays(whole_run, model)
     first, second, last = slice(0, seeds), slice(seeds, 2 * seeds), slice(2 * seeds, None)
-    run, quiet_run = of_seeds(whole_run, first), of_seeds(whole_run, last)
+    run, quiet_run = select_seeds(whole_run, first), select_seeds(whole_run, last)
 
     def columns(selection: slice) -> dict[str, Replay]:
-        return {kind: of_seeds(part, selection) for kind, part in whole_replays.items()}
+        return {kind: select_seeds(part, selection) for kind, part in whole_replays.items()}
 
     exact = replays(run, Bioreactor(HBAR))
     return Study(run, columns(first), columns(second), quiet_run, columns(last), exact, incremental_rate(run, model))

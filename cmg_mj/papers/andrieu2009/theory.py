@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.papers.andrieu2009 import equations_11_12, equations_19_20
-from cmg_mj.papers.andrieu2009.bi_limit import largest_b, violated_conditions
+from cmg_mj.papers.andrieu2009.bi_limit import largest_b, list_violations
 from cmg_mj.papers.andrieu2009.chain_of_integrators import theorem_2
 from cmg_mj.papers.andrieu2009.finite_escape import no_observer_beyond_1
 from cmg_mj.papers.andrieu2009.increments import exponent_of_6, increments, linear_increments
@@ -38,13 +38,13 @@ def claims(on_share: OnShare) -> list[Claim]:
 
 def scaling_conditions() -> Claim:
     """(21), (22) and the parameters of section 3.1."""
-    lines = violated_conditions(2, P, B, (P,))
+    lines = list_violations(2, P, B, (P,))
     bound = largest_b(2, P, (P,))
     return Claim(
         place="Section 4.3, (21), (22)",
-        says=f"b satisfies (21), (22), and section 3.1 uses b = {B} with p = {P}.",
-        found=f"For n = 2 both ask for b < (1 - p)/p = {bound:.4f}. With the printed values {len(lines)} inequalities "
-        "do not hold.",
+        statement=f"b satisfies (21), (22), and section 3.1 uses b = {B} with p = {P}.",
+        result=f"For n = 2 both ask for b < (1 - p)/p = {bound:.4f}. With the printed values {len(lines)} "
+        "inequalities do not hold.",
         table=markdown.table(("inequality", "is not so"), [line.split(": ", 1) for line in lines], text_columns=2),
         holds=not lines,
         otherwise="The parameters of the simulation are outside the theorem's proof. It does no harm there: the "
@@ -77,9 +77,9 @@ def gain_tracking() -> Claim:
     stays_above = min(least) >= 0.0
     return Claim(
         place="Section 2.2, (13)",
-        says="L tracks phi2 + (phi3/phi1) Omega up to an error proportional to |Omega'|, and from L(0) >= phi2 stays "
-        "at or above phi2.",
-        found=f"For Omega = 2 + sin(w t) the largest error falls from {errors[0]:.3f} at w = {rates[0]} by factors "
+        statement="L tracks phi2 + (phi3/phi1) Omega up to an error proportional to |Omega'|, and from L(0) >= phi2 "
+        "stays at or above phi2.",
+        result=f"For Omega = 2 + sin(w t) the largest error falls from {errors[0]:.3f} at w = {rates[0]} by factors "
         f"{', '.join(f'{quotient:.2f}' for quotient in quotients)} as w is halved; the least L - phi2 is "
         f"{min(least):.2g}.",
         holds=proportional and stays_above,

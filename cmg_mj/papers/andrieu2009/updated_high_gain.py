@@ -16,7 +16,7 @@ from cmg_mj.elementwise import Scalar, signed_power
 from cmg_mj.errors import InputError, shown
 from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.observers.model_copy import require_stable_step
-from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, violated_conditions
+from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, list_violations
 from cmg_mj.papers.require import require_number, require_positive
 
 Signals = tuple[Scalar, ...]
@@ -49,7 +49,7 @@ class UpdatedHighGain:
     L takes its exact solution over each half of the step for the Omega at its beginning.
 
     Theorem 1 asks for phi1 small and phi2, phi3 large enough: how far depends on constants that only its proof
-    bounds, so they are the user's to choose. What can be checked is `violated_conditions`; the paper's own example
+    bounds, so they are the user's to choose. What can be checked is `list_violations`; the paper's own example
     violates them, so that they are refused only on demand. Where all a_i are 1, gains are refused with which the
     linear part is unstable in a Runge-Kutta step at the gain at the start; how large L gets depends on Omega.
 
@@ -109,7 +109,7 @@ class UpdatedHighGain:
             names = "l, phi2" if self.L0 is None else "l, L0"
             poles = np.roots([1.0, *self.correction.linear_gains])
             require_stable_step(names, (self.L0 or self.phi2) * poles, self.dt)
-        if self.strict and (violations := self.violated_conditions()):
+        if self.strict and (violations := self.list_violations()):
             raise InputError(f"b = {self.b:g}: {'; '.join(violations)} (Theorem 1)")
 
     def _check_functions(self) -> None:
@@ -169,9 +169,9 @@ class UpdatedHighGain:
         b = min(1.0, 0.5 * largest_b(len(l), 0.0, v))
         return cls(dt, tuple(f), BiLimitCorrection(tuple(l)), Omega, b, phi1, phi2, phi3, v=tuple(v), **extras)
 
-    def violated_conditions(self) -> list[str]:
+    def list_violations(self) -> list[str]:
         """A line for each of the inequalities (21), (22) that does not hold."""
-        return violated_conditions(self.correction.n, self.correction.d_inf, self.b, self.v)
+        return list_violations(self.correction.n, self.correction.d_inf, self.b, self.v)
 
     def init(self, y: Signals, x: Signals | None = None) -> State:
         """The state at the first sample.

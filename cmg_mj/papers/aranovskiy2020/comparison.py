@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.words import listed_and
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import KEYS, format_figure
@@ -36,7 +36,7 @@ def differences(numbers: Numbers) -> list[Interval | None]:
     return [known_interval(numbers[worse] - numbers[better]) for worse, better in PAIRS]
 
 
-def order_of(numbers: Numbers) -> Order:
+def judge_order(numbers: Numbers) -> Order:
     """Whether homogeneous < ltv < linear beyond chance, the other way round, or neither."""
     steps = differences(numbers)
     if all(step is not None and step.low > 0.0 for step in steps):
@@ -46,7 +46,7 @@ def order_of(numbers: Numbers) -> Order:
     return "does not hold"
 
 
-class Measured(NamedTuple):
+class Measure(NamedTuple):
     """One measure, with the law on either kind of angles."""
 
     key: str
@@ -56,22 +56,22 @@ class Measured(NamedTuple):
     @property
     def orders(self) -> dict[AngleSource, Order]:
         """Which angles -> the order."""
-        return {angles: order_of(numbers) for angles, numbers in self.numbers.items()}
+        return {angles: judge_order(numbers) for angles, numbers in self.numbers.items()}
 
     @property
-    def best(self) -> dict[AngleSource, str]:
+    def best_observers(self) -> dict[AngleSource, str]:
         """Which angles -> the observer with the least mean over the worlds that stood."""
         return {
             angles: min(numbers, key=lambda name: float(np.nanmean(numbers[name])))
             for angles, numbers in self.numbers.items()
         }
 
-    def everywhere(self, order: Order) -> bool:
+    def has_order(self, order: Order) -> bool:
         """Whether the order is that one on all angles."""
         return set(self.orders.values()) == {order}
 
 
-def measured(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measured]:
+def read_measures(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measure]:
     """Read the measures off the runs.
 
     Args:
@@ -81,7 +81,7 @@ def measured(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measur
         One a measure.
     """
     return [
-        Measured(
+        Measure(
             key,
             {
                 angles: {name: result.values(key) for name, result in by_name.items()}
@@ -92,7 +92,7 @@ def measured(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measur
     ]
 
 
-def order(measures: list[Measured]) -> Claim:
+def order(measures: list[Measure]) -> Claim:
     """Section V's ranking.
 
     Args:
@@ -105,12 +105,13 @@ def order(measures: list[Measured]) -> Claim:
     worlds = len(next(iter(verdict_measure.numbers.values()))["linear"])
     return Claim(
         place="Section V, the comparison",
-        says="The homogeneous differentiator performs best, the time-varying observer second, the linear one last.",
-        found=(
+        statement="The homogeneous differentiator performs best, the time-varying observer second, the linear one "
+        "last.",
+        result=(
             f"Means over {worlds} seeds of (11), (10), (9); an order is one if both steps of it are beyond chance, "
             f"world by world. {' '.join(_in_words(measure) for measure in measures)}"
         ),
-        holds=verdict_measure.everywhere("holds"),
+        holds=verdict_measure.has_order("holds"),
         conditions=(
             f"{_by_measure(measures)} At e = 0.5 deg and 400 ug/rtHz under this push. At low noise or large bias the "
             "order turns round, because (11) mistakes the bias for a rate most: the map over noise and bias is in "
@@ -127,7 +128,7 @@ def order(measures: list[Measured]) -> Claim:
     )
 
 
-def _in_words(measure: Measured) -> str:
+def _in_words(measure: Measure) -> str:
     """One measure's means and order on each kind of angles."""
     parts = []
     for angles, numbers in measure.numbers.items():
@@ -138,22 +139,22 @@ def _in_words(measure: Measured) -> str:
     return f"{label[0].upper()}{label[1:]}: {'; '.join(parts)}."
 
 
-def _by_measure(measures: list[Measured]) -> str:
+def _by_measure(measures: list[Measure]) -> str:
     """By which measures the order is what."""
     sentences = []
     words: dict[Order, str] = {"holds": "the order holds", "is inverted": "it is inverted: (9), (10), (11)"}
     for kind, wording in words.items():
-        labels = [f"the {KEYS[measure.key].label}" for measure in measures if measure.everywhere(kind)]
+        labels = [f"the {KEYS[measure.key].label}" for measure in measures if measure.has_order(kind)]
         if labels:
-            sentences.append(f"By {listed_and(labels)} {wording}.")
+            sentences.append(f"By {join_with_and(labels)} {wording}.")
     for measure in measures:
-        if not (measure.everywhere("holds") or measure.everywhere("is inverted")):
-            best_equations = listed_and(sorted({OBSERVERS[name] for name in measure.best.values()}))
+        if not (measure.has_order("holds") or measure.has_order("is inverted")):
+            best_equations = join_with_and(sorted({OBSERVERS[name] for name in measure.best_observers.values()}))
             sentences.append(f"By the {KEYS[measure.key].label} it does not hold: best is {best_equations}.")
     return " ".join(sentences)
 
 
-def _picture(measures: list[Measured]) -> Picture:
+def _picture(measures: list[Measure]) -> Picture:
     panels = []
     for i, measure in enumerate(measures):
         most = max(float(np.nanmax(values)) for numbers in measure.numbers.values() for values in numbers.values())

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from cmg_mj.observers import Measurement
-from cmg_mj.papers.aranovskiy2020.forms_of_10 import METHODS, euler_against_exact, matrix_of, ours
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import METHODS, compare_euler, make_exact, matrix_of
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.claim import Claim, OnShare
@@ -78,7 +78,7 @@ def lowest_rate(method: str, sweep: Mapping[float, Transient], passes: Callable[
 
 def matrices_along(run: Trajectory) -> np.ndarray:
     """H of this package's observer along a run, from the second sample on, (n_ticks - 1, 3, 3)."""
-    observer = ours()
+    observer = make_exact()
     y1, y2, u = (run[name].tolist() for name in ("y1_rad", "y2_rad", "u_rad_s"))
     state, matrices = observer.init(Measurement(y1[0], y2[0])), []
     for k in range(1, len(y1)):
@@ -100,7 +100,7 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
     single_precision = {
         name: transient(name, 1.0 / DT, single_precision=True) for name in ("explicit Euler", "Runge-Kutta 4")
     }
-    comparison = euler_against_exact(seed)
+    comparison = compare_euler(seed)
     matrices = matrices_along(run_of_10(seed))
     condition = float(np.linalg.cond(matrices).max())
     least = float(np.linalg.eigvalsh(matrices).min())
@@ -109,13 +109,14 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
     ours_fine = at_200["exact step (ours)"].error < 1e-8 and definite["exact step (ours)"] is None
     return Claim(
         place="Remark 1, delicacy",
-        says="The Riccati equation is sensitive to the numerical method; six decades between Q's entries amplify it.",
-        found=(
+        statement="The Riccati equation is sensitive to the numerical method; six decades between Q's entries amplify "
+        "it.",
+        result=(
             "From H_0 = I at rest, H stays positive definite with explicit Euler "
             f"{_down_to(definite['explicit Euler'])}, with Runge-Kutta 4 {_down_to(definite['Runge-Kutta 4'])}, with "
-            f"the exact step {_down_to(definite['exact step (ours)'])}. At 200 Hz H12 is off, by its steady value, by "
-            f"up to {at_200['explicit Euler'].error:.0%} (Euler), {at_200['Runge-Kutta 4'].error:.1e} (Runge-Kutta 4) "
-            f"and {at_200['exact step (ours)'].error:.0e} (exact); in single precision by "
+            f"the exact step {_down_to(definite['exact step (ours)'])}. At 200 Hz H12 is off, by its steady "
+            f"value, by up to {at_200['explicit Euler'].error:.0%} (Euler), {at_200['Runge-Kutta 4'].error:.1e} "
+            f"(Runge-Kutta 4) and {at_200['exact step (ours)'].error:.0e} (exact); in single precision by "
             f"{single_precision['explicit Euler'].error:.0%} and {single_precision['Runge-Kutta 4'].error:.1e}. Along "
             f"a closed-loop run H's condition number rises to {condition:.2g}, its least eigenvalue stays above "
             f"{least:.2f}; all twelve equations by Euler would change the estimated rate by "

@@ -11,7 +11,7 @@ from cmg_mj.papers.aranovskiy2020.comparison import AngleSource
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import pushed, trajectory_of
+from cmg_mj.papers.recorded import push_intervals, trajectory_of
 from cmg_mj.papers.scales import on_common_scales
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.results.intervals import known_interval
@@ -27,7 +27,7 @@ SEED = 72_001
 WORLDS = 20
 
 
-def in_the_loop(
+def close_loops(
     observers: Sequence[str], angles: AngleSource, worlds: int, seed: int, duration_s: float = DURATION_S
 ) -> dict[str, Result]:
     """Each observer's estimate in the law, a push at 2 s."""
@@ -53,8 +53,8 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
     worlds = len(results["measured"].outcomes)
     return Claim(
         place=FIGURES[name],
-        says=f"With the estimate of {OBSERVERS[name]} in the law the rig stands, and recovers from a push.",
-        found=(
+        statement=f"With the estimate of {OBSERVERS[name]} in the law the rig stands, and recovers from a push.",
+        result=(
             f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, the law on measured or "
             f"on estimated angles. {sentences}"
         ),
@@ -78,7 +78,7 @@ def _picture(name: str, examples: Mapping[AngleSource, Trajectory]) -> Picture:
     """Two columns: the law on measured angles, the law on estimated ones."""
     rows: list[list[Panel]] = [[], [], [], []]
     for angles, example in examples.items():
-        t, shaded = example["time_s"], pushed(example)
+        t, shaded = example["time_s"], push_intervals(example)
         tilt = [
             Line(t, np.degrees(example["y1_rad"]), "measured y1", color=7, width=0.6),
             Line(t, np.degrees(example["x1_rad"]), "true x1", color=0),
@@ -107,7 +107,7 @@ def claims(on_share: OnShare) -> list[Claim]:
     """The three figures, and what Section V concludes from the same runs."""
     results: dict[AngleSource, dict[str, Result]] = {}
     for i, angles in enumerate(ANGLES):
-        results[angles] = in_the_loop(list(OBSERVERS), angles, WORLDS, SEED)
+        results[angles] = close_loops(list(OBSERVERS), angles, WORLDS, SEED)
         on_share((i + 1) / 3.0)
     exact = {
         second_place.TEN: results["measured"]["ltv"].values("velocity_rms_error_rad_s"),
@@ -116,6 +116,6 @@ def claims(on_share: OnShare) -> list[Claim]:
     errors = second_place.all_errors(exact, WORLDS, SEED)
     return [
         *on_common_scales([figure(name, {angles: results[angles][name] for angles in ANGLES}) for name in FIGURES]),
-        comparison.order(comparison.measured(results)),
+        comparison.order(comparison.read_measures(results)),
         second_place.cause(errors),
     ]

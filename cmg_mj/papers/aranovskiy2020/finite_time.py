@@ -40,7 +40,7 @@ class Decay(NamedTuple):
         return np.flatnonzero(np.diff(np.sign(self.rate)))
 
     @property
-    def shrinks(self) -> float:
+    def shrink_factor(self) -> float:
         """By which factor a half turn of the error is quicker than the one before it, in the mean."""
         spans = np.diff(self.time_s[self.turns])
         return float((spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1)))
@@ -53,10 +53,10 @@ class Decay(NamedTuple):
     @property
     def end_s(self) -> float:
         """When it is gone: the last turn and the geometric series of all turns to come; infinite if none is quicker."""
-        factor, (before, last) = self.shrinks, self.time_s[self.turns[-2:]]
+        factor, (before, last) = self.shrink_factor, self.time_s[self.turns[-2:]]
         return math.inf if factor > 0.99 else float(last + (last - before) * factor / (1.0 - factor))
 
-    def below(self, share: float) -> float:
+    def time_below(self, share: float) -> float:
         """From when on the rate's error stays below a share of its first size [s]."""
         return float(self.time_s[np.flatnonzero(np.abs(self.rate) > share)[-1] + 1])
 
@@ -95,7 +95,7 @@ def decay(alpha: float) -> Decay:
     return Decay(-lowest / math.log(10.0), time, np.exp(alpha * log_r) * z2)
 
 
-def of_the_observer(alpha: float) -> float:
+def observer_decay_time(alpha: float) -> float:
     """The same of the bench's observer, sampled often: from when on its error stays below `SEEN` [s]."""
     observer = make_observer("homogeneous", FINE_DT, printed_model(), alpha=alpha)
     rest_measurement = Measurement(0.0, 0.0)
@@ -112,20 +112,20 @@ def finite_time_claim() -> Claim:
     decays = {alpha: decay(alpha) for alpha in ALPHAS}
     finite = {alpha: d for alpha, d in decays.items() if alpha < 1.0}
     predicted_factors = {alpha: 10.0 ** ((alpha - 1.0) * d.decades_a_turn) for alpha, d in decays.items()}
-    factor_error = max(abs(d.shrinks / predicted_factors[alpha] - 1.0) for alpha, d in decays.items())
+    factor_error = max(abs(d.shrink_factor / predicted_factors[alpha] - 1.0) for alpha, d in decays.items())
     printed_alpha = TABLE_2["homogeneous"]["alpha"]
-    observer_s, equation_s = of_the_observer(printed_alpha), decays[printed_alpha].below(SEEN)
+    observer_s, equation_s = observer_decay_time(printed_alpha), decays[printed_alpha].time_below(SEEN)
     return Claim(
         place="After (11), finite time",
-        says="Were it not for the replaced x2 and sin(x1), the error would converge to the origin in finite time.",
-        found=(
+        statement="Were it not for the replaced x2 and sin(x1), the error would converge to the origin in finite time.",
+        result=(
             "k1, k2 of Table 2, no bias, no noise, at rest, a first error of 1 rad/s. By alpha the error is gone "
             f"after {', '.join(f'{alpha:g}: {d.end_s:.3f} s' for alpha, d in finite.items())}. Each half turn is "
-            f"quicker than the one before it, by the factors {', '.join(f'{d.shrinks:.3f}' for d in finite.values())}. "
-            f"By homogeneity the factor is that of the size, to the power 1 - alpha, which agrees to "
-            f"{factor_error:.1%}. With alpha = 1 each takes as long as the one before. At alpha = {printed_alpha:g} "
-            f"the bench's observer, sampled at {1.0 / FINE_DT:g} Hz, has fallen to {SEEN:g} rad/s after "
-            f"{observer_s:.4f} s, the differential equation after {equation_s:.4f} s."
+            "quicker than the one before it, by the factors "
+            f"{', '.join(f'{d.shrink_factor:.3f}' for d in finite.values())}. By homogeneity the factor is that of the "
+            f"size, to the power 1 - alpha, which agrees to {factor_error:.1%}. With alpha = 1 each takes as long as "
+            f"the one before. At alpha = {printed_alpha:g} the bench's observer, sampled at {1.0 / FINE_DT:g} Hz, has "
+            f"fallen to {SEEN:g} rad/s after {observer_s:.4f} s, the differential equation after {equation_s:.4f} s."
         ),
         holds=all(map(math.isfinite, (d.end_s for d in finite.values())))
         and math.isinf(decays[1.0].end_s)
@@ -135,7 +135,7 @@ def finite_time_claim() -> Claim:
         otherwise="The error does not fade as homogeneity has it.",
         figures={
             "gone_after_s": {str(alpha): d.end_s for alpha, d in finite.items()},
-            "time_of_a_half_turn_by_the_one_before": {str(alpha): d.shrinks for alpha, d in decays.items()},
+            "time_of_a_half_turn_by_the_one_before": {str(alpha): d.shrink_factor for alpha, d in decays.items()},
             "fallen_to_a_thousandth_after_s": {"observer": observer_s, "equation": equation_s},
         },
         pictures=[_picture(decays)],

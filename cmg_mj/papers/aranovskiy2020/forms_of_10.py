@@ -42,7 +42,7 @@ def rk4_as_printed(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
 
 def exact_step(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
     """One sample of this package's observer at rest, where A is that of `A_prime()`."""
-    observer = ours(h)
+    observer = make_exact(h)
     rest_measurement = Measurement(0.0, 0.0)
     entries = {"h11": H[0, 0], "h12": H[0, 1], "h22": H[1, 1], "h33": H[2, 2]}
     state = observer.init(rest_measurement)._replace(**{name: float(value) for name, value in entries.items()})
@@ -60,7 +60,7 @@ METHODS: dict[str, Method] = {
 
 
 @cache
-def ours(dt: float = DT) -> LinearTimeVarying:
+def make_exact(dt: float = DT) -> LinearTimeVarying:
     """This package's (10)."""
     return LinearTimeVarying(dt=dt, model=printed_model())
 
@@ -91,7 +91,7 @@ class Plain:
         return (x, self.method(H, A, self.dt)), x
 
 
-class Compared(NamedTuple):
+class Comparison(NamedTuple):
     """Two forms of (10) along a closed-loop run, from 0.2 s on."""
 
     difference: float
@@ -102,15 +102,15 @@ class Compared(NamedTuple):
     """RMS error of the other [rad/s]."""
 
 
-def compared(form: Observer, other_form: Observer, seed: int) -> Compared:
+def compare(form: Observer, other_form: Observer, seed: int) -> Comparison:
     """Replay both on a run with (10) in the loop."""
     run = run_of_10(seed)
     later = run["time_s"] > 0.2
     truth = run["x2_rad_s"][later]
     rate, other_rate = (replay(observer, run).x2[later] for observer in (form, other_form))
-    return Compared(*(float(rms(error)) for error in (other_rate - rate, rate - truth, other_rate - truth)))
+    return Comparison(*(float(rms(error)) for error in (other_rate - rate, rate - truth, other_rate - truth)))
 
 
-def euler_against_exact(seed: int) -> Compared:
+def compare_euler(seed: int) -> Comparison:
     """What all twelve equations by explicit Euler change."""
-    return compared(ours(), Plain(euler), seed)
+    return compare(make_exact(), Plain(euler), seed)

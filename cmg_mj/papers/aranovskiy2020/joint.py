@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, level_at, worth_it
+from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, beats_zero, level_at
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.words import listed_and
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.studies.tuning import NoiseLevelResult
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
@@ -21,7 +21,7 @@ def is_best(level: NoiseLevelResult) -> bool:
     return level.verdict == "tie" or level.ratio.mean <= ROUNDED
 
 
-class Together(NamedTuple):
+class JointExperiment(NamedTuple):
     """The three observers in one experiment: one push on one rig, recorded at one noise."""
 
     push: str
@@ -35,30 +35,30 @@ class Together(NamedTuple):
         return f"{self.push}, {self.noise_ug_rthz:g} ug/rtHz"
 
     @property
-    def worst(self) -> float:
+    def largest_ratio(self) -> float:
         """Table 2's error by that of the tuned, of the observer of which it is largest."""
         return max(level.ratio.mean for level in self.levels.values())
 
     @property
-    def worth_it(self) -> bool:
+    def beats_zero(self) -> bool:
         """Whether all three, tuned, are closer to the gyro than zero: nobody tunes where the best is not to move."""
-        return all(worth_it(level) for level in self.levels.values())
+        return all(beats_zero(level) for level in self.levels.values())
 
     @property
-    def best(self) -> list[str]:
+    def best_observers(self) -> list[str]:
         """The observers whose given parameters are the best ones."""
         return [name for name, level in self.levels.items() if is_best(level)]
 
 
-def experiments(studies: Studies) -> Iterator[Together]:
+def experiments(studies: Studies) -> Iterator[JointExperiment]:
     """All that were tried."""
     for push, by_name in studies.items():
         for level in by_name["linear"].levels:
             noise = level.noise_ug_rthz
-            yield Together(push, noise, {name: level_at(study, noise) for name, study in by_name.items()})
+            yield JointExperiment(push, noise, {name: level_at(study, noise) for name, study in by_name.items()})
 
 
-def listed(joint_experiments: Sequence[Together]) -> str:
+def list_experiments(joint_experiments: Sequence[JointExperiment]) -> str:
     """Experiments push by push: `1 N m, e = 0.5 deg at 100, 200; 0.3 N m, e = 0 at 100 ug/rtHz`."""
     noises: dict[str, list[str]] = {}
     for experiment in joint_experiments:
@@ -66,53 +66,53 @@ def listed(joint_experiments: Sequence[Together]) -> str:
     return "; ".join(f"{push} at {', '.join(densities)}" for push, densities in noises.items()) + " ug/rtHz"
 
 
-def nearest_joint(studies: Studies) -> Together:
+def nearest_joint(studies: Studies) -> JointExperiment:
     """The experiment at which the worst of the three loses least, of those worth tuning in if there are any."""
     candidates = list(experiments(studies))
     return min(
-        [experiment for experiment in candidates if experiment.worth_it] or candidates,
-        key=lambda experiment: experiment.worst,
+        [experiment for experiment in candidates if experiment.beats_zero] or candidates,
+        key=lambda experiment: experiment.largest_ratio,
     )
 
 
 def joint_claim(studies: Studies) -> Claim:
     """Whether one experiment has all three lines of Table 2."""
     nearest, candidates = nearest_joint(studies), list(experiments(studies))
-    tunable = [experiment for experiment in candidates if experiment.worth_it]
-    least = min(candidates, key=lambda experiment: experiment.worst)
+    tunable = [experiment for experiment in candidates if experiment.beats_zero]
+    least = min(candidates, key=lambda experiment: experiment.largest_ratio)
     ratios = "; ".join(
         f"{OBSERVERS[name]} {level.ratio.mean:.3f} ({level.ratio.low:.3f} to {level.ratio.high:.3f})"
         for name, level in nearest.levels.items()
     )
-    misfits = [OBSERVERS[name] for name in nearest.levels if name not in nearest.best]
+    misfits = [OBSERVERS[name] for name in nearest.levels if name not in nearest.best_observers]
     return Claim(
         place="Table 2, the three together",
-        says="The three observers were tuned on the same collected data: Fig. 4's one experiment.",
-        found=(
+        statement="The three observers were tuned on the same collected data: Fig. 4's one experiment.",
+        result=(
             f"{len(studies)} pushes at several noises, {len(candidates)} experiments, each recorded once for all "
             f"three. In {len(tunable)} of them all three can be tuned to follow the gyro better than an estimate of "
             f"zero does. Of these Table 2's lines come nearest to being the best together at {nearest.words}. There "
             f"Table 2's error by that of the tuned is {ratios}. Zero left aside it is {least.words}, where the worst "
-            f"has {least.worst:.2f} times the error of the tuned. {_apart(studies)}"
+            f"has {least.largest_ratio:.2f} times the error of the tuned. {_describe_separate_optima(studies)}"
         ),
-        holds=nearest.worth_it and not misfits,
+        holds=nearest.beats_zero and not misfits,
         conditions=f"At {nearest.words} (the bench's own noise is {DEFAULT_NOISE:g}); the paper gives neither.",
         otherwise=(
-            f"No experiment tried has all three: where the worst loses least, {listed_and(misfits)} is not the best."
+            f"No experiment tried has all three: where the worst loses least, {join_with_and(misfits)} is not the best."
             if misfits
             else "Where all three are the best, an estimate of zero is better still."
         )
         + " The paper gives neither its push nor its noise.",
         figures={
             "experiment": nearest.words,
-            "worst_table_2_by_tuned_error": {experiment.words: experiment.worst for experiment in candidates},
+            "worst_table_2_by_tuned_error": {experiment.words: experiment.largest_ratio for experiment in candidates},
             "worth_tuning_in": [experiment.words for experiment in tunable],
         },
         pictures=[_picture(studies)],
     )
 
 
-def _apart(studies: Studies) -> str:
+def _describe_separate_optima(studies: Studies) -> str:
     """Where each line is best by itself."""
     push = next(iter(studies))
     parts = []

@@ -42,7 +42,7 @@ def trade(tau: float, seed: int = SEED) -> Trade:
     return Trade(float(late), float(np.sqrt(np.mean(x2[settling_ticks:, 1:] ** 2))))
 
 
-def foreseen(tau: float) -> Trade:
+def predict_trade(tau: float) -> Trade:
     """From G = s/(tau s + 1)^2, whose phase falls with the slope 2 tau.
 
     A sample of noise is a triangle in time, two samples wide: the weights are the impulse response's means over it. For
@@ -60,16 +60,16 @@ def foreseen(tau: float) -> Trade:
 def lag_claim(seed: int = SEED) -> Claim:
     """A longer tau: less noise, more lag."""
     trades = {tau: trade(tau, seed) for tau in TAUS_S}
-    lag_error = max(abs(t.lag_s / foreseen(tau).lag_s - 1.0) for tau, t in trades.items())
-    noise_error = max(abs(t.noise_gain_1_s / foreseen(tau).noise_gain_1_s - 1.0) for tau, t in trades.items())
+    lag_error = max(abs(t.lag_s / predict_trade(tau).lag_s - 1.0) for tau, t in trades.items())
+    noise_error = max(abs(t.noise_gain_1_s / predict_trade(tau).noise_gain_1_s - 1.0) for tau, t in trades.items())
     gains = [t.noise_gain_1_s for t in trades.values()]
     taus = ", ".join(f"{tau:g}" for tau in trades)
     lags = ", ".join(f"{1e3 * t.lag_s:.0f}" for t in trades.values())
     noises = ", ".join(f"{t.noise_gain_1_s:.2f}" for t in trades.values())
     return Claim(
         place="(9), lag and noise",
-        says="A filter with the differentiator reduces noise, but lag distorts the estimate: tau trades them.",
-        found=(
+        statement="A filter with the differentiator reduces noise, but lag distorts the estimate: tau trades them.",
+        result=(
             f"With tau = {taus} s the lag on a steady acceleration is {lags} ms. The noise gain, the RMS of the "
             f"estimate by that of white noise in y1 at 200 Hz, is {noises} 1/s. The lag is 2 tau to {lag_error:.1g}, "
             f"the noise gain that of the transfer function to {noise_error:.1%}. For a long tau it falls as "
@@ -90,11 +90,11 @@ def _picture(trades: dict[float, Trade]) -> Picture:
     fine = np.geomspace(TAUS_S[0], TAUS_S[-1], 50)
     lags = [
         Line(TAUS_S, [1e3 * t.lag_s for t in trades.values()], "measured", "o", color=1),
-        Line(fine, [1e3 * foreseen(tau).lag_s for tau in fine], "2 tau", color=7),
+        Line(fine, [1e3 * predict_trade(tau).lag_s for tau in fine], "2 tau", color=7),
     ]
     noise = [
         Line(TAUS_S, [t.noise_gain_1_s for t in trades.values()], "measured", "o", color=1),
-        Line(fine, [foreseen(tau).noise_gain_1_s for tau in fine], "of the transfer function", color=7),
+        Line(fine, [predict_trade(tau).noise_gain_1_s for tau in fine], "of the transfer function", color=7),
     ]
     x = "tau [s]"
     return Picture(

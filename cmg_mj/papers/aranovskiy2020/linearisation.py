@@ -26,8 +26,8 @@ def linearisation() -> Claim:
     margin_at_rest = controllability_margin(still_model.A_e, still_model.B_e)
     return Claim(
         place="(6), Section III",
-        says="A and B linearise (4); the pair (A_e, B_e) with the integrator is controllable.",
-        found=(
+        statement="A and B linearise (4); the pair (A_e, B_e) with the integrator is controllable.",
+        result=(
             f"Central differences of (4) give A and B to {error:.1e}. The controllability matrix of (A_e, B_e) has "
             f"full rank: its least singular value is {margin:.1e} of the largest; with the flywheels at rest it is "
             f"{margin_at_rest:.0e}."
@@ -53,11 +53,11 @@ def law_equilibria() -> Claim:
     stable = max(np.real(poles_7).max(), np.real(poles_8).max()) < 0.0
     return Claim(
         place="(7), (8)",
-        says=(
+        statement=(
             "Static feedback leaves the gimbal off by k1/k3 e; with the integrator x goes to zero and x_e settles at "
             "k_e1/k_e4 e (both printed with a minus)."
         ),
-        found=(
+        result=(
             f"Per radian of e, (7) rests at x3 = {rest_7[2]:+.1f} and (8) at x = 0 with x_e = {rest_8[3]:+.1f} s; the "
             f"closed forms agree to {largest_error:.0e}. Poles of (7): {poles_in_words(poles_7)}; of (8): "
             f"{poles_in_words(poles_8)} 1/s."

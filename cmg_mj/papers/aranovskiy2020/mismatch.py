@@ -56,27 +56,27 @@ class Mismatch:
         change: What it does to a rig.
         sizes: How large it is.
         unit: Of the sizes.
-        shown: Number by which a size is multiplied to be shown in that unit.
-        foreseen: Whether `foreseen_yaw_rate` has it.
+        display_factor: Number by which a size is multiplied to be shown in that unit.
+        is_predictable: Whether `predict_yaw_rate` has it.
     """
 
     kind: str
     change: Change
     sizes: Sequence[float]
     unit: str
-    shown: float
-    foreseen: bool = True
+    display_factor: float
+    is_predictable: bool = True
 
 
 MISMATCHES = (
     Mismatch("flywheel speed", slower_flywheel, (0.01, 0.02, 0.05, 0.1), "%", 100.0),
     Mismatch("gimbal offset", gimbal_offset, (1.0, 2.0, 5.0, 10.0), "deg", 1.0),
     Mismatch("servo gain", servo_gain, (0.02, 0.05, 0.1, 0.2), "%", 100.0),
-    Mismatch("gimbal friction", gimbal_friction, (0.1, 0.3, 1.0), "N m", 1.0, foreseen=False),
+    Mismatch("gimbal friction", gimbal_friction, (0.1, 0.3, 1.0), "N m", 1.0, is_predictable=False),
 )
 
 
-class Ran(NamedTuple):
+class MismatchRuns(NamedTuple):
     """Symmetric and broken rigs on the same noise and push."""
 
     plant: Plant
@@ -94,7 +94,7 @@ class Ran(NamedTuple):
 
 def run_all(
     mismatches: Sequence[Mismatch], worlds: int, seed: int, duration_s: float, settings: Sequence[str] = ()
-) -> Ran:
+) -> MismatchRuns:
     """Run every mismatch in some worlds, all at once, with (11) in the loop and the push of Figs 5 to 7."""
     # A rig is changed after its step has been chosen, and friction wants a short one to conserve momentum.
     experiment = push_recovery("homogeneous", seed, ["plant.timestep_s=0.001", *settings], duration_s)
@@ -105,4 +105,4 @@ def run_all(
     plants = [rig for rig in rigs for _ in range(worlds)]
     symmetric, *broken = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).split(len(rigs))
     kinds = [(mismatch.kind, size) for mismatch, size in cases]
-    return Ran(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))
+    return MismatchRuns(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.forms_of_10 import Compared, Method, Plain, compared, rk4, rk4_as_printed
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import Comparison, Method, Plain, compare, rk4, rk4_as_printed
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime
 from cmg_mj.papers.aranovskiy2020.rig import SEED_OF_10
 from cmg_mj.papers.claim import Claim, OnShare
@@ -20,15 +20,15 @@ HARMLESS = 0.05
 class Misprint(NamedTuple):
     """What the printed Riccati equation changes."""
 
-    corrected: np.ndarray
+    corrected_H: np.ndarray
     """H where the corrected equation settles at rest, (3, 3)."""
-    printed: np.ndarray
+    printed_H: np.ndarray
     """H where the printed one does, (3, 3)."""
-    rate: Compared
+    rate: Comparison
     """The corrected form and the printed one along a closed-loop run."""
 
 
-def settled(method: Method, h: float = 1e-3) -> np.ndarray:
+def settle(method: Method, h: float = 1e-3) -> np.ndarray:
     """H where a method settles at rest, (3, 3)."""
     H = H_0
     for _ in range(round(SETTLING_S / h)):
@@ -38,8 +38,8 @@ def settled(method: Method, h: float = 1e-3) -> np.ndarray:
 
 def misprint(seed: int = SEED_OF_10) -> Misprint:
     """Integrate both equations, at rest and along a run, with Runge-Kutta 4."""
-    comparison = compared(Plain(rk4), Plain(rk4_as_printed), seed)
-    return Misprint(settled(rk4), settled(rk4_as_printed), comparison)
+    comparison = compare(Plain(rk4), Plain(rk4_as_printed), seed)
+    return Misprint(settle(rk4), settle(rk4_as_printed), comparison)
 
 
 def misprint_claim(seed: int = SEED_OF_10) -> Claim:
@@ -49,8 +49,8 @@ def misprint_claim(seed: int = SEED_OF_10) -> Claim:
     gain = float(np.abs(printed_H[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
     return Claim(
         place="After (10), the Riccati equation",
-        says="The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
-        found=(
+        statement="The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
+        result=(
             f"With A of (6) as printed, H settles at rest with H12 = {printed_H[0, 1]:.1f} and H21 = "
             f"{printed_H[1, 0]:.1f}: not symmetric, by {asymmetry:.1%}. With A'^T in A^T's place both are "
             f"{H[1, 0]:.1f}. The observer uses H C^T alone, of which the largest change is {gain:.2%} of its largest "

@@ -66,8 +66,8 @@ def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
     bound = min(pair[0] for pair in extremes), max(pair[1] for pair in extremes)
     return Claim(
         place="After (10)",
-        says="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
-        found=(
+        statement="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
+        result=(
             "[C; C A'; C A'^2] has rank 3 for every u and y2: its rows hold e1, e3 and e2, whatever a = -u J2 sin(2 "
             f"y2)/D is (least by largest singular value at least {margin:.2f}; without the tilt measured "
             f"{margin_without_tilt:.0e}). Uniformity needs a bounded a besides, which the rate limit gives: |a| <= "

@@ -27,11 +27,11 @@ class Instructions(NamedTuple):
     """Instructions of an update of the observer alone, the median along a run.
 
     Attributes:
-        of: By observer, those of the package and (10) written out.
+        by_observer: By observer, those of the package and (10) written out.
         counted_here: Whether they were counted now, or read from the file.
     """
 
-    of: dict[str, float]
+    by_observer: dict[str, float]
     counted_here: bool
 
 

@@ -149,8 +149,8 @@ def lqr_gains() -> Claim:
     gains = ", ".join(f"{gain:.4g}" for gain in nearest.gain)
     return Claim(
         place="Table 2, K_e",
-        says="K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
-        found=(
+        statement="K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
+        result=(
             f"The return difference |1 + K_e (jw - A_e)^-1 B_e| is nowhere below {inverse.least:.6f}: K_e "
             f"{'is' if inverse.optimal else 'is not'} optimal for some quadratic cost, {recovery}. {digits}"
             f"To the digits printed Q = diag({weights}), R = 1 {'does' if nearest.off < 1.0 else 'comes nearest'}: it "

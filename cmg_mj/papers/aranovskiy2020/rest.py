@@ -61,12 +61,12 @@ class Rest(NamedTuple):
     example: Trajectory
     """World 0."""
 
-    def at_zero(self, expected_x_e: float) -> bool:
+    def is_at_zero(self, expected_x_e: float) -> bool:
         """Whether x rests at zero and the integrator where it should, within a twentieth of e and of the offset."""
         return abs(self.x1.mean) < BIAS_DEG / 20.0 and abs(self.x_e.mean / expected_x_e - 1.0) < 0.05
 
 
-def rests_of(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list[Rest]:
+def find_rests(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list[Rest]:
     """Let the rig come to rest, without a push: a case of `CASES`, how many worlds, and settings beside its own."""
     common_settings = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
     runs = []
@@ -77,11 +77,12 @@ def rests_of(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list
         )
     results = run_side_by_side(runs)
     return [
-        _rest(CASES[case].observer, trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)
+        _measure_rest(CASES[case].observer, trajectory_of(result))
+        for (case, *_), result in zip(cases, results, strict=True)
     ]
 
 
-def _rest(observer: str, trajectory: Trajectory) -> Rest:
+def _measure_rest(observer: str, trajectory: Trajectory) -> Rest:
     late = trajectory["time_s"] >= DURATION_S - AVERAGED_S
 
     def mean(name: str, factor: float = 1.0) -> Interval:
@@ -129,14 +130,14 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
     x_e, x3 = integrator_rest(math.radians(BIAS_DEG)), gimbal_rest(BIAS_DEG)
     return Claim(
         place="(7), (8) on the rig",
-        says="Without the integrator the gimbal rests away from zero; with it x converges to zero.",
-        found=(
+        statement="Without the integrator the gimbal rests away from zero; with it x converges to zero.",
+        result=(
             f"Six bodies, e = {BIAS_DEG:g} deg, the true rate in the law. k4 = 0: x3 rests at {static.x3.mean:.2f} "
             f"deg (k1/k3 e = {x3:.2f}). With K_e, mean over the last {AVERAGED_S:g} s of {DURATION_S:g}, {WORLDS} "
-            f"seeds: tilt {plus_minus(rest.x1, signed=True)} deg, gimbal {rest.x3.mean:+.2f} deg, x_e = "
+            f"seeds: tilt {plus_minus(rest.x1, with_sign=True)} deg, gimbal {rest.x3.mean:+.2f} deg, x_e = "
             f"{rest.x_e.mean:.3f} rad s (+k_e1/k_e4 e = {x_e:.3f})."
         ),
-        holds=rest.at_zero(x_e) and abs(static.x3.mean / x3 - 1.0) < 0.05,
+        holds=rest.is_at_zero(x_e) and abs(static.x3.mean / x3 - 1.0) < 0.05,
         conditions="With the signs that follow from y1 = x1 - e: k1/k3 e and +k_e1/k_e4 e.",
         otherwise="They rest elsewhere.",
         figures={
@@ -165,18 +166,18 @@ def observers_claim(rests: Mapping[str, Rest]) -> Claim:
     expected_x_e = {case: expected_integrator(case, BIAS_DEG, sigma) for case in observer_rests}
     quiet = steady("homogeneous", BIAS_DEG, 0.0)[1]
     observers_text = "; ".join(
-        f"{case}: rate estimated {rest.x2_estimated.mean:+.4f} rad/s, tilt {plus_minus(rest.x1, signed=True)} "
+        f"{case}: rate estimated {rest.x2_estimated.mean:+.4f} rad/s, tilt {plus_minus(rest.x1, with_sign=True)} "
         f"deg, x_e {rest.x_e.mean:.3f} rad s ({expected_x_e[case]:.3f} expected)"
         for case, rest in observer_rests.items()
     )
     return Claim(
         place="After (10), the equilibrium",
-        says="The integral action makes x = 0 the equilibrium even with an observer whose estimate e biases.",
-        found=(
+        statement="The integral action makes x = 0 the equilibrium even with an observer whose estimate e biases.",
+        result=(
             f"The same rig with an observer in the law, {WORLDS} seeds. {observers_text}. Without noise (11) would "
             f"estimate {quiet:+.4f} rad/s: its gains fall with the size of its error, so noise adds to its bias."
         ),
-        holds=all(rest.at_zero(expected_x_e[case]) for case, rest in observer_rests.items()),
+        holds=all(rest.is_at_zero(expected_x_e[case]) for case, rest in observer_rests.items()),
         otherwise="The rest is not where it should be.",
         figures={
             key: value
@@ -208,7 +209,7 @@ def _picture(rests: Mapping[str, Rest]) -> Picture:
 def claims(on_share: OnShare) -> list[Claim]:
     """The laws with the true rate, then with observers."""
     without_integrator = (TRUE_RATE, 2, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
-    *case_rests, static = rests_of([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
+    *case_rests, static = find_rests([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
     on_share(0.9)
     rests = dict(zip(CASES, case_rests, strict=True))
     return [laws_claim(rests[TRUE_RATE], static), observers_claim(rests)]

@@ -53,39 +53,39 @@ PUSHES = (
 
 
 @dataclass(frozen=True)
-class Tuned:
+class TuningCase:
     """What is tuned of an observer.
 
     Attributes:
         observer: Its name.
         equation: Its number in the paper.
         parameters: What is tuned of it.
-        printed: Table 2's line.
+        table_line: Table 2's line.
         share: Of the time that the three take.
     """
 
     observer: str
     equation: str
     parameters: Sequence[str]
-    printed: str
+    table_line: str
     share: float
 
 
-LINEAR = Tuned("linear", "(9)", ["tau"], "tau = 0.02", 0.15)
-LTV = Tuned("ltv", "(10)", ["Q[1]"], "Q = diag(1, 5e6, 1)", 0.4)
-HOMOGENEOUS = Tuned("homogeneous", "(11)", ["k1", "k2", "alpha"], "[k1, k2, alpha] = [20, 150, 0.85]", 0.45)
+LINEAR = TuningCase("linear", "(9)", ["tau"], "tau = 0.02", 0.15)
+LTV = TuningCase("ltv", "(10)", ["Q[1]"], "Q = diag(1, 5e6, 1)", 0.4)
+HOMOGENEOUS = TuningCase("homogeneous", "(11)", ["k1", "k2", "alpha"], "[k1, k2, alpha] = [20, 150, 0.85]", 0.45)
 CASES = (LINEAR, LTV, HOMOGENEOUS)
 
 Studies = Mapping[str, Mapping[str, TuningResult]]
 """Words of the push -> observer -> its study."""
 
 
-def _scenario(case: Tuned, push: Push, seed: int) -> Scenario:
+def _scenario(case: TuningCase, push: Push, seed: int) -> Scenario:
     return load_scenario("observer_tuning", [f"seed={seed}", *push.settings], case.observer)
 
 
-def study_of(
-    case: Tuned,
+def tune_case(
+    case: TuningCase,
     push: Push,
     seed: int,
     worlds: int,
@@ -118,7 +118,7 @@ def study_of(
 
 
 def all_studies(
-    seed: int, worlds: int, on_share: OnShare, pushes: Sequence[Push] = PUSHES, cases: Sequence[Tuned] = CASES
+    seed: int, worlds: int, on_share: OnShare, pushes: Sequence[Push] = PUSHES, cases: Sequence[TuningCase] = CASES
 ) -> dict[str, dict[str, TuningResult]]:
     """Tune every observer on the same recordings of every push."""
     studies: dict[str, dict[str, TuningResult]] = {}
@@ -132,7 +132,7 @@ def all_studies(
             def share(part: float, before: float = share_done, case_share: float = case_share) -> None:
                 on_share(before + part * case_share)
 
-            studies[push.words][case.observer] = study_of(case, push, seed, worlds, recorded, share)
+            studies[push.words][case.observer] = tune_case(case, push, seed, worlds, recorded, share)
             share_done += case_share
     return studies
 
@@ -142,12 +142,14 @@ def level_at(study: TuningResult, noise_ug_rthz: float) -> NoiseLevelResult:
     return next(level for level in study.levels if level.noise_ug_rthz == noise_ug_rthz)
 
 
-def worth_it(level: NoiseLevelResult) -> bool:
+def beats_zero(level: NoiseLevelResult) -> bool:
     """Whether the tuned observer is closer to the gyro than an estimate of zero, on the held-out worlds."""
     return float(level.rms.mean()) < level.zero_rms
 
 
-def in_the_loop(trials: Sequence[tuple[Tuned, NoiseLevelResult, Push]], worlds: int, seed: int) -> list[Interval]:
+def compare_in_loop(
+    trials: Sequence[tuple[TuningCase, NoiseLevelResult, Push]], worlds: int, seed: int
+) -> list[Interval]:
     """Velocity RMS error in the closed loop, Table 2's by the tuned, world by world, under that push and noise."""
     runs = []
     for case, level, push in trials:

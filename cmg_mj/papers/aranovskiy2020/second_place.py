@@ -60,13 +60,14 @@ def cause(errors: Errors) -> Claim:
     share_text = "-" if share is None else f"{share:.0%}"
     return Claim(
         place="Section V, the cause of the second place",
-        says="That (10) comes after (11) is partly due to the numerical computations that (10) takes.",
-        found=(
+        statement="That (10) comes after (11) is partly due to the numerical computations that (10) takes.",
+        result=(
             f"The loop closed on either, {len(errors[TEN])} seeds, e = 0.5 deg, 400 ug/rtHz, the law on measured "
             f"angles. Velocity RMS error of (10) less that of (11): {plus_minus(exact)} rad/s with exact steps, "
             f"{plus_minus(by_euler)} with one explicit Euler step a sample in both. The method makes "
             f"{plus_minus(method)} of it, {share_text}. With H by Euler, too, (10) has "
-            f"{plus_minus(gain, signed=True)} rad/s more error than with the exact H and Euler in the estimate alone."
+            f"{plus_minus(gain, with_sign=True)} rad/s more error than with the exact H and Euler in the estimate "
+            "alone."
         ),
         holds=_positive(method) and _positive(exact),
         conditions=(

@@ -82,7 +82,7 @@ def run(worlds: int, seed: int, duration_s: float = DURATION_S) -> Servos:
     return Servos(experiment.run_many(worlds), dict(zip(DEADBANDS, groups, strict=True)), soft)
 
 
-def tracking(result: Result) -> Interval | None:
+def measure_tracking(result: Result) -> Interval | None:
     """RMS of the gimbals' rate less the command, means over `MEANS_S`, by that of the command; worlds that stood."""
     run = trajectory_of(result)
     span = round(MEANS_S / float(run["time_s"][1] - run["time_s"][0]))
@@ -107,7 +107,7 @@ def servo_claim(servos: Servos) -> Claim:
         for d in fall_shares
         if fall_shares[d] == 0.0 and max(abs(velocity[d].mean - 1.0), abs(tilt[d].mean - 1.0)) < WITHIN
     ]
-    tracking_errors = {d: tracking(result) for d, result in servos.velocity.items()}
+    tracking_errors = {d: measure_tracking(result) for d, result in servos.velocity.items()}
     safe_deadbands = [d for d in fall_shares if fall_shares[d] == 0.0]
     ratios_text = ", ".join(f"{d:g}: {velocity[d].mean:.2f} and {tilt[d].mean:.2f}" for d in safe_deadbands if d > 0.0)
     falling = [f"{d:g}" for d in fall_shares if fall_shares[d] > 0.0]
@@ -115,15 +115,16 @@ def servo_claim(servos: Servos) -> Claim:
     bench = ratio_interval(*(r.values("velocity_rms_error_rad_s") for r in (servos.position, smooth)))
     return Claim(
         place="After (2), the servos",
-        says="The gimbals' servos ensure velocity tracking, so that omega_c can be taken for an input.",
-        found=(
+        statement="The gimbals' servos ensure velocity tracking, so that omega_c can be taken for an input.",
+        result=(
             f"Servos in velocity mode with a lag of {1e3 * LAG_S:g} ms and a deadband, (11) in the loop, "
             f"{len(smooth.outcomes)} seeds, the push of Figs 5 to 7. Over {MEANS_S:g} s the gimbal is off its command "
             f"by {_share(tracking_errors[0.0])} of it (RMS) without a deadband, by {_share(error_at_resolution)} with "
             f"the resolution of the MX-106, {RESOLUTION:g} rad/s. With a lag of {1e3 * SOFT_LAG_S:g} ms, and so less "
-            f"torque against the flywheel's, it is {_share(tracking(servos.soft))}. By deadband [rad/s], velocity RMS "
-            f"error and tilt RMS by those without: {ratios_text}. The rig falls with {', '.join(falling) or 'none'}. "
-            f"The bench's own servo, which integrates its command, has {bench.mean:.2f} times the velocity error."
+            f"torque against the flywheel's, it is {_share(measure_tracking(servos.soft))}. By deadband [rad/s], "
+            f"velocity RMS error and tilt RMS by those without: {ratios_text}. The rig falls with "
+            f"{', '.join(falling) or 'none'}. The bench's own servo, which integrates its command, has "
+            f"{bench.mean:.2f} times the velocity error."
         ),
         holds=RESOLUTION in harmless and error_at_resolution is not None and error_at_resolution.mean < WITHIN,
         conditions=(
@@ -136,7 +137,7 @@ def servo_claim(servos: Servos) -> Claim:
             "velocity_rms_error_by_none": list(velocity.values()),
             "tilt_rms_by_none": list(tilt.values()),
             "tracking_error_share": list(tracking_errors.values()),
-            "tracking_error_share_soft": tracking(servos.soft),
+            "tracking_error_share_soft": measure_tracking(servos.soft),
             "fell_fraction": list(fall_shares.values()),
             "bench_servo_velocity_rms_error_by_none": bench,
         },

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from cmg_mj.papers.aranovskiy2020.paper import printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.words import listed_and
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.summary_keys import format_figure
 from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
@@ -34,17 +34,17 @@ class Gain(NamedTuple):
         return math.sqrt(self.l2)
 
 
-def damped(speed: float) -> Gain:
+def damped_gain(speed: float) -> Gain:
     """The gain whose poles lie 45 degrees off the real axis, as those of the frozen Riccati gain do [rad/s]."""
     return Gain(math.sqrt(2.0) * speed, speed**2)
 
 
 PREDECESSOR, FROZEN = "predecessor's", "frozen"
 GAINS: dict[str, Gain] = {
-    "slow": damped(10.0),
+    "slow": damped_gain(10.0),
     PREDECESSOR: Gain(20.0, 150.0),
-    "medium": damped(20.0),
-    "fast": damped(30.0),
+    "medium": damped_gain(20.0),
+    "fast": damped_gain(30.0),
     FROZEN: Gain(*settled_gains()),
 }
 """From slow to fast. The predecessor's is of its Table II, the frozen one is where the Riccati equation settles."""
@@ -70,7 +70,7 @@ class Fate(NamedTuple):
     """Mean velocity RMS error of those that stood [rad/s]; None if none did."""
 
 
-def fates_of(
+def find_fates(
     observers: Sequence[tuple[str, Sequence[str]]],
     biases_deg: Sequence[float],
     worlds: int,
@@ -104,7 +104,7 @@ def fates_of(
     ]
 
 
-def observer_of(cell: Cell) -> tuple[str, list[str]]:
+def choose_observer(cell: Cell) -> tuple[str, list[str]]:
     """The observer with that gain and model, and its settings.
 
     With alpha = 1, (11) is the first two states of (10) with a constant gain.
@@ -144,37 +144,37 @@ class Factorial(NamedTuple):
         return [c for c in self.cells if c[0] in PRINTED and self.cells[c][JUDGED_DEG].fell == 1.0]
 
 
-def remark(fates_by_cell: Factorial) -> Claim:
+def remark(experiment: Factorial) -> Claim:
     """The remark, over gain, model and bias.
 
     Args:
-        fates_by_cell: The fates.
+        experiment: The fates.
 
     Returns:
         The claim.
     """
-    safe_gains = [gain for gain in GAINS if all(fates_by_cell.stands_everywhere((gain, model)) for model in MODELS)]
+    safe_gains = [gain for gain in GAINS if all(experiment.stands_everywhere((gain, model)) for model in MODELS)]
     return Claim(
         place="Section V, the time-invariant observer",
-        says="A linear time-invariant observer, which is a particular case of (10), could not stabilise the rig.",
-        found=(
-            f"{len(GAINS)} constant gains by 2 models by {len(fates_by_cell.whole)} biases, {WORLDS} seeds each, the "
+        statement="A linear time-invariant observer, which is a particular case of (10), could not stabilise the rig.",
+        result=(
+            f"{len(GAINS)} constant gains by 2 models by {len(experiment.whole)} biases, {WORLDS} seeds each, the "
             "push of Figs 5 to 7, the law on measured angles. "
-            f"{' '.join(_of_model(fates_by_cell, model) for model in MODELS)} {_stands(safe_gains)} Velocity RMS error "
-            f"of the frozen gain with gravity at y1 at {JUDGED_DEG:g} deg "
-            f"{_error(fates_by_cell.cells[FROZEN, MEASURED][JUDGED_DEG])} rad/s, of (10) itself "
-            f"{_error(fates_by_cell.whole[JUDGED_DEG])}. At rest e biases the estimated rate by "
+            f"{' '.join(_describe_model(experiment, model) for model in MODELS)} {_describe_safe_gains(safe_gains)} "
+            f"Velocity RMS error of the frozen gain with gravity at y1 at {JUDGED_DEG:g} deg "
+            f"{_error(experiment.cells[FROZEN, MEASURED][JUDGED_DEG])} rad/s, of (10) itself "
+            f"{_error(experiment.whole[JUDGED_DEG])}. At rest e biases the estimated rate by "
             f"{rate_bias((PREDECESSOR, LINEAR)):.1f} e/s with the predecessor's gain on the linear model, by "
             f"{rate_bias((FROZEN, MEASURED)):.1f} e/s with the frozen one and gravity at y1."
         ),
-        holds=bool(fates_by_cell.failing),
-        conditions=_conditions(fates_by_cell, safe_gains),
+        holds=bool(experiment.failing),
+        conditions=_conditions(experiment, safe_gains),
         otherwise=(
             f"At e = {JUDGED_DEG:g} deg neither the predecessor's gain nor the frozen one of (10) falls in every "
             "world, with either model, where (10) stands."
         ),
         figures={
-            "bias_deg": list(fates_by_cell.whole),
+            "bias_deg": list(experiment.whole),
             **{
                 f"{gain}, {model}": {
                     "l1_1_s": GAINS[gain].l1,
@@ -183,43 +183,43 @@ def remark(fates_by_cell: Factorial) -> Claim:
                     "fell_fraction": [fate.fell for fate in fates.values()],
                     "velocity_rms_error_rad_s": [fate.error for fate in fates.values()],
                 }
-                for (gain, model), fates in fates_by_cell.cells.items()
+                for (gain, model), fates in experiment.cells.items()
             },
-            "fell_fraction (10)": [fate.fell for fate in fates_by_cell.whole.values()],
-            "velocity_rms_error (10)_rad_s": [fate.error for fate in fates_by_cell.whole.values()],
+            "fell_fraction (10)": [fate.fell for fate in experiment.whole.values()],
+            "velocity_rms_error (10)_rad_s": [fate.error for fate in experiment.whole.values()],
         },
-        pictures=[_picture(fates_by_cell)],
+        pictures=[_picture(experiment)],
     )
 
 
-def _of_model(fates_by_cell: Factorial, model: str) -> str:
+def _describe_model(experiment: Factorial, model: str) -> str:
     """From which bias on each gain falls in every world."""
     parts = []
     for gain, (_, l2) in GAINS.items():
-        falls = fates_by_cell.falls_at((gain, model))
+        falls = experiment.falls_at((gain, model))
         fate = f"from {min(falls):g} deg" if falls else "at none"
         parts.append(f"{gain} ({math.sqrt(l2):.0f} rad/s) {fate}")
     return f"With {model} it falls in every world: {', '.join(parts)}."
 
 
-def _stands(gains: Sequence[str]) -> str:
+def _describe_safe_gains(gains: Sequence[str]) -> str:
     if not gains:
         return "No gain stands at every bias with both models."
-    return f"At every bias and with both models it stands with the gains {listed_and(gains)}."
+    return f"At every bias and with both models it stands with the gains {join_with_and(gains)}."
 
 
-def _conditions(fates_by_cell: Factorial, safe_gains: Sequence[str]) -> str:
+def _conditions(experiment: Factorial, safe_gains: Sequence[str]) -> str:
     """What falls, and that it is not the constancy of the gain."""
-    cells = [f"the {gain} gain and {model}" for gain, model in fates_by_cell.failing]
-    sentences = [f"At e = {JUDGED_DEG:g} deg, with {listed_and(cells)}." if cells else "Nowhere."]
+    cells = [f"the {gain} gain and {model}" for gain, model in experiment.failing]
+    sentences = [f"At e = {JUDGED_DEG:g} deg, with {join_with_and(cells)}." if cells else "Nowhere."]
     if FROZEN in safe_gains:
         sentences.append(
             "It is not that the gain is constant: frozen at the value at which the Riccati equation settles, it "
             "stands with either model at every bias tried."
         )
-    sensitive_models = [model for model in MODELS if fates_by_cell.falls_at((PREDECESSOR, model))]
+    sensitive_models = [model for model in MODELS if experiment.falls_at((PREDECESSOR, model))]
     if len(sensitive_models) == 2:
-        first = {model: min(fates_by_cell.falls_at((PREDECESSOR, model))) for model in MODELS}
+        first = {model: min(experiment.falls_at((PREDECESSOR, model))) for model in MODELS}
         sentences.append(
             f"It is that the gain is small, and then the model: the predecessor's falls from {first[LINEAR]:g} deg "
             f"with {LINEAR}, from {first[MEASURED]:g} deg with {MEASURED}."
@@ -231,16 +231,16 @@ def _error(fate: Fate) -> str:
     return format_figure("velocity_rms_error_rad_s", fate.error)
 
 
-def _picture(fates_by_cell: Factorial) -> Picture:
+def _picture(experiment: Factorial) -> Picture:
     shares, errors = [], []
     for model in MODELS:
         falls, velocities = [], []
         for color, gain in enumerate(GAINS):
-            fates = fates_by_cell.cells[gain, model]
+            fates = experiment.cells[gain, model]
             known_errors = {e: fate.error for e, fate in fates.items() if fate.error is not None}
             falls.append(Line(list(fates), [100.0 * fate.fell for fate in fates.values()], gain, "o-", color))
             velocities.append(Line(list(known_errors), list(known_errors.values()), style="o-", color=color))
-        whole_errors = {e: fate.error for e, fate in fates_by_cell.whole.items() if fate.error is not None}
+        whole_errors = {e: fate.error for e, fate in experiment.whole.items() if fate.error is not None}
         velocities.append(Line(list(whole_errors), list(whole_errors.values()), WHOLE, "k--"))
         shares.append(Panel("share of falls [%]", falls, y_range=(-5.0, 105.0)))
         label = "velocity\nRMS error [rad/s]"
@@ -256,8 +256,8 @@ def _picture(fates_by_cell: Factorial) -> Picture:
 def factorial(worlds: int, seed: int, duration_s: float = DURATION_S) -> Factorial:
     """Run every cell, and (10)."""
     cells = [(gain, model) for gain in GAINS for model in MODELS]
-    observers = [*(observer_of(cell) for cell in cells), ("ltv", [])]
-    *fates, whole = fates_of(observers, BIASES_DEG, worlds, seed, duration_s)
+    observers = [*(choose_observer(cell) for cell in cells), ("ltv", [])]
+    *fates, whole = find_fates(observers, BIASES_DEG, worlds, seed, duration_s)
     return Factorial(dict(zip(cells, fates, strict=True)), whole)
 
 

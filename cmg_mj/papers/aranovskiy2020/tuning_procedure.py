@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from cmg_mj.papers.aranovskiy2020.joint import Together, experiments, listed
+from cmg_mj.papers.aranovskiy2020.joint import JointExperiment, experiments, list_experiments
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.retuned import CASES, DEFAULT_NOISE, PUSHES, SEED, STRONG, Studies, in_the_loop
+from cmg_mj.papers.aranovskiy2020.retuned import CASES, DEFAULT_NOISE, PUSHES, SEED, STRONG, Studies, compare_in_loop
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.words import listed_and
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval
 
 LOOP_WORLDS = 10
@@ -17,26 +17,26 @@ LOOP_SHARE = 0.1
 """Of the time that the section takes, the closed loops'."""
 
 
-class Tried(NamedTuple):
+class Trial(NamedTuple):
     """One experiment in which the three were tuned, and what the tuned do in the loop."""
 
-    together: Together
+    experiment: JointExperiment
     loop: Mapping[str, Interval]
     """Observer -> error in the closed loop, Table 2's by that of the tuned, under the same push and noise."""
 
     @property
-    def beaten(self) -> list[str]:
+    def worse_than_zero(self) -> list[str]:
         """The equations that an estimate of zero is closer than, tuned."""
-        levels = self.together.levels.items()
+        levels = self.experiment.levels.items()
         return [OBSERVERS[name] for name, level in levels if level.rms.mean() >= level.zero_rms]
 
     @property
-    def worse(self) -> list[str]:
+    def worse_in_loop(self) -> list[str]:
         """The equations that the tuning makes worse in the loop, beyond chance; a world that fell counts."""
         return [OBSERVERS[name] for name, ratio in self.loop.items() if not ratio.high >= 1.0]
 
 
-def loops_of(studies: Studies, joint_experiment: Together, on_share: OnShare) -> list[Tried]:
+def run_trials(studies: Studies, joint_experiment: JointExperiment, on_share: OnShare) -> list[Trial]:
     """Close the loop on the tuned and on Table 2's: at the default noise and push, and in the joint experiment."""
     default = next(
         experiment
@@ -46,13 +46,15 @@ def loops_of(studies: Studies, joint_experiment: Together, on_share: OnShare) ->
     trials, selection = [], [default] + [joint_experiment] * (joint_experiment.words != default.words)
     for i, experiment in enumerate(selection):
         push = next(push for push in PUSHES if push.words == experiment.push)
-        loops = in_the_loop([(case, experiment.levels[case.observer], push) for case in CASES], LOOP_WORLDS, SEED + 1)
-        trials.append(Tried(experiment, dict(zip((case.observer for case in CASES), loops, strict=True))))
+        loops = compare_in_loop(
+            [(case, experiment.levels[case.observer], push) for case in CASES], LOOP_WORLDS, SEED + 1
+        )
+        trials.append(Trial(experiment, dict(zip((case.observer for case in CASES), loops, strict=True))))
         on_share((i + 1) / len(selection))
     return trials
 
 
-def procedure_claim(studies: Studies, loops: list[Tried]) -> Claim:
+def procedure_claim(studies: Studies, loops: list[Trial]) -> Claim:
     """The procedure.
 
     Args:
@@ -69,29 +71,30 @@ def procedure_claim(studies: Studies, loops: list[Tried]) -> Claim:
         for level in study.levels
     ]
     candidates = list(experiments(studies))
-    tunable = [experiment for experiment in candidates if experiment.worth_it]
+    tunable = [experiment for experiment in candidates if experiment.beats_zero]
     return Claim(
         place="Section V, tuning",
-        says="Fitting an observer to the gyro's rate, recorded with the loop closed on the gyro and a push, tunes it.",
-        found=(
+        statement="Fitting an observer to the gyro's rate, recorded with the loop closed on the gyro and a push, tunes "
+        "it.",
+        result=(
             f"{' '.join(_in_words(trial) for trial in loops)} Over {len(ratios)} fits the error on other seeds is "
             f"{min(ratios):.3f} to {max(ratios):.3f} times that on the fitted ones."
         ),
         holds=bool(tunable),
         conditions=(
             f"In {len(tunable)} of the {len(candidates)} experiments tried: there all three, tuned, follow the gyro "
-            f"better than an estimate of zero. These are {listed(tunable) if tunable else 'none'}. "
-            f"{_zero(loops)}{_worse(loops)}"
+            f"better than an estimate of zero. These are {list_experiments(tunable) if tunable else 'none'}. "
+            f"{_describe_zero(loops)}{_describe_losses(loops)}"
         ),
         otherwise="In none of the experiments tried do all three, tuned, follow the gyro better than zero does.",
         figures={
             "held_out_by_fitted_error_largest": max(ratios),
             **{
-                trial.together.words: {
-                    "fitted_error_rad_s": {n: level.fit_rms for n, level in trial.together.levels.items()},
-                    "held_out_error_rad_s": {n: float(v.rms.mean()) for n, v in trial.together.levels.items()},
-                    "table_2_error_rad_s": {n: float(v.given_rms.mean()) for n, v in trial.together.levels.items()},
-                    "zero_estimate_error_rad_s": {n: level.zero_rms for n, level in trial.together.levels.items()},
+                trial.experiment.words: {
+                    "fitted_error_rad_s": {n: level.fit_rms for n, level in trial.experiment.levels.items()},
+                    "held_out_error_rad_s": {n: float(v.rms.mean()) for n, v in trial.experiment.levels.items()},
+                    "table_2_error_rad_s": {n: float(v.given_rms.mean()) for n, v in trial.experiment.levels.items()},
+                    "zero_estimate_error_rad_s": {n: level.zero_rms for n, level in trial.experiment.levels.items()},
                     "in_the_loop_table_2_by_tuned_error": dict(trial.loop),
                 }
                 for trial in loops
@@ -100,8 +103,8 @@ def procedure_claim(studies: Studies, loops: list[Tried]) -> Claim:
     )
 
 
-def _in_words(trial: Tried) -> str:
-    levels = trial.together.levels
+def _in_words(trial: Trial) -> str:
+    levels = trial.experiment.levels
     tuned_errors = ", ".join(f"{OBSERVERS[name]} {level.rms.mean():.4f}" for name, level in levels.items())
     zero = next(iter(levels.values())).zero_rms
     loop = ", ".join(
@@ -109,24 +112,26 @@ def _in_words(trial: Tried) -> str:
         for name, ratio in trial.loop.items()
     )
     return (
-        f"At {trial.together.words} the tuned are off the gyro by {tuned_errors} rad/s RMS, an estimate of zero by "
+        f"At {trial.experiment.words} the tuned are off the gyro by {tuned_errors} rad/s RMS, an estimate of zero by "
         f"{zero:.4f}. In the loop under the same push and noise Table 2's error by that of the tuned is {loop}."
     )
 
 
-def _zero(loops: list[Tried]) -> str:
+def _describe_zero(loops: list[Trial]) -> str:
     """Where an estimate of zero does better than the tuned, of the experiments whose loop was closed."""
     return "".join(
-        f"At {trial.together.words} zero is closer than {listed_and(trial.beaten)} at their best, which know the "
-        "command, but not the push. "
+        f"At {trial.experiment.words} zero is closer than {join_with_and(trial.worse_than_zero)} at their best, which "
+        "know the command, but not the push. "
         for trial in loops
-        if trial.beaten
+        if trial.worse_than_zero
     )
 
 
-def _worse(loops: list[Tried]) -> str:
+def _describe_losses(loops: list[Trial]) -> str:
     """What a fit to the gyro is not."""
-    parts = [f"{listed_and(trial.worse)} at {trial.together.words}" for trial in loops if trial.worse]
+    parts = [
+        f"{join_with_and(trial.worse_in_loop)} at {trial.experiment.words}" for trial in loops if trial.worse_in_loop
+    ]
     if not parts:
         return "In the loop no tuned observer is worse than Table 2's."
     return f"It is no fit for the loop: there the tuned are worse than Table 2's for {'; '.join(parts)}."

@@ -111,7 +111,7 @@ def reduced(model: mujoco.MjModel, axis: int) -> ReducedModel:
     return ReducedModel(J1, 0.0, TABLE_1["J_d"], SPEED, abs(float(data.qfrc_bias[tilt])) / 2.0, 2)
 
 
-class Ran(NamedTuple):
+class Motion(NamedTuple):
     """What the body did."""
 
     tilts: np.ndarray
@@ -120,7 +120,7 @@ class Ran(NamedTuple):
     """The torque about the vertical that held it from turning, (n_ticks - 1,) [N m]."""
 
 
-def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Ran:
+def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Motion:
     """The motion under a push on each axis at 0.2 s, each axis with a law of its own that knows its own state alone.
 
     Args:
@@ -151,7 +151,7 @@ def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Ran:
         mujoco.mj_subtreeVel(model, data)
         momenta.append(float(_about_the_joint(data, torso)))
         mujoco.mj_step(model, data, steps)
-    return Ran(np.array(tilts), np.diff(momenta) / DT)
+    return Motion(np.array(tilts), np.diff(momenta) / DT)
 
 
 def _about_the_joint(data: mujoco.MjData, body: int) -> float:
@@ -163,9 +163,9 @@ def _about_the_joint(data: mujoco.MjData, body: int) -> float:
 class Coupling(NamedTuple):
     """One push on both axes at once beside the same on either alone."""
 
-    both: np.ndarray
+    joint_tilts: np.ndarray
     """Tilts, (n_ticks, 2) [rad]."""
-    alone: np.ndarray
+    single_tilts: np.ndarray
     """Each axis' tilt while the other is not pushed, (n_ticks, 2) [rad]."""
     vertical_n_m: float
     """Largest torque about the vertical, with both pushed."""
@@ -173,12 +173,12 @@ class Coupling(NamedTuple):
     @property
     def largest_deg(self) -> float:
         """Largest tilt of an axis alone."""
-        return float(np.degrees(np.abs(self.alone).max()))
+        return float(np.degrees(np.abs(self.single_tilts).max()))
 
     @property
     def share(self) -> float:
         """Largest change by the other axis, by the largest tilt."""
-        return float(np.abs(self.both - self.alone).max() / np.abs(self.alone).max())
+        return float(np.abs(self.joint_tilts - self.single_tilts).max() / np.abs(self.single_tilts).max())
 
 
 def coupling(push_n_m: float) -> Coupling:
@@ -197,8 +197,8 @@ def axes_claim(couplings: dict[float, Coupling]) -> Claim:
     tilts_text = ", ".join(f"{push:g} N m: {c.largest_deg:.1f} deg, {c.share:.2%}" for push, c in couplings.items())
     return Claim(
         place="Section I, one axis at a time",
-        says="With two scissored pairs at right angles each tilt axis of the robot can be stabilised by itself.",
-        found=(
+        statement="With two scissored pairs at right angles each tilt axis of the robot can be stabilised by itself.",
+        result=(
             "Four cubes on a body that tilts about two axes, each with a law of its own that knows only its own state. "
             "A push on both axes at once beside the same push on either alone: largest tilt, and how much of it the "
             f"other axis changes. {tilts_text}. The torque about the vertical is "
@@ -226,10 +226,10 @@ def _picture(couplings: dict[float, Coupling]) -> Picture:
     panels = []
     push = max(couplings)
     for axis, name in enumerate(AXES):
-        time = np.arange(len(couplings[push].both)) * DT
+        time = np.arange(len(couplings[push].joint_tilts)) * DT
         lines = [
-            Line(time, np.degrees(couplings[push].alone[:, axis]), "pushed alone", color=0),
-            Line(time, np.degrees(couplings[push].both[:, axis]), "both pushed", "--", color=1),
+            Line(time, np.degrees(couplings[push].single_tilts[:, axis]), "pushed alone", color=0),
+            Line(time, np.degrees(couplings[push].joint_tilts[:, axis]), "both pushed", "--", color=1),
         ]
         panels.append(Panel(f"{name} [deg]", lines, shaded=[(0.2, 0.2 + PUSH_S)]))
     return Picture(

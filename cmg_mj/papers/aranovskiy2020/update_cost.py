@@ -50,9 +50,9 @@ def cost() -> Claim:
     share = dearest / CLOCK_MHZ / (1e6 * DT)
     return Claim(
         place="Remark 1, cost",
-        says="The observer (10) is computationally heavy in embedded systems: its gain takes differential equations "
-        "solved online.",
-        found=(
+        statement="The observer (10) is computationally heavy in embedded systems: its gain takes differential "
+        "equations solved online.",
+        result=(
             "On the class of the rig's processor, a Cortex-M7, an update takes "
             f"{board['linear']:.0f} instructions by (9), {board['homogeneous']:.0f} by (11) and {board['ltv']:.0f} by "
             "(10), with the exact step on the 2x2 block that is left of H. Written out with 3x3 matrices (10) takes "

@@ -30,7 +30,7 @@ SEEN_RAD_S = 0.01
 """Biases of the rate above this one are compared with the closed form by their ratio, those below by the difference."""
 
 
-def left_of_an_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, span_s: float = 3.0) -> float:
+def remaining_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, span_s: float = 3.0) -> float:
     """What is left of a wrong rate without bias, noise or motion, by its first size: largest of the last 0.5 s."""
     observer = make_observer("homogeneous", dt, printed_model(), alpha=alpha)
     rest_measurement = Measurement(0.0, 0.0)
@@ -111,9 +111,7 @@ def vicinity(rng: np.random.Generator) -> Vicinity:
 def vicinity_claim(seed: int = SEED) -> Claim:
     """Convergence to a vicinity of the origin, and how large it is."""
     rng = np.random.default_rng(seed)
-    errors_left, errors_at_2000_hz = (
-        {alpha: left_of_an_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0)
-    )
+    errors_left, errors_at_2000_hz = ({alpha: remaining_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
     # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
     converges = all(errors_left[a] < VANISHED or errors_at_2000_hz[a] < errors_left[a] / 10.0 for a in ALPHAS)
     measures = vicinity(rng)
@@ -122,17 +120,17 @@ def vicinity_claim(seed: int = SEED) -> Claim:
     is_equivalent = all(hurwitz(k1, k2) == hurwitz(k2, k1) for k1, k2 in gains)
     return Claim(
         place="After (11), the vicinity",
-        says="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
-        found=(
+        statement="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
+        result=(
             "k1, k2 of Table 2, at rest. Without bias and noise a first error of 1 rad/s has fallen after 2.5 s, by "
-            f"alpha, to {_listed(errors_left, '.0e')} rad/s at 200 Hz. At 2000 Hz it is "
-            f"{_listed(errors_at_2000_hz, '.0e')}: near 1/2 what is left is chatter between samples. With a bias e the "
-            "rate rests off by k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), for e from "
+            f"alpha, to {_list_by_alpha(errors_left, '.0e')} rad/s at 200 Hz. At 2000 Hz it is "
+            f"{_list_by_alpha(errors_at_2000_hz, '.0e')}: near 1/2 what is left is chatter between samples. With a "
+            "bias e the rate rests off by k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), for e from "
             f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg: to {relative_difference:.0e} of it where that is above "
             f"{SEEN_RAD_S:g} rad/s, else to {difference:.0e} rad/s. At 0.5 deg it is "
-            f"{_listed({a: values[2] for a, values in measures.by_bias.items()}, '.4f')} rad/s. With noise in y1 and e "
-            "= 0 its RMS rises with the noise to the power "
-            f"{_listed(slopes, '.2f')}: the vicinity shrinks to the origin "
+            f"{_list_by_alpha({a: values[2] for a, values in measures.by_bias.items()}, '.4f')} rad/s. With noise in "
+            "y1 and e = 0 its RMS rises with the noise to the power "
+            f"{_list_by_alpha(slopes, '.2f')}: the vicinity shrinks to the origin "
             f"with either. Of {len(gains)} random pairs of gains, of any sign, the two polynomials are Hurwitz "
             f"together in {'all' if is_equivalent else 'some'}."
         ),
@@ -161,7 +159,7 @@ def vicinity_claim(seed: int = SEED) -> Claim:
     )
 
 
-def _listed(by_alpha: Mapping[float, float], form: str) -> str:
+def _list_by_alpha(by_alpha: Mapping[float, float], form: str) -> str:
     return ", ".join(f"{alpha:g}: {value:{form}}" for alpha, value in by_alpha.items())
 
 

@@ -34,7 +34,7 @@ def inertia_of(plant: Plant) -> Inertia:
     return Inertia(*(float(M[i, i]) for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
 
 
-def carried(plant: Plant, trajectory: Trajectory) -> np.ndarray:
+def carried_momentum(plant: Plant, trajectory: Trajectory) -> np.ndarray:
     """Momentum of gimbals and flywheels about the vertical, (n_ticks, ...) [N m s].
 
     The gimbals' axis is b_x, whose vertical part is -sin q_b; the flywheels' is b_y cos q_c + b_z sin q_c, whose
@@ -54,11 +54,11 @@ def carried(plant: Plant, trajectory: Trajectory) -> np.ndarray:
 
 def balanced_yaw_rate(plant: Plant, trajectory: Trajectory) -> np.ndarray:
     """Body A's rate by conservation: no torque acts about the vertical, so I q_a' + carried stays [rad/s]."""
-    momentum = carried(plant, trajectory)
+    momentum = carried_momentum(plant, trajectory)
     return (momentum[0] - momentum) / inertia_of(plant).yaw
 
 
-def foreseen_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajectory) -> np.ndarray:
+def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajectory) -> np.ndarray:
     """Body A's rate foretold from a run of the symmetric rig, for a small mismatch [rad/s].
 
     The law holds the mean of both gimbal angles x3, whatever each does, so x3 and the tilt are those of the symmetric

@@ -49,8 +49,9 @@ def order_claim(rows: Sequence[Row]) -> Claim:
     winners = ", ".join(f"`{kind}` {best_kinds.count(kind)}" for kind in dict.fromkeys(best_kinds))
     return Claim(
         place="All observers, three noises, three biases",
-        says="aranovskiy2020 section V: homogeneous before ltv before linear; here over a grid, with every observer",
-        found=(
+        statement="aranovskiy2020 section V: homogeneous before ltv before linear; here over a grid, with every "
+        "observer",
+        result=(
             f"{rows[0]['worlds']} seeds a cell. The smallest velocity error: {winners} of {len(cells)} cells. The "
             f"paper's order holds at {cells_text or 'none of them'}. The floor is the error of the filter that knows "
             "the model, e, the push, the gimbals' motion and the noise exactly: none of the observers knows e or the "

@@ -73,9 +73,9 @@ def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
     cells = [(f"{row['bias_deg']:g}", *(_cell(row, kind) for kind in KINDS)) for row in rows]
     return Claim(
         place="homogeneous with the bias fed in from adaptive",
-        ours=True,
-        says="the rate error of (11) that e causes goes when e is estimated beside it",
-        found="Velocity RMS error in `push_recovery`, 95 % intervals:",
+        is_ours=True,
+        statement="the rate error of (11) that e causes goes when e is estimated beside it",
+        result="Velocity RMS error in `push_recovery`, 95 % intervals:",
         table=markdown.table(headings, cells),
         holds=bool(helped_biases),
         conditions="" if len(helped_biases) == len(rows) else helpful_biases,

@@ -72,8 +72,8 @@ def friction_claim(figures: dict[str, Any]) -> Claim:
     error_without, error_with = (format_figure(ERROR, error) for error in errors)
     return Claim(
         place="Future work of both papers: friction in the observer",
-        says="a friction model in the velocity estimator would reduce its modelling errors",
-        found=(
+        statement="a friction model in the velocity estimator would reduce its modelling errors",
+        result=(
             f"On a rig with {FRICTION_N_M:g} N m of dry friction on the tilt axis the same friction in (11) takes "
             f"{_milli(gain_with_friction)} off the velocity RMS error ({error_without} to {error_with} rad/s). But on "
             f"a rig without it, it takes {_milli(gain_without_friction)} off as well: it also damps the estimate of a "

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.pendulum_robot import Errors, settle_times
-from cmg_mj.papers.dao2023.study import SETTLED, UNSTATED, Study, known_times, words_of_time
+from cmg_mj.papers.dao2023.study import SETTLED, UNSTATED, Study, finite_times, words_of_time
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 QUICK = 10.0
@@ -17,7 +17,7 @@ QUICK = 10.0
 
 def claims(study: Study) -> list[Claim]:
     """(a), (b), and how fast (b) is."""
-    return [conventional(study), proposed(study), quickly(study)]
+    return [conventional(study), proposed(study), speed_claim(study)]
 
 
 def conventional(study: Study) -> Claim:
@@ -25,9 +25,9 @@ def conventional(study: Study) -> Claim:
     rms = study.conventional.tail_rms()[0]
     return Claim(
         place="Fig. 2(a)",
-        says="With the conventional observer, which knows of no disturbance, the error of the state goes on "
+        statement="With the conventional observer, which knows of no disturbance, the error of the state goes on "
         "oscillating.",
-        found=f"RMS of the state error over 160-200 s at Sigma = 10: {rms.min():.3f} to {rms.max():.3f} in {len(rms)} "
+        result=f"RMS of the state error over 160-200 s at Sigma = 10: {rms.min():.3f} to {rms.max():.3f} in {len(rms)} "
         "motions; it does not decay.",
         holds=rms.min() > 0.2,
         conditions=UNSTATED,
@@ -60,8 +60,8 @@ def proposed(study: Study) -> Claim:
     rms, plain = study.proposed.tail_rms()[0], study.conventional.tail_rms()[0]
     return Claim(
         place="Fig. 2(b)",
-        says="With the proposed observer the error of the state tends to zero.",
-        found=f"RMS over 160-200 s at Sigma = 10: {rms.min():.3f} to {rms.max():.3f}, {np.min(plain / rms):.1f} to "
+        statement="With the proposed observer the error of the state tends to zero.",
+        result=f"RMS over 160-200 s at Sigma = 10: {rms.min():.3f} to {rms.max():.3f}, {np.min(plain / rms):.1f} to "
         f"{np.max(plain / rms):.0f} times smaller than the conventional observer's.",
         holds=rms.max() < 0.1 and bool((rms < plain).all()),
         conditions=UNSTATED,
@@ -70,7 +70,7 @@ def proposed(study: Study) -> Claim:
     )
 
 
-def quickly(study: Study) -> Claim:
+def speed_claim(study: Study) -> Claim:
     """(b), how fast."""
     learning_times, ideal_times = state_settle_times(study.proposed)
     middle, yardstick = float(np.median(learning_times)), float(np.median(ideal_times))
@@ -80,15 +80,15 @@ def quickly(study: Study) -> Claim:
     )
     return Claim(
         place="Fig. 2(b), how fast",
-        says="With the proposed observer the error of the state tends to zero soon.",
-        found=f"At Sigma = 10 the state's error stays below {SETTLED} from {words_of_time(middle)} on (median of "
+        statement="With the proposed observer the error of the state tends to zero soon.",
+        result=f"At Sigma = 10 the state's error stays below {SETTLED} from {words_of_time(middle)} on (median of "
         f"{len(learning_times)} motions); with all of xm known, L takes {yardstick:.1f} s. It is "
         f"{middle / yardstick:.0f} times as slow: what takes long is to learn the parameters.",
         holds=middle <= QUICK * yardstick,
         conditions=meaning,
         otherwise=meaning,
         figures={
-            "state_settles_below_0_1_s": known_times(learning_times),
+            "state_settles_below_0_1_s": finite_times(learning_times),
             "state_settles_below_0_1_if_all_is_known_s": ideal_times.tolist(),
         },
     )

@@ -14,7 +14,7 @@ from cmg_mj.papers.dao2023.study import (
     UNSTATED,
     Study,
     exogenous_settle_times,
-    known_times,
+    finite_times,
     words_of_time,
 )
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
@@ -49,14 +49,14 @@ def settling_order(study: Study) -> Claim:
     )
     return Claim(
         place="Fig. 3(a), (b), (c)",
-        says="Against Sigma = 10, parameters and disturbance are found sooner with 1000 and later with 0.1.",
-        found=f"In {int(motions_in_order.sum())} of {n} motions the settling order is 1000 < 10 <= 0.1. Medians: "
+        statement="Against Sigma = 10, parameters and disturbance are found sooner with 1000 and later with 0.1.",
+        result=f"In {int(motions_in_order.sum())} of {n} motions the settling order is 1000 < 10 <= 0.1. Medians: "
         f"{words_of_time(medians[1])} at 1000, {words_of_time(medians[0])} at 10, {words_of_time(medians[2])} at 0.1.",
         holds=motions_in_order.sum() >= 0.9 * n,
         conditions=meaning,
         otherwise=meaning,
         figures={
-            f"settles_below_0_1_sigma_{sigma:g}_s": known_times(row)
+            f"settles_below_0_1_sigma_{sigma:g}_s": finite_times(row)
             for sigma, row in zip(paper.SIGMAS, times, strict=True)
         }
         | {
@@ -91,8 +91,8 @@ def parameters(study: Study) -> Claim:
     sampling_remark = f"{UNSTATED} At 400 Hz; at 200 Hz the straight line between samples leaves up to 3e-3 in theta1."
     return Claim(
         place="Fig. 3(b), parameters",
-        says="At Sigma = 1000 theta1 and theta2 are found.",
-        found=f"After 200 s the largest errors of {len(errors)} motions are {errors[:, 0].max():.1e} of theta1 = 9.81 "
+        statement="At Sigma = 1000 theta1 and theta2 are found.",
+        result=f"After 200 s the largest errors of {len(errors)} motions are {errors[:, 0].max():.1e} of theta1 = 9.81 "
         f"and {errors[:, 1].max():.1e} of theta2 = 2; the state's RMS error is at most {rms.max():.1e}.",
         holds=errors.max() < 1e-3,
         conditions=sampling_remark,
@@ -118,8 +118,8 @@ def larger_gains(study: Study) -> Claim:
     ]
     return Claim(
         place="Section 3.2, conclusion",
-        says="L_m grows in proportion to Sigma, and the more of it, the sooner every estimate settles.",
-        found="For one T, (9) is linear in Sigma. Median settling times: "
+        statement="L_m grows in proportion to Sigma, and the more of it, the sooner every estimate settles.",
+        result="For one T, (9) is linear in Sigma. Median settling times: "
         + ", ".join(f"{words_of_time(medians[SIGMAS[i]])} at {SIGMAS[i]:g}" for i in order)
         + ".",
         holds=in_order,

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker
-from cmg_mj.papers.dao2023.pendulum_robot import motion, one, starts
+from cmg_mj.papers.dao2023.pendulum_robot import make_single, motion, starts
 
 
 def claims(on_share: OnShare) -> list[Claim]:
@@ -31,8 +31,8 @@ def separated_errors(on_share: OnShare) -> Claim:
     largest = max(errors.values())
     return Claim(
         place="Equations (7) to (9)",
-        says="With T from (8), the error of the state parts from that of the exosystem.",
-        found="z = (x^ - x) - T (xm^ - xm) obeys z' = (A + L C2) z whatever Gamma and Sigma, along a motion that is "
+        statement="With T from (8), the error of the state parts from that of the exosystem.",
+        result="z = (x^ - x) - T (xm^ - xm) obeys z' = (A + L C2) z whatever Gamma and Sigma, along a motion that is "
         f"chaotic, to {largest:.0e} at worst. It does so in continuous time for 6 s (1.5 s at Sigma = 1000) and, "
         "sampled at 200 Hz, for 40 s.",
         holds=largest < 1e-8,
@@ -55,7 +55,7 @@ def continuous_run(
     Returns:
         The arm's x (n_times, 2), the observer's x (n_times, 2), xm (n_times, 4) and T (n_times, 2, 4).
     """
-    observer = one(1.0, sigma)
+    observer = make_single(1.0, sigma)
     no_input = np.zeros(1)
 
     def slope(time: float, s: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ def sampled_deviation(sigma: float, dt: float, duration: float, seed: int = 0) -
         The largest deviation, and the largest |z| for comparison.
     """
     rng = np.random.default_rng(seed)
-    observer = one(dt, sigma)
+    observer = make_single(dt, sigma)
     q, rate = starts(seed, 1)[0].tolist()
     state = observer.init(np.array([q]), x=rng.normal(0.0, 1.0, 2), xm=rng.normal(0.0, 1.0, 4))
     F, half = expm(paper.A_M * dt), dt / 2.0 * paper.error_matrix()
@@ -138,8 +138,8 @@ def upsilon() -> Claim:
     )
     return Claim(
         place="Section 2.2, last equation",
-        says="The conventional observer's Upsilon is T exp(Am t).",
-        found=f"To {matrix_gap:.0e} over 15 s at 200 Hz; the estimates of x of both observers agree to "
+        statement="The conventional observer's Upsilon is T exp(Am t).",
+        result=f"To {matrix_gap:.0e} over 15 s at 200 Hz; the estimates of x of both observers agree to "
         f"{estimate_gap:.0e}.",
         holds=matrix_gap < 1e-9 and estimate_gap < 1e-9,
         conditions=correction,
@@ -162,7 +162,7 @@ def upsilon_gaps(sigma: float, dt: float, duration: float, seed: int = 0) -> tup
     """
     t = dt * np.arange(round(duration / dt) + 1)
     y = motion(starts(seed, 1), t)[:, 0, :1]
-    proposed = one(dt, sigma)
+    proposed = make_single(dt, sigma)
     plain = FriedlandTacker.conventional(dt, paper.L, paper.GAMMA, proposed.Sigma)
     a, b = proposed.init(y[0]), plain.init(y[0])
     mean = paper.C_M @ (expm(paper.A_M * dt) + np.eye(4)) / 2.0

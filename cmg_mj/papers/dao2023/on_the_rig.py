@@ -47,10 +47,10 @@ def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
     )
     return Claim(
         place="On the rig: equilibrium bias",
-        says=f"`adaptive` finds the equilibrium bias together with the state, to {WITHIN_DEG} degrees RMS over seconds "
-        "5 to 10.",
-        found=f"RMS error of the bias over seconds 5 to 10: {rms.mean():.3f} deg on average, {rms.max():.3f} at worst; "
-        f"at most {WITHIN_DEG} in {100.0 * share:.0f} % of {worlds} worlds. With the accelerometers "
+        statement=f"`adaptive` finds the equilibrium bias together with the state, to {WITHIN_DEG} degrees RMS over "
+        "seconds 5 to 10.",
+        result=f"RMS error of the bias over seconds 5 to 10: {rms.mean():.3f} deg on average, {rms.max():.3f} at "
+        f"worst; at most {WITHIN_DEG} in {100.0 * share:.0f} % of {worlds} worlds. With the accelerometers "
         f"{offset_mg[0]:g} and {offset_mg[1]:g} mg off, it finds e less the tilt that they make: "
         f"{excess.mean():+.3f} deg beside e, where {expected_excess.mean():+.3f} is expected.",
         holds=share >= 0.95 and share_within(rig.errors(offset_run, "bias_rms_error_deg"), WITHIN_DEG) == 1.0,
@@ -64,7 +64,7 @@ def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
             "expected_less_e_deg": expected_excess.tolist(),
         },
         pictures=[_picture_of_bias(trajectory_of(result).between(0.0, 5.0), biases)],
-        ours=True,
+        is_ours=True,
     )
 
 
@@ -105,9 +105,9 @@ def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
     )
     return Claim(
         place="On the rig: velocity",
-        says="From e = 0.5 degrees up, the velocity error of `adaptive` is smaller than that of (9), (10), (11) of "
-        "aranovskiy2020, which take e for zero.",
-        found=f"Velocity RMS error with `adaptive` in the loop {words('adaptive')} rad/s at e = 0.5, 1.0, 1.5 deg; "
+        statement="From e = 0.5 degrees up, the velocity error of `adaptive` is smaller than that of (9), (10), (11) "
+        "of aranovskiy2020, which take e for zero.",
+        result=f"Velocity RMS error with `adaptive` in the loop {words('adaptive')} rad/s at e = 0.5, 1.0, 1.5 deg; "
         + "; ".join(f"{name} {words(name)}" for name in OTHERS)
         + ".",
         holds=all((errors["adaptive"] < errors[name])[biased_cases].all() for name in OTHERS),
@@ -117,7 +117,7 @@ def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
         | {f"{name}_velocity_rms_error_rad_s": values for name, values in means.items()}
         | {f"{name}_half_interval_rad_s": values for name, values in halves.items()},
         pictures=[picture],
-        ours=True,
+        is_ours=True,
     )
 
 
@@ -129,9 +129,9 @@ def torques(seed: int = 52_000, worlds: int = 4) -> Claim:
     better = (gait["knowing_rad_s"] < gait["not_knowing_rad_s"]).all()
     return Claim(
         place="On the rig: disturbance torques",
-        says="`adaptive` finds a sinusoidal torque of known frequency, and the state in spite of it; a constant torque "
-        "too.",
-        found=f"Over seconds 5 to 10 the velocity RMS error is {gait['knowing_rad_s'].mean():.3f} rad/s, against "
+        statement="`adaptive` finds a sinusoidal torque of known frequency, and the state in spite of it; a constant "
+        "torque too.",
+        result=f"Over seconds 5 to 10 the velocity RMS error is {gait['knowing_rad_s'].mean():.3f} rad/s, against "
         f"{gait['not_knowing_rad_s'].mean():.3f} without the sinusoid in the exosystem; the torque is found to "
         f"{gait['disturbance_n_m'].max():.3f} N m RMS, the bias to {gait['bias_deg'].max():.3f} deg. A constant "
         f"torque is found to {torque.max():.3f} N m.",
@@ -140,5 +140,5 @@ def torques(seed: int = 52_000, worlds: int = 4) -> Claim:
         otherwise=remark,
         figures={name: values.tolist() for name, values in gait.items()}
         | {"constant_torque_rms_error_n_m": torque.tolist()},
-        ours=True,
+        is_ours=True,
     )

@@ -12,17 +12,17 @@ from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, System
 
 
-def proposed(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
+def make_proposed(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
     """The paper's observer; its leading dimensions are those of the weights sigma, then one for the motions."""
     return FriedlandTacker(dt, paper.A_M, paper.C_M, paper.L, paper.GAMMA, np.reshape(sigmas, (-1, 1, 1, 1)))
 
 
-def conventional(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
+def make_conventional(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
     """The observer it is compared with, which knows of no disturbance; leading dimensions as above."""
     return FriedlandTacker.conventional(dt, paper.L, paper.GAMMA[:2, :2], np.reshape(sigmas, (-1, 1, 1, 1)))
 
 
-def one(dt: float, sigma: float) -> FriedlandTacker:
+def make_single(dt: float, sigma: float) -> FriedlandTacker:
     """The paper's observer without leading dimensions."""
     return FriedlandTacker(dt, paper.A_M, paper.C_M, paper.L, paper.GAMMA, np.array([[sigma]]))
 

@@ -61,9 +61,9 @@ def study(
     rate, every = rates_hz[0], round(rates_hz[0] / rates_hz[1])
     t = np.arange(round(duration_s * rate) + 1) / rate
     x = robot.motion(robot.starts(seed, motions), t)
-    proposed = robot.follow(robot.proposed(1.0 / rate, SIGMAS), t, x, lambda s: on_share(0.1 + 0.65 * s))
+    proposed = robot.follow(robot.make_proposed(1.0 / rate, SIGMAS), t, x, lambda s: on_share(0.1 + 0.65 * s))
     t_plain, x_plain = t[::every], x[::every]
-    plain = robot.follow(robot.conventional(every / rate), t_plain, x_plain, lambda s: on_share(0.75 + 0.25 * s))
+    plain = robot.follow(robot.make_conventional(every / rate), t_plain, x_plain, lambda s: on_share(0.75 + 0.25 * s))
     return Study(proposed, plain, float(np.abs(x[..., 0]).max()))
 
 
@@ -77,6 +77,6 @@ def words_of_time(time: float) -> str:
     return f"{time:.0f} s" if math.isfinite(time) else "not within 200 s"
 
 
-def known_times(times: np.ndarray) -> list[float | None]:
+def finite_times(times: np.ndarray) -> list[float | None]:
     """Settling times as JSON can hold them."""
     return [float(time) if math.isfinite(time) else None for time in times]

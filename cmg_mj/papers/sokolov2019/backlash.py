@@ -38,7 +38,7 @@ class Cycle(NamedTuple):
         return f"goes on oscillating by {self.amplitude_deg:.2f} deg to either side at {self.frequency_hz:.1f} Hz"
 
 
-def released(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Experiment:
+def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Experiment:
     """The rig let go with a gap.
 
     Args:
@@ -54,7 +54,7 @@ def released(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Ex
     return experiment([*RELEASE, f"duration_s={RELEASE_S}", gap, *observer_settings], observer)
 
 
-def cycles_of(releases: Sequence[Experiment]) -> list[Cycle]:
+def find_cycles(releases: Sequence[Experiment]) -> list[Cycle]:
     """The cycles that rigs let go end in, one world each."""
     return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(release, 1) for release in releases])]
 

@@ -15,7 +15,7 @@ import numpy as np
 from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import poles_as_pairs
-from cmg_mj.papers.recorded import pushed, rms, trajectory_of
+from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.papers.sokolov2019.vertical_torque import Locked, locked_run, vertical_torque
 from cmg_mj.papers.words import plus_minus
@@ -107,8 +107,8 @@ def study(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Study:
 def claim(runs: Study) -> Claim:
     """The thrust bearing, which the model of one tilt angle leaves out."""
     worlds, error, k = len(runs.locked), runs.closed_form_error, stiffness()
-    peak = mean_interval([float(np.abs(run.within(1.0, 1.6)).max()) for run in runs.locked])
-    noise_torque = mean_interval([float(rms(run.within(0.5, 1.0))) for run in runs.locked])
+    peak = mean_interval([float(np.abs(run.torque_between(1.0, 1.6)).max()) for run in runs.locked])
+    noise_torque = mean_interval([float(rms(run.torque_between(0.5, 1.0))) for run in runs.locked])
     peak_of_mean, pair = float(np.abs(runs.mean_torque).max()), float(np.abs(runs.pair.torque).max())
     falls = {case: float(result.fell.mean()) for case, result in runs.free.items()}
     ends = {
@@ -121,8 +121,8 @@ def claim(runs: Study) -> Claim:
     )
     return Claim(
         place="Fig. 2, the bearing",
-        says="The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
-        found=(
+        statement="The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
+        result=(
             "One gimbal leaves a torque about the vertical, dH/dt with H = J_d w_d cos x3 cos q_b and smaller terms; "
             f"MuJoCo's inverse dynamics confirm it to {error:.0e} N m. A locked bearing carries up to "
             f"{plus_minus(peak, 3)} N m at a push ({worlds} seeds; {peak_of_mean:.3f} in their mean). Noise makes "
@@ -161,7 +161,7 @@ def _picture(runs: Study) -> Picture:
     example = runs.locked[0]
     free = trajectory_of(runs.free["a push of the upright rig"]).world(0)
     plant = experiment([BALANCED]).plant
-    t, s, push = example.time_s, free["time_s"], pushed(free)
+    t, s, push = example.time_s, free["time_s"], push_intervals(free)
     x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.modules[0].gimbal_zero
     torques = [
         Line(t, example.torque, "on the bearing", color=1, width=0.5),

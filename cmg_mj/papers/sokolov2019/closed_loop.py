@@ -24,7 +24,7 @@ def claims(on_share: OnShare) -> list[Claim]:
         cause_of_figure_5(ends),
         six,
         figure_6_at_rest(lags, ends),
-        comparison.best(results),
+        comparison.best_claim(results),
         comparison.model_based(results),
         lag.claim(lags),
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.sokolov2019.loops import Loops, better, numbers, shown, smaller
+from cmg_mj.papers.sokolov2019.loops import Loops, format_interval, is_better, is_smaller, numbers
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.results import markdown
 from cmg_mj.results.intervals import known_interval
@@ -16,33 +16,33 @@ KEYS = {"velocity_rms_error_rad_s": "velocity RMS error [rad/s]", "tilt_rms_deg"
 
 def _cell(result: Result, key: str) -> str:
     falls_note = f" ({result.fell.mean():.0%} fell)" if result.fell.any() else ""
-    return shown(known_interval(result.values(key))) + falls_note
+    return format_interval(known_interval(result.values(key))) + falls_note
 
 
 def _table(loops: Loops) -> str:
     rows = [
         (setting, words, *(_cell(by_name[name], key) for name in OBSERVERS))
         for key, words in KEYS.items()
-        for setting, by_name in loops.everywhere.items()
+        for setting, by_name in loops.all_settings.items()
     ]
     return markdown.table(("where", "what", *OBSERVERS.values()), rows, text_columns=2)
 
 
-def best(loops: Loops) -> Claim:
+def best_claim(loops: Loops) -> Claim:
     """Section V: (10) against the other two."""
     wins = {
-        setting: all(better(by_name["homogeneous"], by_name[name]) for name in ("linear", "luenberger"))
-        for setting, by_name in loops.everywhere.items()
+        setting: all(is_better(by_name["homogeneous"], by_name[name]) for name in ("linear", "luenberger"))
+        for setting, by_name in loops.all_settings.items()
     }
     tilt_of_8 = [
         setting
-        for setting, by_name in loops.everywhere.items()
-        if smaller(by_name["linear"], by_name["homogeneous"], "tilt_rms_deg")
+        for setting, by_name in loops.all_settings.items()
+        if is_smaller(by_name["linear"], by_name["homogeneous"], "tilt_rms_deg")
     ]
     return Claim(
         place="Section V, the comparison",
-        says="The nonlinear differentiator (10) offers the best behaviour of the three.",
-        found=(
+        statement="The nonlinear differentiator (10) offers the best behaviour of the three.",
+        result=(
             f"{loops.worlds} seeds, world by world, 95 % intervals. (10) has the smallest error of the rate, or stands "
             f"where another falls, in {sum(wins.values())} of {len(wins)} settings."
         ),
@@ -57,26 +57,27 @@ def best(loops: Loops) -> Claim:
         otherwise="Its velocity error is not the smallest everywhere.",
         figures={
             setting: {name: numbers(by_name[name]) for name in OBSERVERS} | {"10_is_best": wins[setting]}
-            for setting, by_name in loops.everywhere.items()
+            for setting, by_name in loops.all_settings.items()
         },
     )
 
 
-def ranked(by_name: Mapping[str, Result]) -> bool:
+def is_ranked(by_name: Mapping[str, Result]) -> bool:
     """Whether (9) is better than (8), (10) better than (9), and neither of the two with a model falls."""
-    with_model = better(by_name["luenberger"], by_name["linear"])
-    nonlinear = better(by_name["homogeneous"], by_name["luenberger"])
+    with_model = is_better(by_name["luenberger"], by_name["linear"])
+    nonlinear = is_better(by_name["homogeneous"], by_name["luenberger"])
     return with_model and nonlinear and not any(by_name[name].fell.any() for name in ("luenberger", "homogeneous"))
 
 
 def model_based(loops: Loops) -> Claim:
     """Section VI: with a model better than without, and the nonlinear one better than the linear one."""
-    holds_at = [setting for setting, by_name in loops.everywhere.items() if ranked(by_name)]
-    not_at = [setting for setting in loops.everywhere if setting not in holds_at]
+    holds_at = [setting for setting, by_name in loops.all_settings.items() if is_ranked(by_name)]
+    not_at = [setting for setting in loops.all_settings if setting not in holds_at]
     return Claim(
         place="Section VI",
-        says="The designs with a model outperform the one without; of them the nonlinear one has the smaller error.",
-        found=(
+        statement="The designs with a model outperform the one without; of them the nonlinear one has the smaller "
+        "error.",
+        result=(
             f"By velocity RMS error, {loops.worlds} seeds, world by world beyond chance, (10) is better than (9) and "
             f"(9) than (8), with no fall, at {'; '.join(holds_at) or 'none'}."
         ),

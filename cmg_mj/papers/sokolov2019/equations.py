@@ -18,7 +18,7 @@ from cmg_mj.papers.linear_check import (
     poles_in_words,
 )
 from cmg_mj.papers.sokolov2019 import paper
-from cmg_mj.papers.sokolov2019.rig import experiment, servo_of
+from cmg_mj.papers.sokolov2019.rig import experiment, read_servo
 from cmg_mj.plant.plant import Plant
 
 
@@ -34,8 +34,8 @@ def table_i() -> Claim:
     largest_error = max(abs(getattr(compiled, name) / getattr(paper_model, name) - 1.0) for name in names)
     return Claim(
         place="Table I",
-        says="Mass, pivot distance and inertias; J1 = I_d + J_b + K_c + m l^2, J2 = J_c - I_d + J_d - K_c.",
-        found=(
+        statement="Mass, pivot distance and inertias; J1 = I_d + J_b + K_c + m l^2, J2 = J_c - I_d + J_d - K_c.",
+        result=(
             f"J1 = {paper_model.J1:.6f}, J2 = {paper_model.J2:.2e} kg m^2, J_d w_d = "
             f"{paper_model.J_d * paper_model.omega_d:.4f} N m s, m g l = {paper_model.gravity_torque:.4f} N m; the "
             f"compiled model has the same to {largest_error:.0e}. Unstable pole "
@@ -62,7 +62,7 @@ def equation_residual(plant: Plant, model: ReducedModel, states: int, seed: int)
         states: How many.
         seed: Of the states.
     """
-    I_cd = servo_of(plant).inertia
+    I_cd = read_servo(plant).inertia
     rng, data, largest = np.random.default_rng(seed), mujoco.MjData(plant.model), 0.0
     for _ in range(states):
         q = rng.uniform(-math.pi, math.pi, 3)
@@ -82,8 +82,8 @@ def equations_of_motion(states: int = 300, seed: int = 81_000) -> Claim:
     residual_turned = equation_residual(plant, replace(model, J2=-model.J2), states, seed)
     return Claim(
         place="(1)",
-        says="The Euler-Lagrange equations of frame, gimbal and wheel.",
-        found=(
+        statement="The Euler-Lagrange equations of frame, gimbal and wheel.",
+        result=(
             f"At {states} random states all three are those of the compiled bodies to {residual:.0e} N m; with J2's "
             f"sign turned they are off by {residual_turned:.1e} N m."
         ),
@@ -111,11 +111,11 @@ def law_equilibria() -> Claim:
     slowest = float(max(np.real(poles_6).max(), np.real(poles_7).max()))
     return Claim(
         place="(5), (6), (7)",
-        says=(
+        statement=(
             "A, B linearise (3) and (A_e, B_e) is controllable; (6) leaves the gimbal at -k1/k3 e, (7) brings x to "
             "zero with x_e at -k_e1/k_e4 e."
         ),
-        found=(
+        result=(
             f"Central differences give A and B to {error:.0e}; the controllability matrix has rank 4 (least singular "
             f"value {margin:.1e} of the largest). Per radian of e, (6) rests at x3 = {rest_6[2]:+.1f} = +k1/k3 and (7) "
             f"at x = 0, x_e = {rest_7[3]:+.1f} s = +k_e1/k_e4. Poles of (6): {poles_in_words(poles_6)}; of (7): "

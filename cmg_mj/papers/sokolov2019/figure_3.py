@@ -11,7 +11,7 @@ from scipy.signal import lsim, lti
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import pushed, rms, trajectory_of
+from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS, TABLE_II
 from cmg_mj.papers.sokolov2019.rig import estimator, experiment
 from cmg_mj.papers.words import plus_minus
@@ -83,7 +83,7 @@ def relative_errors(tuning: Tuning) -> dict[str, Interval]:
     return {name: mean_interval(rms(rates[tuning.window] - gyro) / rms(gyro)) for name, rates in tuning.rates.items()}
 
 
-def predicted_error(tuning: Tuning) -> np.ndarray:
+def predict_error(tuning: Tuning) -> np.ndarray:
     """The error in the rate of (9) that the push alone makes, (n_ticks,) [rad/s].
 
     The observer does not know the push: d/J1 passes through (s + 20)/(s^2 + 20 s + 150 - M/J1), with the sign turned.
@@ -117,8 +117,8 @@ def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
     other_failures = " and ".join(OBSERVERS[name] for name, error in other_errors.items() if error.low > 1.0)
     return Claim(
         place="Fig. 3",
-        says="At the push, (9) fails completely to estimate x2.",
-        found=(
+        statement="At the push, (9) fails completely to estimate x2.",
+        result=(
             f"The law fed by the gyro, {tuning.push.torque_n_m:g} N m for {tuning.push.duration_s:g} s, {worlds} seeds "
             f"with 95 % intervals. From the push to half a second after it, RMS of estimate less gyro by the gyro's "
             f"own RMS (an estimate of zero has 1): {errors_text}. When the push ends the gyro shows {truth.mean:+.2f} "
@@ -147,11 +147,11 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
     reach = y2_reaches_the_rate(tuning.prepared)
     error, with_y2, without_y2 = tuning.error_of_9, relative[WITH_Y2], relative["luenberger"]
     bias_error = error[tuning.trajectory["time_s"] < tuning.push.start_s][-20:].mean()
-    explained_share = 1.0 - np.var((error - predicted_error(tuning))[tuning.window]) / np.var(error[tuning.window])
+    explained_share = 1.0 - np.var((error - predict_error(tuning))[tuning.window]) / np.var(error[tuning.window])
     return Claim(
         place="Section V, (9) and y2",
-        says="(9) ignores y2 completely, and thus is not robust against external disturbances.",
-        found=(
+        statement="(9) ignores y2 completely, and thus is not robust against external disturbances.",
+        result=(
             f"y2 does not reach its rate: noise of 1 rad on y2 changes it by {reach:.0e} rad/s. But with every "
             f"term in y2 put back in its relative error at the push is {with_y2.mean:.2f} instead of "
             f"{without_y2.mean:.2f}. What (9) lacks is the push: d/J1 through (s + 20)/(s^2 + 20 s + "
@@ -176,7 +176,7 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
 
 def _picture(tuning: Tuning) -> Picture:
     example = tuning.trajectory.world(0).between(0.0, 3.0)
-    t, shaded, push = example["time_s"], pushed(example), tuning.push
+    t, shaded, push = example["time_s"], push_intervals(example), tuning.push
     panels = [
         Panel(
             "tilt y1 [deg]", [Line(t, np.degrees(example["y1_rad"]), "y1", color=7, width=0.8)], "(a)", shaded=shaded

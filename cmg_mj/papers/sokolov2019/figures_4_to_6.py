@@ -11,9 +11,9 @@ from cmg_mj.papers.sokolov2019.loops import (
     SHOWN_DEG,
     Loops,
     deviation,
+    format_interval,
     main_frequency,
     numbers,
-    shown,
     tail,
 )
 from cmg_mj.papers.sokolov2019.pictures_4_to_6 import picture
@@ -36,8 +36,8 @@ def _standing(loops: Loops, name: str) -> str:
     """The tilt's late deviation in both rigs, and what of it the push's tail is, in words."""
     no_gap, gap = loops.by_bias[SHOWN_DEG][name], loops.gap[name]
     return (
-        f"{_setting(loops)}: {shown(deviation(no_gap))} deg without backlash, {shown(deviation(gap))} with it. "
-        f"The push's tail is {tail(loops.quiet[name]):.3f} deg of it."
+        f"{_setting(loops)}: {format_interval(deviation(no_gap))} deg without backlash, "
+        f"{format_interval(deviation(gap))} with it. The push's tail is {tail(loops.quiet[name]):.3f} deg of it."
     )
 
 
@@ -62,12 +62,13 @@ def figure_4(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
     no_gap = loops.by_bias[SHOWN_DEG]["linear"]
     return Claim(
         place="Fig. 4",
-        says="With (8) in the loop the system enters sustained oscillations.",
-        found=(
+        statement="With (8) in the loop the system enters sustained oscillations.",
+        result=(
             f"Let go without noise it {'oscillates by itself' if oscillates_by_itself else 'comes to rest'} without "
             f"backlash; with {GAP_ARCMIN:g} arcmin it {cycle.words}. {_standing(loops, 'linear')} Without backlash "
             f"most of it is at {main_frequency(no_gap):.1f} Hz, where the loop has a badly damped pole "
-            f"({prediction.frequency_hz:.1f} Hz). With the gyro in the law it is {shown(deviation(loops.gyro))} deg."
+            f"({prediction.frequency_hz:.1f} Hz). With the gyro in the law it is "
+            f"{format_interval(deviation(loops.gyro))} deg."
         ),
         holds=oscillates_by_itself or cycle.sustained,
         conditions=(
@@ -91,8 +92,8 @@ def figure_5(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
     prediction = lags.predictions["luenberger"]
     return Claim(
         place="Fig. 5",
-        says="With (9) in the loop the system oscillates, much as with (8).",
-        found=(
+        statement="With (9) in the loop the system oscillates, much as with (8).",
+        result=(
             f"Let go without noise it {'oscillates by itself' if oscillates_by_itself else 'comes to rest'} without "
             f"backlash; with {GAP_ARCMIN:g} arcmin it {cycle.words}, (8) {cycles.ends['linear'].words}. "
             f"{_standing(loops, 'luenberger')} Without backlash it falls in {falls_text}."
@@ -114,15 +115,15 @@ def figure_5(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
 def cause_of_figure_5(cycles: Cycles) -> Claim:
     """What Section V puts the oscillation with (9) down to."""
     without_y2, with_y2 = cycles.ends["luenberger"], cycles.ends[WITH_Y2]
-    predicted_cycles = {name: cycles.foreseen[name] for name in ("linear", "luenberger")}
+    predicted_cycles = {name: cycles.predicted[name] for name in ("linear", "luenberger")}
     cycles_text = " and ".join(
         "none" if cycle is None else f"{cycle.amplitude_deg:.2f} deg at {cycle.frequency_hz:.1f} Hz"
         for cycle in predicted_cycles.values()
     )
     return Claim(
         place="Section V, the cause of Fig. 5",
-        says="(9) makes the system oscillate because the linearisation does not fit its behaviour.",
-        found=(
+        statement="(9) makes the system oscillate because the linearisation does not fit its behaviour.",
+        result=(
             f"With backlash the loop {without_y2.words}. With gravity, J2 and y2 in (9) as in the nonlinear model it "
             f"{with_y2.words}. The linear loop with a gap, for which the linearisation is exact, has by its describing "
             f"function cycles of {cycles_text} with (8) and (9)."
@@ -143,14 +144,15 @@ def cause_of_figure_5(cycles: Cycles) -> Claim:
 
 def figure_6(loops: Loops, cycles: Cycles) -> Claim:
     """(10): stabilised."""
-    falls = {setting: float(by_name["homogeneous"].fell.mean()) for setting, by_name in loops.everywhere.items()}
+    falls = {setting: float(by_name["homogeneous"].fell.mean()) for setting, by_name in loops.all_settings.items()}
     error = known_interval(loops.by_bias[SHOWN_DEG]["homogeneous"].values("velocity_rms_error_rad_s"))
     return Claim(
         place="Fig. 6",
-        says="With (10) in the loop the system is stabilised.",
-        found=(
+        statement="With (10) in the loop the system is stabilised.",
+        result=(
             f"With noise and the push it falls in at most {max(falls.values()):.0%} of {loops.worlds} seeds at "
-            f"{', '.join(falls)}. {_standing(loops, 'homogeneous')} The velocity RMS error is {shown(error)} rad/s."
+            f"{', '.join(falls)}. {_standing(loops, 'homogeneous')} The velocity RMS error is {format_interval(error)} "
+            "rad/s."
         ),
         holds=max(falls.values()) == 0.0,
         otherwise="It falls.",
@@ -168,8 +170,8 @@ def figure_6_at_rest(lags: Lags, cycles: Cycles) -> Claim:
     is_sustained = lags.sweeps["homogeneous"].sustained
     return Claim(
         place="Fig. 6, beside Figs 4 and 5",
-        says="With (10) in the loop the oscillations of Figs 4 and 5 are not there.",
-        found=(
+        statement="With (10) in the loop the oscillations of Figs 4 and 5 are not there.",
+        result=(
             f"Let go without noise, with backlash, (10) {ten.words}. (8) {eight.words}. (9) {nine.words}. "
             f"Without backlash (10) comes to rest at {len(is_sustained) - is_sustained.sum()} of {len(is_sustained)} "
             f"servo lags up to {in_ms(float(lags.sweeps['homogeneous'].lags_s[-1]))}."

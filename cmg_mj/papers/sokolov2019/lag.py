@@ -20,7 +20,7 @@ from cmg_mj.papers.sokolov2019.release import (
     latency_threshold,
     sweeps,
 )
-from cmg_mj.papers.sokolov2019.rig import FINE, estimator, experiment, servo_of
+from cmg_mj.papers.sokolov2019.rig import FINE, estimator, experiment, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
 from cmg_mj.results import markdown
 from cmg_mj.simulation.experiment import Experiment
@@ -30,7 +30,7 @@ LARGEST_S = 0.12
 """Lags are searched up to here in the linearised loop [s]."""
 
 
-class Predicted(NamedTuple):
+class Prediction(NamedTuple):
     """Of one observer in the linearised, sampled loop; None for what does not happen in the range searched."""
 
     servo_lag_s: float | None
@@ -63,7 +63,7 @@ def _rig() -> Experiment:
     return experiment([FINE])
 
 
-def linearised(observer: str | None, **parameters: float) -> tuple[Loop, Servo, float]:
+def linearise(observer: str | None, **parameters: float) -> tuple[Loop, Servo, float]:
     """The sampled loop with an observer, or with the true rate (None).
 
     Args:
@@ -82,20 +82,20 @@ def linearised(observer: str | None, **parameters: float) -> tuple[Loop, Servo, 
         step = plant.model.opt.timestep
         return period_map(plant.reduced, servo, o, law, timestep=step, age_steps=age_steps, share=share)
 
-    return loop, servo_of(plant), law.dt
+    return loop, read_servo(plant), law.dt
 
 
-def predicted(observer: str | None) -> Predicted:
+def predict(observer: str | None) -> Prediction:
     """What the linearised loop does with a linear observer, or with the true rate (None)."""
-    loop, servo, dt = linearised(observer)
+    loop, servo, dt = linearise(observer)
 
     def growth(changed_servo: Servo, age_steps: int = 0) -> float:
         return float(modes(loop(changed_servo, age_steps), dt)[0].real)
 
     latencies = range(LARGEST_LATENCY_STEPS + 1) if observer else ()
-    return Predicted(
-        first_crossing(lambda lag: growth(servo.damped(lag)), 5e-3, LARGEST_S),
-        first_crossing(lambda lag: growth(servo.softened(lag)), 5e-3, LARGEST_S),
+    return Prediction(
+        first_crossing(lambda lag: growth(servo.damp(lag)), 5e-3, LARGEST_S),
+        first_crossing(lambda lag: growth(servo.soften(lag)), 5e-3, LARGEST_S),
         next((steps / 1000 for steps in latencies if growth(servo, steps) > 0.0), None),
         oscillation(loop(servo), dt),
     )
@@ -105,7 +105,7 @@ def largest_tau() -> float | None:
     """The time constant of (8) from which the loop oscillates with the model's servo [s]; its own lag is 2 tau."""
 
     def growth(tau: float) -> float:
-        loop, servo, dt = linearised("linear", tau=tau)
+        loop, servo, dt = linearise("linear", tau=tau)
         return float(modes(loop(servo), dt)[0].real)
 
     return first_crossing(growth, 0.01, 0.1)
@@ -117,7 +117,7 @@ class Lags(NamedTuple):
     sweeps: dict[str, Sweep]
     thresholds: dict[str, Threshold]
     latencies: dict[str, Threshold]
-    predictions: dict[str, Predicted]
+    predictions: dict[str, Prediction]
     """Of the linear observers and, under `truth`, of the true rate."""
     tau: float | None
     own_lag_s: float
@@ -132,7 +132,7 @@ def lags(on_share: OnShare) -> Lags:
     for i, name in enumerate(OBSERVERS):
         latencies[name] = latency_threshold(name)
         on_share((i + 1) / 4.0)
-    predictions = {name: predicted(name) for name in ("linear", "luenberger")} | {"truth": predicted(None)}
+    predictions = {name: predict(name) for name in ("linear", "luenberger")} | {"truth": predict(None)}
     return Lags(lag_sweeps, thresholds, latencies, predictions, largest_tau(), float(lag_sweeps["linear"].lags_s[0]))
 
 
@@ -151,8 +151,8 @@ def claim(results: Lags) -> Claim:
     )
     return Claim(
         place="Section V, the lag",
-        says="Finite differences lag, and the lag brings the loop into sustained oscillations.",
-        found=(
+        statement="Finite differences lag, and the lag brings the loop into sustained oscillations.",
+        result=(
             "Let go without noise, the rig oscillates by itself from the lags and latencies of the table on. With the "
             f"model's servo, {in_ms(own_lag)}, the loop of (8) has poles {linear.pole.real:.1f} +- "
             f"{linear.pole.imag:.1f}j 1/s, a damping ratio of {linear.damping:.2f} at {linear.frequency_hz:.1f} Hz. "
@@ -212,8 +212,8 @@ def _table(results: Lags) -> str:
 
 def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
     """Growth of the tilt's oscillation over the servo lag [1/s]."""
-    loop, servo, dt = linearised(observer)
-    return [oscillation(loop(servo.damped(float(lag))), dt).real for lag in lags_s]
+    loop, servo, dt = linearise(observer)
+    return [oscillation(loop(servo.damp(float(lag))), dt).real for lag in lags_s]
 
 
 def _picture(results: Lags) -> Picture:

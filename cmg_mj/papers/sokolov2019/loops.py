@@ -42,7 +42,7 @@ class Loops(NamedTuple):
     worlds: int
 
     @property
-    def everywhere(self) -> dict[str, Mapping[str, Result]]:
+    def all_settings(self) -> dict[str, Mapping[str, Result]]:
         """All but the gyro's: where, in words -> observer -> runs."""
         by_setting: dict[str, Mapping[str, Result]] = {f"e = {e:g} deg": by_name for e, by_name in self.by_bias.items()}
         return by_setting | {BEHIND_A_GAP: self.gap}
@@ -73,7 +73,7 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
 # --- what is read off the runs ------------------------------------------------------------------------------
 
 
-def _late(result: Result, name: str) -> np.ndarray:
+def _late_signal(result: Result, name: str) -> np.ndarray:
     """A signal over the last `LATE_S` of the worlds that stood, (n_ticks, n_stood)."""
     t = trajectory_of(result)["time_s"]
     return trajectory_of(result)[name].reshape(len(t), -1)[t >= t[-1] - LATE_S][:, result.stood]
@@ -81,7 +81,7 @@ def _late(result: Result, name: str) -> np.ndarray:
 
 def main_frequency(result: Result) -> float:
     """Where the tilt rate's spectrum has its late peak, averaged over the worlds that stood [Hz]."""
-    x2, t = _late(result, "x2_rad_s"), trajectory_of(result)["time_s"]
+    x2, t = _late_signal(result, "x2_rad_s"), trajectory_of(result)["time_s"]
     padded = 8 * len(x2)
     spectrum = (np.abs(np.fft.rfft(x2 - x2.mean(axis=0), padded, axis=0)) ** 2).mean(axis=1)
     return float(np.fft.rfftfreq(padded, t[1] - t[0])[spectrum.argmax()])
@@ -89,7 +89,7 @@ def main_frequency(result: Result) -> float:
 
 def deviations(result: Result) -> np.ndarray:
     """Standard deviation of the tilt over the last `LATE_S`, one a world that stood [deg]."""
-    return np.degrees(_late(result, "x1_rad")).std(axis=0)
+    return np.degrees(_late_signal(result, "x1_rad")).std(axis=0)
 
 
 def deviation(result: Result) -> Interval | None:
@@ -102,7 +102,7 @@ def tail(result: Result) -> float:
     return float(deviations(result).max())
 
 
-def shown(interval: Interval | None) -> str:
+def format_interval(interval: Interval | None) -> str:
     """With three digits after the point, as these claims write them."""
     return plus_minus(interval, 3)
 
@@ -117,15 +117,15 @@ def numbers(result: Result) -> dict[str, Any]:
     }
 
 
-def smaller(a: Result, b: Result, key: str = "velocity_rms_error_rad_s") -> bool | None:
+def is_smaller(a: Result, b: Result, key: str = "velocity_rms_error_rad_s") -> bool | None:
     """Whether a's numbers are smaller than b's beyond chance, world by world; None if fewer than two stood in both."""
     difference = known_interval(b.values(key) - a.values(key))
     return None if difference is None else difference.low > 0.0
 
 
-def better(a: Result, b: Result) -> bool:
+def is_better(a: Result, b: Result) -> bool:
     """Whether a has the smaller velocity error beyond chance and falls no more often, or stands where b always fell."""
-    beyond_chance = smaller(a, b)
+    beyond_chance = is_smaller(a, b)
     if beyond_chance is None:
         return bool(a.stood.all() and b.fell.all())
     return beyond_chance and a.fell.mean() <= b.fell.mean()

@@ -29,7 +29,7 @@ class Rest(NamedTuple):
     """The integrator [rad s]."""
 
 
-def rest_of(observer: str, e_deg: float, angles: str) -> Rest:
+def find_rest(observer: str, e_deg: float, angles: str) -> Rest:
     """Release the rig with a bias and wait; the law on `estimated` or `measured` angles."""
     settings = [*NO_NOISE, f"plant.equilibrium_bias_deg={e_deg}", "plant.initial_tilt_deg=0.1", "push=[]"]
     result = experiment([*settings, f"duration_s={REST_S}", f"controller.angle_source={angles}"], observer).run()
@@ -45,7 +45,7 @@ def biased_luenberger(e_deg: float = 0.25) -> Claim:
     model, e = paper.printed_model(), math.radians(e_deg)
     poles = np.linalg.eigvals(paper.error_matrix(model))
     x_hat = paper.rest_of_9(model, e)
-    rests = {angles: rest_of("luenberger", e_deg, angles) for angles in ("estimated", "measured")}
+    rests = {angles: find_rest("luenberger", e_deg, angles) for angles in ("estimated", "measured")}
     k1, k2, _, k4 = paper.K_E
     x_e = {"estimated": -(k1 * x_hat[0] + k2 * x_hat[1]) / k4, "measured": (k1 * e - k2 * x_hat[1]) / k4}
     largest_rest = max(float(rest.x.max()) for rest in rests.values())
@@ -53,8 +53,9 @@ def biased_luenberger(e_deg: float = 0.25) -> Claim:
     integrator_error = max(abs(rest.x_e / x_e[angles] - 1.0) for angles, rest in rests.items())
     return Claim(
         place="Section IV-B",
-        says="A - L C is Hurwitz; with a bias e the estimate of (9) is off, but the integrator still brings x to zero.",
-        found=(
+        statement="A - L C is Hurwitz; with a bias e the estimate of (9) is off, but the integrator still brings x to "
+        "zero.",
+        result=(
             f"Poles of A - L C: {poles_in_words(poles)} 1/s. At e = {e_deg} deg and without noise, |x| ends below "
             f"{largest_rest:.1e} after {REST_S:.0f} s, the law on estimated angles or on measured ones, while the "
             f"estimated rate rests at {rests['estimated'].x2_estimate:.4f} rad/s (closed form {x_hat[1]:.4f})."
@@ -79,7 +80,7 @@ def biased_luenberger(e_deg: float = 0.25) -> Claim:
 def homogeneous_vicinity(biases_deg: Sequence[float] = (0.0, 0.25, 0.5)) -> Claim:
     """Section IV-C: the error of (10) ends in a vicinity of the origin, whose size e decides."""
     model = paper.printed_model()
-    estimates = {e: rest_of("homogeneous", e, "measured").x2_estimate for e in biases_deg}
+    estimates = {e: find_rest("homogeneous", e, "measured").x2_estimate for e in biases_deg}
     closed_forms = {e: paper.rest_of_10(model, math.radians(e)) for e in biases_deg}
     largest_error = max(abs(estimates[e] - closed_forms[e]) / max(abs(closed_forms[e]), 5e-3) for e in biases_deg)
     rates_text = ", ".join(
@@ -87,10 +88,10 @@ def homogeneous_vicinity(biases_deg: Sequence[float] = (0.0, 0.25, 0.5)) -> Clai
     )
     return Claim(
         place="Section IV-C",
-        says=(
+        statement=(
             "With alpha in (1/2, 1] the error of (10) converges to a vicinity of the origin: sin(y1) replaces sin(x1)."
         ),
-        found=f"Without noise the estimated rate comes to rest at [rad/s] {rates_text}, the true one being zero.",
+        result=f"Without noise the estimated rate comes to rest at [rad/s] {rates_text}, the true one being zero.",
         holds=largest_error < 0.1,
         otherwise="The vicinity is not of the size that the equations give.",
         figures={

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.papers.recorded import pushed, trajectory_of
+from cmg_mj.papers.recorded import push_intervals, trajectory_of
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.loops import SHOWN_DEG, Loops
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
@@ -22,7 +22,7 @@ def picture(name: str, loops: Loops) -> Picture:
     rows: list[list[Panel]] = [[], [], []]
     for title, result in runs.items():
         example = trajectory_of(result).world(0)
-        t, shaded = example["time_s"], pushed(example)
+        t, shaded = example["time_s"], push_intervals(example)
         tilt = [
             Line(t, np.degrees(example["y1_rad"]), "measured y1", color=7, width=0.5),
             Line(t, np.degrees(example["x1_rad"]), "true x1", color=0),

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, experiment, rig_with, servo_of
+from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, experiment, make_rig, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
@@ -53,7 +53,7 @@ def releases(servos: Mapping[str, Sequence[Servo]], settings: Sequence[str] = ()
     runs = []
     for observer, observer_servos in servos.items():
         base = experiment([*RELEASE, FINE, *settings], observer)
-        rigs = [replace(base, plant=rig_with(base.scenario.plant, servo)) for servo in observer_servos]
+        rigs = [replace(base, plant=make_rig(base.scenario.plant, servo)) for servo in observer_servos]
         runs.append(BatchJob(rigs, range(len(rigs))))
     results = run_side_by_side(runs)
     return {observer: trajectory_of(result) for observer, result in zip(servos, results, strict=True)}
@@ -74,16 +74,16 @@ class Sweep(NamedTuple):
     amplitude_deg: np.ndarray
     """Largest tilt over the last two seconds, (n_lags,); NaN where the rig fell."""
 
-    def sustained_at(self, lag_s: float) -> bool:
+    def is_sustained_at(self, lag_s: float) -> bool:
         """Whether it does so at the lag nearest to this one."""
         return bool(self.sustained[np.argmin(np.abs(self.lags_s - lag_s))])
 
 
 def sweeps(observers: Sequence[str]) -> dict[str, Sweep]:
     """Release the rig with the model's servo and with slower ones, as stiff."""
-    servo = servo_of(experiment().plant)
+    servo = read_servo(experiment().plant)
     lags = np.array([servo.lag_s, *LAGS_S])
-    servos = [servo.damped(lag) for lag in lags]
+    servos = [servo.damp(lag) for lag in lags]
     results = {}
     for observer, trajectory in releases(dict.fromkeys(observers, servos)).items():
         t, x1 = trajectory["time_s"], trajectory["x1_rad"]
@@ -115,8 +115,8 @@ def lag_thresholds(sweep_by_observer: Mapping[str, Sweep], parts: int = 10) -> d
             thresholds[observer] = Threshold(0.0, float(sweep.lags_s[0]))
         else:
             grids[observer] = np.linspace(sweep.lags_s[first[0] - 1], sweep.lags_s[first[0]], parts + 1)
-    servo = servo_of(experiment().plant)
-    refinements = releases({observer: [servo.damped(lag) for lag in grid[1:]] for observer, grid in grids.items()})
+    servo = read_servo(experiment().plant)
+    refinements = releases({observer: [servo.damp(lag) for lag in grid[1:]] for observer, grid in grids.items()})
     for observer, grid in grids.items():
         i = int(np.argmax(is_sustained(refinements[observer])))  # the last of them is the sweep's own
         thresholds[observer] = Threshold(float(grid[i]), float(grid[i + 1]))

@@ -50,7 +50,7 @@ def estimator(name: str, prepared: Experiment, **changes: Any) -> Observer:
     return make_observer(name, prepared.law.dt, prepared.plant.reduced, **TABLE_II[name] | changes)
 
 
-def servo_of(plant: Plant) -> Servo:
+def read_servo(plant: Plant) -> Servo:
     """The gimbal servo that the model file describes."""
     (servo,) = plant.axis.servos
     (module,) = plant.modules
@@ -62,7 +62,7 @@ def servo_of(plant: Plant) -> Servo:
     )
 
 
-def rig_with(settings: PlantSettings, servo: Servo) -> Plant:
+def make_rig(settings: PlantSettings, servo: Servo) -> Plant:
     """The rig with another servo.
 
     Raises:

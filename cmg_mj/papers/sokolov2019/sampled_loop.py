@@ -40,11 +40,11 @@ class Servo:
         """How far the angle stays behind a setpoint that moves steadily [s]."""
         return self.kv / self.kp
 
-    def damped(self, lag_s: float) -> Servo:
+    def damp(self, lag_s: float) -> Servo:
         """As stiff, with another lag: more damping."""
         return replace(self, kv=lag_s * self.kp)
 
-    def softened(self, lag_s: float) -> Servo:
+    def soften(self, lag_s: float) -> Servo:
         """Critically damped, with another lag: less stiffness."""
         kp = 4.0 * self.inertia / lag_s**2
         return replace(self, kp=kp, kv=lag_s * kp)

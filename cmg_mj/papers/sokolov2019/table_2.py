@@ -24,7 +24,7 @@ PUSHES: dict[str, tuple[Sequence[str], Sequence[float]]] = {
 }
 """What pushes, and at which noises [ug/sqrt(Hz)]: the same for all three, which were tuned on one recording."""
 
-Tuned = Mapping[str, Mapping[str, Sequence[NoiseLevelResult]]]
+Levels = Mapping[str, Mapping[str, Sequence[NoiseLevelResult]]]
 """Push -> observer -> what came out, one a noise."""
 
 
@@ -53,7 +53,7 @@ def levels_of(
     ).levels
 
 
-def tuned(
+def tune_all(
     on_share: OnShare, worlds: int = WORLDS, seed: int = SEED
 ) -> dict[str, dict[str, Sequence[NoiseLevelResult]]]:
     """Tune all three under both pushes."""
@@ -76,7 +76,7 @@ def none_better(levels: Sequence[NoiseLevelResult]) -> bool:
     return all(level.verdict != "better" for level in levels)
 
 
-def claim(results: Tuned) -> Claim:
+def claim(results: Levels) -> Claim:
     """The printed values beside the best ones."""
     settings = [
         (push, i, level.noise_ug_rthz)
@@ -102,8 +102,8 @@ def claim(results: Tuned) -> Claim:
     )
     return Claim(
         place="Table II, tuning",
-        says="tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
-        found=(
+        statement="tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
+        result=(
             f"Fitted on {WORLDS} seeds and scored on as many others, from the push's start to a second after it. The "
             f"printed values are not beaten, by noise in ug/rtHz: {settings_text}."
         ),
@@ -137,7 +137,7 @@ def claim(results: Tuned) -> Claim:
     )
 
 
-def _table(results: Tuned) -> str:
+def _table(results: Levels) -> str:
     rows = [
         (
             push,
@@ -157,4 +157,4 @@ def _table(results: Tuned) -> str:
 
 def claims(on_share: OnShare) -> list[Claim]:
     """Table II."""
-    return [claim(tuned(on_share))]
+    return [claim(tune_all(on_share))]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.sokolov2019.rig import servo_of
+from cmg_mj.papers.sokolov2019.rig import read_servo
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment
@@ -31,7 +31,7 @@ class Motion(NamedTuple):
 
 def vertical_momentum(plant: Plant, motion: Motion) -> np.ndarray:
     """H of the module's docstring, (...) [N m s]."""
-    r, inertia = plant.reduced, servo_of(plant).inertia
+    r, inertia = plant.reduced, read_servo(plant).inertia
     q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.modules[0].gimbal_zero
     w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
     spin = r.J_d * w_d * np.cos(x3) - 0.5 * r.J2 * np.sin(2.0 * x3) * w_b
@@ -40,7 +40,7 @@ def vertical_momentum(plant: Plant, motion: Motion) -> np.ndarray:
 
 def vertical_torque(plant: Plant, motion: Motion) -> np.ndarray:
     """dH/dt, (...) [N m]."""
-    r, inertia = plant.reduced, servo_of(plant).inertia
+    r, inertia = plant.reduced, read_servo(plant).inertia
     q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.modules[0].gimbal_zero
     w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
     dw_b, dw_c, dw_d = np.moveaxis(motion.a, -1, 0)
@@ -59,7 +59,7 @@ class Locked(NamedTuple):
     torque: np.ndarray
     """What the bearing carries about the vertical, by MuJoCo's inverse dynamics, (n_ticks,) [N m]."""
 
-    def within(self, start_s: float, end_s: float) -> np.ndarray:
+    def torque_between(self, start_s: float, end_s: float) -> np.ndarray:
         """The torque between two times, (n_ticks,) [N m]."""
         return self.torque[(self.time_s > start_s) & (self.time_s < end_s)]
 
