@@ -33,8 +33,8 @@ def test_figure_4_other_seeds() -> None:
     assert claim.verdict == "not reproduced"
     figures = claim.figures
     assert figures["largest_by_smallest"] < figure_4.COMPARABLE < figures["largest_by_smallest_after_push"]
-    after = {name: figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
-    assert after["homogeneous"] > 1.3 * max(after["linear"], after["zero"])  # it misses the push
+    errors = {name: figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
+    assert errors["homogeneous"] > 1.3 * max(errors["linear"], errors["zero"])  # it misses the push
     assert max(figures[f"rms_{name}_rad_s"].low for name in OBSERVERS) > figures["rms_zero_rad_s"].high
     assert "closer than (10) and (11)." in claim.reason
     assert "closer than (9), (10) and (11)." in claim.reason
@@ -43,10 +43,14 @@ def test_figure_4_other_seeds() -> None:
 @pytest.mark.parametrize(("last", "verdict"), [(0.14, "reproduced within stated conditions"), (0.16, "not reproduced")])
 def test_figure_4_is_judged_by_the_push(monkeypatch: pytest.MonkeyPatch, last: float, verdict: str) -> None:
     """Errors within a factor of 1.5 after the push hold, whatever the whole run says."""
-    riding = figure_4.run_open_loop(2, SEED)
-    after = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.12, last, 0.11), strict=True)}
-    apart = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.5, 0.9, 0.01), strict=True)}
-    monkeypatch.setattr(figure_4, "run_open_loop", lambda *_: riding._replace(whole=apart, after_push=after))
+    runs = figure_4.run_open_loop(2, SEED)
+    push_errors = {
+        name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.12, last, 0.11), strict=True)
+    }
+    whole_errors = {
+        name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.5, 0.9, 0.01), strict=True)
+    }
+    monkeypatch.setattr(figure_4, "run_open_loop", lambda *_: runs._replace(whole=whole_errors, after_push=push_errors))
     claim = figure_4.figure_4(2, SEED)
     assert claim.verdict == verdict
     assert "zero is closer than (10) and (11)." in claim.reason
@@ -63,19 +67,19 @@ def test_an_order_is_one_beyond_chance_in_both_steps() -> None:
     # The means are in order, or inverted, but a difference of this scatter may be none.
     assert judge_order(numbers(0.05, 0.07, 0.11, 0.02)) == "does not hold"
     assert judge_order(numbers(0.11, 0.07, 0.05, 0.02)) == "does not hold"
-    alone = {name: np.array([0.05, math.nan, math.nan]) for name in OBSERVERS}
-    assert comparison.differences(alone) == [None, None]
-    assert judge_order(alone) == "does not hold"
+    one_world = {name: np.array([0.05, math.nan, math.nan]) for name in OBSERVERS}
+    assert comparison.differences(one_world) == [None, None]
+    assert judge_order(one_world) == "does not hold"
 
 
 @pytest.mark.parametrize("angles", ANGLES)
 def test_order_of_the_observers_in_the_loop(angles: AngleSource) -> None:
-    found = comparison.read_measures({angles: close_loops(list(OBSERVERS), angles, 6, SEED, 8.0)})
-    print({m.key: {name: v.mean() for name, v in m.numbers[angles].items()} for m in found})
-    orders = {measure.key: measure.orders[angles] for measure in found}
+    measures = comparison.read_measures({angles: close_loops(list(OBSERVERS), angles, 6, SEED, 8.0)})
+    print({m.key: {name: v.mean() for name, v in m.numbers[angles].items()} for m in measures})
+    orders = {measure.key: measure.orders[angles] for measure in measures}
     assert orders["velocity_rms_error_rad_s"] == orders["command_rms_rad_s"] == "holds"
     assert orders["tilt_rms_deg"] != "holds"
-    assert comparison.order(found).verdict == "reproduced within stated conditions"
+    assert comparison.order(measures).verdict == "reproduced within stated conditions"
 
 
 def of_measures(velocity: Mapping[AngleSource, dict], tilt: Mapping[AngleSource, dict]) -> list[Measure]:
@@ -83,17 +87,17 @@ def of_measures(velocity: Mapping[AngleSource, dict], tilt: Mapping[AngleSource,
 
 
 def test_the_order_is_judged_by_the_velocity_on_all_angles() -> None:
-    right, turned = numbers(0.05, 0.07, 0.11), numbers(0.11, 0.07, 0.05)
-    both: dict[AngleSource, dict] = {"measured": right, "estimated": right}
-    claim = comparison.order(of_measures(both, {"measured": turned, "estimated": turned}))
+    right, inverted = numbers(0.05, 0.07, 0.11), numbers(0.11, 0.07, 0.05)
+    velocity: dict[AngleSource, dict] = {"measured": right, "estimated": right}
+    claim = comparison.order(of_measures(velocity, {"measured": inverted, "estimated": inverted}))
     assert claim.verdict == "reproduced within stated conditions"
     assert "By the velocity RMS error the order holds. By the tilt RMS it is inverted" in claim.reason
     step = claim.figures["linear_less_ltv_measured_angles_velocity_rms_error_rad_s"]
     assert step.mean == pytest.approx(0.04)
     assert claim.figures["ltv_less_homogeneous_estimated_angles_tilt_rms_deg"].mean == pytest.approx(-0.04)
-    claim = comparison.order(of_measures({"measured": right, "estimated": turned}, both))
+    claim = comparison.order(of_measures({"measured": right, "estimated": inverted}, velocity))
     assert claim.verdict == "not reproduced"
-    claim = comparison.order(of_measures(both, {"measured": turned, "estimated": right}))
+    claim = comparison.order(of_measures(velocity, {"measured": inverted, "estimated": right}))
     assert "By the tilt RMS it does not hold: best is (11) and (9)." in claim.reason
 
 
@@ -117,11 +121,11 @@ def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> Non
     """A number of its own for every observer and kind of angles: each must come out in its own place."""
     sizes = {"linear": 0.11, "ltv": 0.07, "homogeneous": 0.05}
 
-    def made(names: Sequence[str], angles: AngleSource, worlds: int, seed: int) -> dict[str, Result]:
+    def make_results(names: Sequence[str], angles: AngleSource, worlds: int, seed: int) -> dict[str, Result]:
         more = 0.001 if angles == "estimated" else 0.0
         return {name: result_of(name, angles, sizes[name] + more) for name in names}
 
-    monkeypatch.setattr(figures_5_to_7, "close_loops", made)
+    monkeypatch.setattr(figures_5_to_7, "close_loops", make_results)
     by_euler = {TEN_BY_EULER: 0.09, TEN_EXACT_GAIN: 0.088, ELEVEN_BY_EULER: 0.051}
     monkeypatch.setattr(
         second_place, "errors_of", lambda forms, worlds, seed: {form: np.full(3, by_euler[form]) for form in forms}
@@ -190,6 +194,6 @@ def test_the_cause_is_not_partly_the_method(exact: float, euler: float, scatter:
 
 
 def test_euler_makes_ten_worse_in_the_loop_and_eleven_hardly() -> None:
-    found = second_place.errors_of((TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER), 4, SEED)
-    assert mean_interval(found[TEN_BY_EULER] / found[TEN]).low > 1.15
-    assert abs(mean_interval(found[ELEVEN_BY_EULER] / found[ELEVEN]).mean - 1.0) < 0.05
+    errors = second_place.errors_of((TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER), 4, SEED)
+    assert mean_interval(errors[TEN_BY_EULER] / errors[TEN]).low > 1.15
+    assert abs(mean_interval(errors[ELEVEN_BY_EULER] / errors[ELEVEN]).mean - 1.0) < 0.05

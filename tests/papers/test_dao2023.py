@@ -14,47 +14,47 @@ SEED = 7
 
 
 @pytest.fixture(scope="module")
-def found() -> Study:
+def results() -> Study:
     """Ten other motions than the report's."""
     return study(seed=SEED, rates_hz=(400.0, 50.0))
 
 
-def test_conventional_state_error_keeps_oscillating_and_the_proposed_does_not(found: Study) -> None:
+def test_conventional_state_error_keeps_oscillating_and_the_proposed_does_not(results: Study) -> None:
     """Fig. 2."""
-    plain, ours = found.conventional.tail_rms()[0], found.proposed.tail_rms()[0]
+    plain, ours = results.conventional.tail_rms()[0], results.proposed.tail_rms()[0]
     print(f"state error RMS over 160-200 s: conventional {np.round(plain, 3)}, proposed {np.round(ours, 3)}")
     assert plain.min() > 0.2
     assert ours.max() < 0.1
-    assert found.largest_angle > 100.0  # the motion that no two integrators agree on
+    assert results.largest_angle > 100.0  # the motion that no two integrators agree on
 
 
-def test_settling_order(found: Study) -> None:
+def test_settling_order(results: Study) -> None:
     """Fig. 3: 1000 before 10 before 0.1; and not before 10 on the way there, nor ever faster with Sigma."""
-    ten, thousand, tenth, ten_thousand = exogenous_settle_times(found.proposed)
+    ten, thousand, tenth, ten_thousand = exogenous_settle_times(results.proposed)
     print(f"settle below {SETTLED}: Sigma 10 {ten}, 1000 {thousand}, 0.1 {tenth}, 10000 {ten_thousand}")
     assert np.sum((thousand < ten) & (ten <= tenth) & np.isfinite(thousand)) >= 9
-    early = exogenous_settle_times(found.proposed, 1.0)
+    early = exogenous_settle_times(results.proposed, 1.0)
     assert np.sum(early[1] < early[0]) < 9
     assert np.median(ten_thousand) > 2.0 * np.median(thousand)
 
 
-def test_state_error_does_not_settle_quickly(found: Study) -> None:
+def test_state_error_does_not_settle_quickly(results: Study) -> None:
     """Fig. 2(b): with all known, L alone needs some time constants of 2 s, the real part of s^2 + s + 1 = 0."""
-    settled, known = state_settle_times(found.proposed)
-    print(f"state error below {SETTLED}: {settled} s; with all known {known} s")
-    size = np.linalg.norm(found.proposed.state[0, 0], axis=-1)
+    learning_times, ideal_times = state_settle_times(results.proposed)
+    print(f"state error below {SETTLED}: {learning_times} s; with all known {ideal_times} s")
+    size = np.linalg.norm(results.proposed.state[0, 0], axis=-1)
     expected = 2.0 * np.log(size / SETTLED)
-    assert np.all(np.abs(known - expected) < 3.0)
-    assert np.median(settled) > QUICK * np.median(known)
+    assert np.all(np.abs(ideal_times - expected) < 3.0)
+    assert np.median(learning_times) > QUICK * np.median(ideal_times)
 
 
-def test_parameters_at_sigma_1000(found: Study) -> None:
-    errors = np.abs(found.proposed.exogenous[-1, 1, :, :2])
+def test_parameters_at_sigma_1000(results: Study) -> None:
+    errors = np.abs(results.proposed.exogenous[-1, 1, :, :2])
     print(f"largest errors of theta1 and theta2: {errors.max(axis=0)}")
     assert errors.max() < 1e-3
 
 
-def test_too_large_a_gain_is_slow_at_a_finer_step_too(found: Study) -> None:
+def test_too_large_a_gain_is_slow_at_a_finer_step_too(results: Study) -> None:
     """No effect of sampling: at 1 kHz Sigma = 10000 is no faster than at 400 Hz, and slower than 1000."""
     assert SIGMAS[1::2] == (1000.0, 10_000.0)
     t = np.arange(40_001) / 1000.0
@@ -65,7 +65,7 @@ def test_too_large_a_gain_is_slow_at_a_finer_step_too(found: Study) -> None:
         late = (errors.t > 30.0) & (errors.t <= 40.0)
         return np.median(np.linalg.norm(errors.exogenous[late], axis=-1), axis=(0, 2))
 
-    coarse, fine = medians(found.proposed)[1::2], medians(finer)
+    coarse, fine = medians(results.proposed)[1::2], medians(finer)
     print(f"median error over 30-40 s at Sigma = 1000 and 10000: at 400 Hz {coarse}, at 1 kHz {fine}")
     assert coarse[1] > 3.0 * coarse[0]
     assert fine[1] > 3.0 * fine[0]

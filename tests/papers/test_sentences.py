@@ -33,13 +33,13 @@ def test_what_was_said_is_not_said_again() -> None:
 
 def texts(kind: str) -> list[tuple[str, str]]:
     """Paper and text of the paragraphs of a kind in docs/reproduced.md."""
-    found, paper = [], ""
+    matches, paper = [], ""
     for paragraph in (DOCS / "reproduced.md").read_text(encoding="utf-8").split("\n\n"):
         if paragraph.startswith("## "):
             paper = paragraph
         elif match := re.match(rf"\*\*(?:{kind}):\*\* (.*)", paragraph, re.DOTALL):
-            found.append((paper, match[1]))
-    return found
+            matches.append((paper, match[1]))
+    return matches
 
 
 def test_no_sentence_of_the_report_is_long() -> None:
@@ -49,6 +49,6 @@ def test_no_sentence_of_the_report_is_long() -> None:
 
 
 def test_every_condition_stands_once_in_a_paper() -> None:
-    said = [(paper, s) for paper, text in texts("Conditions|Why not") for s in split_sentences(text)]
-    again = {entry for entry in said if said.count(entry) > 1 and not entry[1].startswith("As at ")}
-    assert not again
+    entries = [(paper, s) for paper, text in texts("Conditions|Why not") for s in split_sentences(text)]
+    repeats = {entry for entry in entries if entries.count(entry) > 1 and not entry[1].startswith("As at ")}
+    assert not repeats

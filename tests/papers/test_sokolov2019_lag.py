@@ -31,11 +31,11 @@ def servo() -> Servo:
 
 
 def test_servo_is_the_models() -> None:
-    found = servo()
-    assert (found.kp, found.kv) == (85.6, 0.731)
-    assert found.inertia == pytest.approx(paper_model.I_c + paper_model.I_d, rel=1e-12)
-    assert found.damp(0.02).lag_s == found.soften(0.02).lag_s == pytest.approx(0.02)
-    soft = found.soften(0.02)
+    model_servo = servo()
+    assert (model_servo.kp, model_servo.kv) == (85.6, 0.731)
+    assert model_servo.inertia == pytest.approx(paper_model.I_c + paper_model.I_d, rel=1e-12)
+    assert model_servo.damp(0.02).lag_s == model_servo.soften(0.02).lag_s == pytest.approx(0.02)
+    soft = model_servo.soften(0.02)
     assert soft.kv == pytest.approx(2.0 * math.sqrt(soft.kp * soft.inertia))
 
 
@@ -47,26 +47,26 @@ def test_a_servo_too_fast_for_the_integrator_is_refused() -> None:
 @pytest.mark.parametrize("lag_ms", [8.5, 15.0, 22.0])
 def test_pole_of_the_sampled_loop_is_mujocos(lag_ms: float) -> None:
     """Decay and frequency of a small release of the compiled bodies, against the eigenvalue."""
-    loop, own, dt = lag.linearise("linear")
-    varied = own.damp(1e-3 * lag_ms)
-    pole = oscillation(loop(varied), dt)
+    loop, model_servo, dt = lag.linearise("linear")
+    slow_servo = model_servo.damp(1e-3 * lag_ms)
+    pole = oscillation(loop(slow_servo), dt)
     settings = ["plant.initial_tilt_deg=0.02", "duration_s=3.0"]
-    trajectory = release.release("linear", [varied], settings)
+    trajectory = release.release("linear", [slow_servo], settings)
     t, x2 = trajectory["time_s"], trajectory["x2_rad_s"][:, 0]
-    kept = (t > 0.8) & (t < 1.6)  # when the faster poles have faded
+    window = (t > 0.8) & (t < 1.6)  # when the faster poles have faded
     # A free oscillation obeys x[k+2] = 2 r cos(w) x[k+1] - r^2 x[k], here for steps of eight ticks.
-    x = [x2[kept][8 * i :] for i in range(3)]
+    x = [x2[window][8 * i :] for i in range(3)]
     n = len(x[2])
     (a, b), *_ = np.linalg.lstsq(np.column_stack([x[1][:n], x[0][:n]]), x[2], rcond=None)
-    measured = np.log(np.roots([1.0, -a, -b]).astype(complex)[0]) / (8.0 * dt)
-    assert abs(measured.imag) == pytest.approx(pole.imag, rel=0.02)
-    assert measured.real == pytest.approx(pole.real, abs=0.15)
+    pole_on_mujoco = np.log(np.roots([1.0, -a, -b]).astype(complex)[0]) / (8.0 * dt)
+    assert abs(pole_on_mujoco.imag) == pytest.approx(pole.imag, rel=0.02)
+    assert pole_on_mujoco.real == pytest.approx(pole.real, abs=0.15)
 
 
 def test_modes_of_a_known_system() -> None:
     """Without observer, gravity or spin the servo's own poles come out."""
-    still = paper.printed_model()
-    A, B = rig_matrices(still, servo())
+    model = paper.printed_model()
+    A, B = rig_matrices(model, servo())
     assert B[4, 0] == 1.0
     s = servo()
     np.testing.assert_allclose(A[3, 2:], [-s.kp / s.inertia, -s.kv / s.inertia, s.kp / s.inertia])
@@ -101,12 +101,12 @@ def test_the_flywheels_torque_on_the_gimbal_counts(lags: lag.Lags, monkeypatch: 
     """A loop model without it predicts another threshold, and MuJoCo tells the two apart."""
     from cmg_mj.papers.sokolov2019 import sampled_loop
 
-    def without(model, servo):
+    def matrices_without(model, servo):
         A, B = rig_matrices(model, servo)
         A[3, 1] = 0.0
         return A, B
 
-    monkeypatch.setattr(sampled_loop, "rig_matrices", without)
+    monkeypatch.setattr(sampled_loop, "rig_matrices", matrices_without)
     prediction = lag.predict("linear").servo_lag_s
     assert prediction is not None
     assert abs(prediction - (lags.thresholds["linear"].middle or 0.0)) > 1e-3
