@@ -25,7 +25,7 @@ PAPERS = {
 """Paper -> its title."""
 
 BEYOND = {"beyond": "A step beyond the papers"}
-"""What is reproduced only when asked for by name, because it takes long."""
+"""The studies reproduced only when asked for by name, because they take long."""
 
 NEEDS = {"aranovskiy2020": ("sympy",), "sokolov2019": ("sympy",)}
 """Paper -> the packages that it needs beyond the bench's; the extra `[papers]` has them all."""
@@ -33,7 +33,7 @@ NEEDS = {"aranovskiy2020": ("sympy",), "sokolov2019": ("sympy",)}
 
 @dataclass
 class Reproduction:
-    """What was obtained for one paper.
+    """The claims obtained for one paper.
 
     Attributes:
         paper: Its short name.
@@ -108,5 +108,5 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
 def _on_share(
     on_progress: Callable[[str, float], None], label: str, seconds_before: float, seconds: float, total: float
 ) -> Callable[[float], None]:
-    """From a section's share to that of the whole, of which so many seconds lie before it."""
+    """Turn a section's share into that of the whole, of which so many seconds lie before the section."""
     return lambda share: on_progress(label, (seconds_before + share * seconds) / total)

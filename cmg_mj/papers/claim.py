@@ -53,7 +53,7 @@ class Claim:
 
     @property
     def verdict(self) -> Verdict:
-        """How the paper and what was obtained compare."""
+        """The comparison of the paper with what was obtained."""
         if not self.holds:
             return "not reproduced"
         return "reproduced within stated conditions" if self.conditions else "reproduced"

@@ -34,7 +34,7 @@ def finite_difference_error(model: ReducedModel, h: float = 1e-5) -> float:
 
 
 def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where x' = A x + B u, u = -K x + k1 e rests. With y1 = x1 - e the bias enters with a plus.
+    """Solve x' = A x + B u, u = -K x + k1 e for its rest. With y1 = x1 - e the bias enters with a plus.
 
     Args:
         A: State matrix, (n, n).

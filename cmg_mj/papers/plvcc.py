@@ -27,7 +27,7 @@ Paper = Literal["aranovskiy2020", "sokolov2019"]
 
 
 class PrintedInertia(NamedTuple):
-    """What a paper prints of its inertia.
+    """A paper's inertia as printed.
 
     Attributes:
         place: Where it says that the system is not PLvCC.
@@ -119,7 +119,7 @@ def symmetric_part_is_lie_derivative(i: int, M: Any) -> bool:
 
 
 def printed_entries() -> dict[str, bool]:
-    """Whether the definition gives what the appendix prints for the entries of B_(2), for any Psi and any m1(q2)."""
+    """Compare the definition with the appendix's entries of B_(2), for any Psi and any m1(q2)."""
     import sympy as sp
 
     matrix = B(1, any_psi(), any_m1(), dict.fromkeys(coordinates(), 0))
@@ -149,7 +149,7 @@ def mixed_derivatives(sign: int = 1) -> bool:
 
 
 def zero_d_is_singular() -> bool:
-    """Whether d = 0 with a constant b, the appendix's trivial solution, leaves a singular Psi (it does not)."""
+    """Return true if d = 0 with a constant b, the appendix's trivial solution, leaves a singular Psi (it does not)."""
     import sympy as sp
 
     Psi = sp.Matrix([[0, 1], [1, 0]])
@@ -158,7 +158,7 @@ def zero_d_is_singular() -> bool:
 
 @dataclass(frozen=True)
 class Proof:
-    """What of a paper's proof was found right.
+    """The checked steps and decisions of a paper's proof.
 
     Attributes:
         steps: Step in words -> whether it was found so.
@@ -172,7 +172,7 @@ class Proof:
 
     @property
     def failures(self) -> list[str]:
-        """What was not found so: a step, a Psi for the paper's m1, no Psi for an m1 that has one."""
+        """The failures: a step, a Psi for the paper's m1, no Psi for an m1 that has one."""
         failures = [name for name, right in self.steps.items() if not right]
         failures += [f"m1 = {decision.m1}: a Psi was found" for decision in self.paper_decisions if decision.plvcc]
         return failures + [

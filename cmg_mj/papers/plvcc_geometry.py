@@ -77,7 +77,7 @@ def lie_derivative(X: Any, M: Any) -> Any:
 
 
 def vanishes(expression: Any) -> bool:
-    """Whether a quotient of polynomials in q, sines, cosines and exponentials is zero.
+    """Return true if a quotient of polynomials in q, sines, cosines and exponentials is zero.
 
     sympy's simplify does this too, in minutes for some of the expressions here.
     """
@@ -98,7 +98,7 @@ def vanishes(expression: Any) -> bool:
 
 
 def is_skew(matrix: Any) -> bool:
-    """Whether A + A' is zero."""
+    """Return true if A + A' is zero."""
     return all(vanishes(entry) for entry in matrix + matrix.T)
 
 
@@ -125,7 +125,7 @@ def explicit_psi(m1: Any, C: Any) -> Any:
 
 @dataclass(frozen=True)
 class Decision:
-    """Whether M = diag(m1(q2), 1) is PLvCC.
+    """The decision whether M = diag(m1(q2), 1) is PLvCC.
 
     Attributes:
         plvcc: Whether it is.

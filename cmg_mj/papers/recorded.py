@@ -1,4 +1,4 @@
-"""What several papers read off a recorded run."""
+"""Readings of a recorded run that several papers need."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cmg_mj.results.trajectory import Trajectory
 
 
 def trajectory_of(result: Result) -> Trajectory:
-    """What was recorded, of a result that kept it."""
+    """Return the recording of a result that kept it."""
     assert result.trajectory is not None
     return result.trajectory
 

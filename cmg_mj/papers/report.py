@@ -89,11 +89,11 @@ MEANINGS = {
     "mended; they stand below the claim",
     "not reproduced": "it does not, and the reason stands below the claim",
 }
-"""What the verdicts say."""
+"""The meanings of the verdicts."""
 
 
 def _opening(entries: Sequence[Reproduction]) -> list[str]:
-    """What the verdicts mean, how many there are of each, and which claims were not reproduced."""
+    """List the meanings of the verdicts, their counts, and the claims that were not reproduced."""
     parts = [
         "Each claim stands beside what this software obtains. Its verdict is computed from the figures behind it, "
         "and no parameter was tuned to bring one about.",
@@ -134,7 +134,7 @@ def _parts_of_claim(claim: Claim, log: SentenceLog) -> list[str]:
 
 
 def _count_of_verdicts(entries: Sequence[Reproduction]) -> str:
-    """How many claims have which verdict, the papers' and ours apart, and how long it took."""
+    """Count the claims by verdict, the papers' and ours apart, and say how long they took."""
     claims = [claim for entry in entries for claim in entry.claims]
     sentences = []
     for is_ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
@@ -147,7 +147,7 @@ def _count_of_verdicts(entries: Sequence[Reproduction]) -> str:
 
 
 REPORT_FILES = ["report.md", "figures.json"]
-"""What every report has; its pictures are beside them."""
+"""The files of every report; its pictures are beside them."""
 
 
 def save_report(folder: RunFolder | Path, entries: Sequence[Reproduction]) -> Path:

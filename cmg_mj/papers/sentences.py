@@ -17,7 +17,7 @@ def split_sentences(text: str) -> list[str]:
 
 
 def count_words(sentence: str) -> int:
-    """How many words a sentence has."""
+    """Count the words of a sentence."""
     return sum(any(letter.isalnum() for letter in part) for part in sentence.split())
 
 

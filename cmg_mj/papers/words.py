@@ -1,4 +1,4 @@
-"""How numbers are written in a claim's words."""
+"""The numbers in a claim's words."""
 
 from __future__ import annotations
 

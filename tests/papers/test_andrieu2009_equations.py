@@ -45,7 +45,7 @@ def test_w_is_its_integral_and_the_gradient_its_derivative(d_inf: float) -> None
 
 @pytest.mark.parametrize("d_inf", [0.25, 0.75])
 def test_w_is_homogeneous_in_the_bi_limit(d_inf: float) -> None:
-    """Of degree d_W with the weights (1, 1) near 0 and (1 - d_inf, 1) far out, and positive."""
+    """W has the degree d_W with the weights (1, 1) near 0 and (1 - d_inf, 1) far out, and is positive."""
     W = lyapunov(d_inf)
     near, far = invert(W, 0.4e-9, -0.7e-9), invert(W, 0.4 * (1e12) ** (1.0 - d_inf), -0.7e12)
     twice_near, twice_far = invert(W, 0.8e-9, -1.4e-9), invert(W, 0.4 * (2e12) ** (1.0 - d_inf), -1.4e12)

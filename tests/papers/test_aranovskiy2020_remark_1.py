@@ -92,7 +92,7 @@ def test_euler_makes_the_estimate_worse() -> None:
 
 
 def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matters() -> None:
-    """Where it settles, by a root of the nine equations."""
+    """It settles at a root of its nine equations."""
     corrected_H, printed_H, rate = misprint.misprint(SEED)
     A, lost = A_prime(), C.T @ C
     for H, first in ((corrected_H, A), (printed_H, printed_model().A)):
@@ -175,7 +175,7 @@ def test_the_verdict_on_the_cost_follows_from_the_instructions(monkeypatch: pyte
 
 @pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
 def test_the_recorded_instructions_are_those_counted() -> None:
-    """Of another compiler or C library some per cent more or less."""
+    """Another compiler or C library may make some per cent more or less."""
     recorded = json.loads(on_the_board.RECORDED.read_text())
     assert on_the_board.count() == pytest.approx(recorded, rel=0.1)
 

@@ -1,4 +1,4 @@
-"""Where the rig of aranovskiy2020 rests with a biased observer in the law."""
+"""The rest of the rig of aranovskiy2020 with a biased observer in the law."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def test_a_servo_that_is_noticed_is_not_reproduced(servos: servo.Servos) -> None
 
 
 def test_tracking_is_the_rate_less_the_command(servos: servo.Servos) -> None:
-    """Of a recording whose gimbal turns at 0.9 of the command: a tenth."""
+    """A recording whose gimbal turns at 0.9 of the command is a tenth off."""
     run = trajectory_of(servos.soft)
     time = run["time_s"]
     command = np.tile(np.sin(time)[:, None], (1, 2))

@@ -25,7 +25,7 @@ NO_PAPER = frozenset(BEYOND)
 
 
 class Import(NamedTuple):
-    """What is imported, by its full name, and where."""
+    """An import: the full name, and the place."""
 
     name: str
     line: int
@@ -144,7 +144,7 @@ def section_file(node: ast.AST) -> str:
 
 
 def exports_claims(path: Path) -> bool:
-    """Whether a file has a function `claims` that takes one argument."""
+    """Return true if a file has a function `claims` that takes one argument."""
     if not path.is_file():
         return False
     functions = [node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.FunctionDef)]

@@ -37,7 +37,7 @@ NOT_PLVCC = {
 
 @cache
 def decision_on(name: str) -> Decision:
-    """Of one of `PLVCC`."""
+    """Decide on one of `PLVCC`."""
     return decide(PLVCC[name])
 
 
@@ -90,7 +90,7 @@ def momenta(m1: Any, Psi: Any, duration: float = 1.0) -> np.ndarray:
 
 @pytest.mark.parametrize("name", PLVCC)
 def test_momenta_of_an_explicit_psi_do_not_change(name: str) -> None:
-    """What PLvCC is for: without forces the new momenta are constant. B_(i) is not used here."""
+    """PLvCC means that without forces the new momenta are constant. B_(i) is not used here."""
     values = momenta(PLVCC[name], decision_on(name).Psi)
     np.testing.assert_allclose(values, np.broadcast_to(values[0], values.shape), rtol=1e-7, atol=1e-9)
 

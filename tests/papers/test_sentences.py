@@ -1,4 +1,4 @@
-"""How the report is written: short sentences, and each condition once."""
+"""The words of the report: short sentences, and each condition once."""
 
 from __future__ import annotations
 

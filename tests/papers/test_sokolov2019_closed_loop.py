@@ -37,7 +37,7 @@ def results() -> Loops:
 
 @pytest.fixture(scope="module")
 def lags() -> Lags:
-    """What test_sokolov2019_lag.py sees MuJoCo do: (8) alone oscillates by itself, from a servo lag of 20 ms on."""
+    """The lags of MuJoCo in test_sokolov2019_lag.py: (8) alone oscillates by itself, from a servo lag of 20 ms on."""
     lags_s = np.array([0.0085, *LAGS_S])
     quiet, never = Sweep(lags_s, np.zeros(12, dtype=bool), np.zeros(12)), Threshold(0.045, None)
     return Lags(
@@ -56,7 +56,7 @@ def lags() -> Lags:
 
 @pytest.fixture(scope="module")
 def cycles() -> Cycles:
-    """What test_sokolov2019_backlash.py sees MuJoCo do."""
+    """The cycles of MuJoCo in test_sokolov2019_backlash.py."""
     ends = {"linear": 0.166, "luenberger": 0.219, "homogeneous": 0.097, WITH_Y2: 0.219}
     foreseen: dict[str, PredictedCycle | None] = {
         "linear": PredictedCycle(0.155, 3.2),
@@ -103,7 +103,7 @@ def test_only_the_runs_behind_a_gap_have_one(results: Loops) -> None:
     """There the gimbal stands half a gap, 10 arcmin, off where the servo would have it behind the commands."""
 
     def deviation_arcmin(result: Result) -> float:
-        """How far at most ticks, world 0, while it stands [arcmin]."""
+        """Median distance from the setpoint, world 0, while it stands [arcmin]."""
         run = trajectory_of(result).of_worlds(slice(0, 1))
         t, u, x3 = (
             run[column][np.isfinite(run["x3_rad"].ravel())].ravel() for column in ("time_s", "u_rad_s", "x3_rad")
@@ -132,7 +132,7 @@ def test_the_late_window_does_not_hold_the_pushs_tail(results: Loops) -> None:
 
 
 def test_verdicts_follow_the_lags_and_the_cycles(results: Loops, lags: Lags, cycles: Cycles) -> None:
-    """What they rest on, turned round."""
+    """The lags and cycles that the verdicts rest on are exchanged."""
 
     def replace_lags(name: str, sustained: bool) -> Lags:
         sweep = lags.sweeps[name]._replace(sustained=np.full(12, sustained))

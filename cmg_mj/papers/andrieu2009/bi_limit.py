@@ -116,7 +116,7 @@ def largest_b(n: int, d_inf: float, v: Sequence[float] = ()) -> float:
 
 
 def list_violations(n: int, d_inf: float, b: float, v: Sequence[float] = ()) -> list[str]:
-    """Which of the inequalities (21), (22) that the proof of Theorem 1 needs do not hold.
+    """List the inequalities (21), (22), needed by the proof of Theorem 1, that do not hold.
 
     Args:
         n: Dimension.

@@ -98,7 +98,7 @@ class Increments(NamedTuple):
     by_Omega2_printed: float
     """Omega_2 ending in m2 x2^(2-p), as printed."""
     by_Omega2_local: float
-    """With c_inf at each point in place of its maximum."""
+    """Omega_2 with c_inf at each point in place of its maximum."""
     by_Omega2_local_printed: float
     c_inf: float
     slope_over_Omega2: float

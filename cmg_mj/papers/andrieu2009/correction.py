@@ -16,7 +16,7 @@ SEEN_NOISE = 0.05
 
 
 def correction(run: Run, reference: Replay) -> Claim:
-    """What the homogeneous terms do in the example."""
+    """Judge the part of the homogeneous terms in the example."""
     model = Bioreactor(HBAR_OF_OBSERVERS)
     linear = replay(HOMOGENEOUS, run, model, p=0.0)
     b_inside = 0.5 * largest_b(2, P, (P,))

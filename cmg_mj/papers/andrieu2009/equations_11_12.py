@@ -17,7 +17,7 @@ SIZES = (1e-1, 1e-2, 1e-3)
 """Amplitudes of the disturbances."""
 KINDS = ("delta_1", "delta_2", "delta_y")
 ERRORS = (1.0, 10.0, 100.0, 1000.0)
-"""Of x2 at the start."""
+"""Errors of x2 at the start."""
 GAINS = (1.0, 10.0, 50.0)
 """L(0) over phi2."""
 SOLUTIONS = (1.0, 2.0, 4.0)
@@ -38,7 +38,7 @@ class Column(NamedTuple):
 
 
 class Response(NamedTuple):
-    """What the observer made of the runs, each (n_times, n_runs)."""
+    """The observer's answer to the runs, each (n_times, n_runs)."""
 
     scaled_error: np.ndarray
     """|L^-1 e| with the matrix of (10)."""

@@ -126,7 +126,7 @@ def bias_left(study: Study) -> np.ndarray:
 
 
 def bias_of_constant_gain(study: Study) -> Claim:
-    """What makes the constant gain's bias."""
+    """Judge the cause of the constant gain's bias."""
     shares_left = bias_left(study)[0]
     return Claim(
         place="Section 3.1, bias of the constant gain",
@@ -140,7 +140,7 @@ def bias_of_constant_gain(study: Study) -> Claim:
 
 
 def bias_of_updated_gains(study: Study) -> Claim:
-    """What makes the biases of the two whose gain is updated."""
+    """Judge the cause of the biases of the two observers with updated gain."""
     shares_left = bias_left(study)[1:]
     due = np.all(shares_left < HALF, axis=0).tolist()
     windows = [name for name, is_due in zip(WINDOW_NAMES, due, strict=True) if is_due]

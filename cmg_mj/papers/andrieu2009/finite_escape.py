@@ -36,7 +36,7 @@ class Escape(NamedTuple):
     end_time: float
     """When the solution ends."""
     moved: float
-    """By how much y has moved until then; infinite if without bound."""
+    """Distance that y has moved until then; infinite if without bound."""
 
 
 def solution(p: float, x2: float, share_left: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:

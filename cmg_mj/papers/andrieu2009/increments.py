@@ -67,7 +67,7 @@ def increments() -> Claim:
 
 
 def printed_exponent(n: int, i: int, j: int, d_inf: float) -> float:
-    """Of |x_j_hat - x_j| in (6), as printed there."""
+    """Return the exponent of |x_j_hat - x_j| in (6), as printed there."""
     return (1.0 - d_inf * (n - i)) / (1.0 - d_inf * (n - j))
 
 

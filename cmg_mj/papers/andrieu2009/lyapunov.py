@@ -20,7 +20,7 @@ from cmg_mj.elementwise import signed_power
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection
 
 SCALES = np.geomspace(1e-8, 1e8, 65)
-"""Of the states, from where W is that of its limit at 0 to where it is that at infinity."""
+"""Scales of the states, from where W is that of its limit at 0 to where it is that at infinity."""
 ANGLES = 120
 
 
@@ -57,7 +57,7 @@ class Lyapunov:
 
     @property
     def powers(self) -> tuple[float, float]:
-        """Of h."""
+        """The two powers in h."""
         r1 = 1.0 - self.K.d_inf
         return self.d_W - 1.0, self.d_W / r1 - 1.0
 

@@ -54,7 +54,7 @@ def run_kinds(labels: Sequence[str], worlds: int, seed: int) -> dict[str, Result
 
 
 def comparison_claim(results: dict[str, Result]) -> Claim:
-    """Who is how good."""
+    """Compare the errors of `KINDS` in the loop."""
     errors = {label: result.values(VELOCITY) for label, result in results.items()}
     standing_counts = {label: int(result.stood.sum()) for label, result in results.items()}
     worlds = len(errors["high_gain"])

@@ -45,7 +45,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Replay:
-    """What an observer makes of a run.
+    """An observer's estimates along a run.
 
     Attributes:
         x2: Estimate of x2, (n, seeds).

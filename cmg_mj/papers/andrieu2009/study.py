@@ -28,14 +28,14 @@ class Study(NamedTuple):
 
     run: Run
     nominal: dict[str, Replay]
-    """With the paper's noise and error of hbar."""
+    """Runs with the paper's noise and error of hbar."""
     loud: dict[str, Replay]
-    """With noise of 10 % of the domain."""
+    """Runs with noise of 10 % of the domain."""
     quiet_run: Run
     quiet: dict[str, Replay]
     """Without noise, one run."""
     exact: dict[str, Replay]
-    """With noise, without error of hbar."""
+    """Runs with noise, without error of hbar."""
     rate: np.ndarray
     """df2/dx2, (n, seeds)."""
 

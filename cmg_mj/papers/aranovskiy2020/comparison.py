@@ -19,7 +19,7 @@ Numbers = Mapping[str, np.ndarray]
 """Observer -> a measure in the loop, (n_worlds,); NaN for a world that did not stand. Less is better."""
 
 AngleSource = Literal["measured", "estimated"]
-"""Which angles the law is fed with."""
+"""The angles that the law is fed with."""
 
 Order = Literal["holds", "is inverted", "does not hold"]
 
@@ -37,7 +37,7 @@ def differences(numbers: Numbers) -> list[Interval | None]:
 
 
 def judge_order(numbers: Numbers) -> Order:
-    """Whether homogeneous < ltv < linear beyond chance, the other way round, or neither."""
+    """Judge the order homogeneous < ltv < linear: it holds beyond chance, is inverted, or neither."""
     steps = differences(numbers)
     if all(step is not None and step.low > 0.0 for step in steps):
         return "holds"
@@ -51,23 +51,23 @@ class Measure(NamedTuple):
 
     key: str
     numbers: Mapping[AngleSource, Numbers]
-    """Which angles -> observer -> numbers."""
+    """Angle source -> observer -> numbers."""
 
     @property
     def orders(self) -> dict[AngleSource, Order]:
-        """Which angles -> the order."""
+        """Angle source -> the order."""
         return {angles: judge_order(numbers) for angles, numbers in self.numbers.items()}
 
     @property
     def best_observers(self) -> dict[AngleSource, str]:
-        """Which angles -> the observer with the least mean over the worlds that stood."""
+        """Angle source -> the observer with the least mean over the worlds that stood."""
         return {
             angles: min(numbers, key=lambda name: float(np.nanmean(numbers[name])))
             for angles, numbers in self.numbers.items()
         }
 
     def has_order(self, order: Order) -> bool:
-        """Whether the order is that one on all angles."""
+        """Return true if the order is this one on all angles."""
         return set(self.orders.values()) == {order}
 
 
@@ -140,7 +140,7 @@ def _in_words(measure: Measure) -> str:
 
 
 def _by_measure(measures: list[Measure]) -> str:
-    """By which measures the order is what."""
+    """Say by which measures the order holds or is inverted."""
     sentences = []
     words: dict[Order, str] = {"holds": "the order holds", "is inverted": "it is inverted: (9), (10), (11)"}
     for kind, wording in words.items():

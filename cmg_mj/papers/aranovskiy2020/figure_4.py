@@ -52,7 +52,7 @@ def run_open_loop(worlds: int, seed: int) -> OpenLoopRuns:
 
 
 def largest_by_smallest(errors: Mapping[str, Interval]) -> float:
-    """How far apart the three observers' errors are, as their ratio."""
+    """Return the largest of the three observers' errors by the smallest."""
     means = [errors[name].mean for name in OBSERVERS]
     return max(means) / min(means)
 

@@ -22,7 +22,7 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 FIGURES = {"linear": "Fig. 5", "ltv": "Fig. 6", "homogeneous": "Fig. 7"}
 ANGLES: tuple[AngleSource, AngleSource] = ("measured", "estimated")
-"""Which angles the law is fed with."""
+"""The angles that the law is fed with."""
 SEED = 72_001
 WORLDS = 20
 

@@ -17,15 +17,15 @@ ALPHAS = (0.55, 0.7, 0.85, 1.0)
 DECADES = 12
 """So many powers of ten the error is followed down."""
 STEP = 5e-4
-"""Of the integration [s], at the error's first size."""
+"""Step of the integration [s], at the error's first size."""
 FINE_DT = 1e-4
 """Sample period at which the bench's observer is compared with the differential equation [s]."""
 SEEN = 1e-3
-"""Of the first error of the rate: when it has fallen to this share for good, the two are compared."""
+"""Share of the rate's first error: when the error has fallen to it for good, the two are compared."""
 
 
 class Decay(NamedTuple):
-    """How an error fades."""
+    """The course of an error that fades."""
 
     decades: np.ndarray
     """Powers of ten by which its homogeneous size has fallen, (n,)."""
@@ -36,12 +36,12 @@ class Decay(NamedTuple):
 
     @property
     def turns(self) -> np.ndarray:
-        """Where the rate's error changes its sign: rows of `time_s`, (n_turns,)."""
+        """Changes of the sign of the rate's error: rows of `time_s`, (n_turns,)."""
         return np.flatnonzero(np.diff(np.sign(self.rate)))
 
     @property
     def shrink_factor(self) -> float:
-        """By which factor a half turn of the error is quicker than the one before it, in the mean."""
+        """Mean factor by which a half turn of the error is quicker than the one before it."""
         spans = np.diff(self.time_s[self.turns])
         return float((spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1)))
 
@@ -57,7 +57,7 @@ class Decay(NamedTuple):
         return math.inf if factor > 0.99 else float(last + (last - before) * factor / (1.0 - factor))
 
     def time_below(self, share: float) -> float:
-        """From when on the rate's error stays below a share of its first size [s]."""
+        """Return the time from which the rate's error stays below a share of its first size [s]."""
         return float(self.time_s[np.flatnonzero(np.abs(self.rate) > share)[-1] + 1])
 
 

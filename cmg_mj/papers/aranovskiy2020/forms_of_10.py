@@ -112,5 +112,5 @@ def compare(form: Observer, other_form: Observer, seed: int) -> Comparison:
 
 
 def compare_euler(seed: int) -> Comparison:
-    """What all twelve equations by explicit Euler change."""
+    """Compare all twelve equations by explicit Euler with the exact form."""
     return compare(make_exact(), Plain(euler), seed)

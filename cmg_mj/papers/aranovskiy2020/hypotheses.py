@@ -20,7 +20,7 @@ WORLDS = 4
 
 
 class Yaw(NamedTuple):
-    """What body A does under one mismatch."""
+    """The motion of body A under one mismatch."""
 
     drift_deg: float
     """Largest turn, mean over the worlds."""

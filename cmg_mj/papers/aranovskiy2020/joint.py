@@ -13,11 +13,11 @@ from cmg_mj.studies.tuning import NoiseLevelResult
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 ROUNDED = 1.05
-"""What printing a parameter to one digit costs: tau = 0.02 stands for 0.015 to 0.025."""
+"""The cost of printing a parameter to one digit: tau = 0.02 stands for 0.015 to 0.025."""
 
 
 def is_best(level: NoiseLevelResult) -> bool:
-    """Whether the given parameters are the best ones: a tie with the tuned, or as near as rounding."""
+    """Return true if the given parameters are the best ones: a tie with the tuned, or as near as rounding."""
     return level.verdict == "tie" or level.ratio.mean <= ROUNDED
 
 
@@ -41,7 +41,7 @@ class JointExperiment(NamedTuple):
 
     @property
     def beats_zero(self) -> bool:
-        """Whether all three, tuned, are closer to the gyro than zero: nobody tunes where the best is not to move."""
+        """True if all three, tuned, are closer to the gyro than zero: nobody tunes where the best is not to move."""
         return all(beats_zero(level) for level in self.levels.values())
 
     @property
@@ -76,7 +76,7 @@ def nearest_joint(studies: Studies) -> JointExperiment:
 
 
 def joint_claim(studies: Studies) -> Claim:
-    """Whether one experiment has all three lines of Table 2."""
+    """Judge whether one experiment has all three lines of Table 2."""
     nearest, candidates = nearest_joint(studies), list(experiments(studies))
     tunable = [experiment for experiment in candidates if experiment.beats_zero]
     least = min(candidates, key=lambda experiment: experiment.largest_ratio)
@@ -113,7 +113,7 @@ def joint_claim(studies: Studies) -> Claim:
 
 
 def _describe_separate_optima(studies: Studies) -> str:
-    """Where each line is best by itself."""
+    """Name the noise at which each line is best by itself."""
     push = next(iter(studies))
     parts = []
     for name, study in studies[push].items():

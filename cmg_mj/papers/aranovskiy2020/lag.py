@@ -19,10 +19,10 @@ TAUS_S = (0.01, 0.015, 0.02, 0.03, 0.05, 0.08)
 
 
 class Trade(NamedTuple):
-    """What (9) does with one time constant."""
+    """Lag and noise gain of (9) with one time constant."""
 
     lag_s: float
-    """How late the estimate of a steadily rising rate is [s]."""
+    """Delay of the estimate of a steadily rising rate [s]."""
     noise_gain_1_s: float
     """RMS of the estimate by that of a white noise measured [1/s]."""
 
@@ -43,7 +43,7 @@ def trade(tau: float, seed: int = SEED) -> Trade:
 
 
 def predict_trade(tau: float) -> Trade:
-    """From G = s/(tau s + 1)^2, whose phase falls with the slope 2 tau.
+    """Predict the trade by G = s/(tau s + 1)^2, whose phase falls with the slope 2 tau.
 
     A sample of noise is a triangle in time, two samples wide: the weights are the impulse response's means over it. For
     samples short beside tau their squares add up to dt/(4 tau^3).

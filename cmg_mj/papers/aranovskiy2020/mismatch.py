@@ -88,7 +88,7 @@ class MismatchRuns(NamedTuple):
 
     @property
     def fell(self) -> int:
-        """How many worlds fell."""
+        """Number of worlds that fell."""
         return int(sum(result.fell.sum() for result in (self.symmetric, *self.broken.values())))
 
 

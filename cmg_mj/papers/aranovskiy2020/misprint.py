@@ -14,11 +14,11 @@ from cmg_mj.papers.claim import Claim, OnShare
 SETTLING_S = 8.0
 """The slowest entry, H33, takes 1 s to fall by e^2 [s]."""
 HARMLESS = 0.05
-"""Of the rate's error: if the misprint changes the rate by less, it does not matter which equation the authors ran."""
+"""Share of the rate's error: if the misprint changes the rate by less, either equation may have been run."""
 
 
 class Misprint(NamedTuple):
-    """What the printed Riccati equation changes."""
+    """The changes that the printed Riccati equation makes."""
 
     corrected_H: np.ndarray
     """H where the corrected equation settles at rest, (3, 3)."""

@@ -58,11 +58,11 @@ class Residuals(NamedTuple):
     """The six-body model's accelerations less the reduced model's, RMS over random states [rad/s^2]; then torques."""
 
     tilt: float
-    """With the flywheels' own acceleration counted."""
+    """The tilt's, with the flywheels' own acceleration counted."""
     tilt_as_printed: float
-    """As (3) is printed, which takes omega_d' for zero (Hypothesis 3)."""
+    """The tilt's, by (3) as printed, which takes omega_d' for zero (Hypothesis 3)."""
     tilt_turned_J2: float
-    """With J2's sign turned: what the comparison can tell apart."""
+    """The tilt's, with J2's sign turned: a difference that the comparison must see."""
     yaw: float
     """Acceleration of body A, which Hypotheses 1 and 2 say is zero."""
     size: float
@@ -70,7 +70,7 @@ class Residuals(NamedTuple):
     torque: float
     """The gimbal's torque less tau_c of (2) [N m]."""
     torque_turned_J2: float
-    """With the sign of its last term turned [N m]."""
+    """The same with the sign of the last term turned [N m]."""
     torque_without_flywheel: float
     """Without the flywheel's term, which is what the servo has to bear [N m]."""
     torque_size: float

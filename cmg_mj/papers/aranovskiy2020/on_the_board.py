@@ -1,4 +1,4 @@
-"""What the observers of aranovskiy2020 cost on the processor of its rig, an STM32F746, as far as an emulator can say.
+"""The cost of aranovskiy2020's observers on its rig's processor, an STM32F746, as far as an emulator can say.
 
 `on_the_board.json` stands in where the cross-compiler, the emulator or CasADi is missing; `python -m
 cmg_mj.papers.aranovskiy2020.record_on_the_board` writes it anew.

@@ -14,16 +14,16 @@ from cmg_mj.papers.claim import Claim, OnShare
 
 
 class Inverse(NamedTuple):
-    """What return difference says of a gain."""
+    """The answer of the return difference for a gain."""
 
     least: float
     """min over w of |1 + K (jw - A)^-1 B|."""
     optimal: bool
-    """Whether some Q >= 0 makes K the LQR gain (Kalman 1964: the minimum is not below 1)."""
+    """True if some Q >= 0 makes K the LQR gain (Kalman 1964: the minimum is not below 1)."""
     Q: np.ndarray | None
     """Such a Q, (n, n), of rank 1."""
     recovered: float
-    """How far the Riccati equation's gain for that Q is off, relative."""
+    """Relative error of the Riccati equation's gain for that Q."""
     diagonal: np.ndarray
     """The one diagonal of Q that would give K: with a negative entry no diagonal Q >= 0 does."""
 
@@ -80,7 +80,7 @@ class Diagonal(NamedTuple):
     Q: np.ndarray
     """Its entries, none below 0, (n,)."""
     gain: np.ndarray
-    """What it gives, with R = 1, (n,)."""
+    """Its gain with R = 1, (n,)."""
     off: float
     """Largest difference from the printed gain, by half a unit of the digit it is printed with: 1 is rounding's."""
 
@@ -91,7 +91,7 @@ def lqr_gain(A: np.ndarray, B: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
 
 
 LEAST_WEIGHT = 1e-3
-"""Of a diagonal Q: a state that hardly counts."""
+"""Least weight in a diagonal Q: a state that hardly counts."""
 
 
 def nearest_diagonal(
@@ -129,7 +129,7 @@ def nearest_diagonal(
 
 
 def lqr_gains() -> Claim:
-    """Whether Table 2's K_e is an LQR gain."""
+    """Judge whether Table 2's K_e is an LQR gain."""
     model = printed_model()
     K = np.array(K_E)
     inverse = inverse_optimality(model.A_e, model.B_e, K)

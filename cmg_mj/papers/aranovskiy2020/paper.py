@@ -1,4 +1,4 @@
-"""What aranovskiy2020 prints: Tables 1 and 2, the reduced model, where the law rests, the observer (10)."""
+"""aranovskiy2020 as printed: Tables 1 and 2, the reduced model, where the law rests, the observer (10)."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ OBSERVERS = {"linear": "(9)", "ltv": "(10)", "homogeneous": "(11)"}
 """The paper's three by the bench's names, and their equations."""
 
 Q, H_0 = np.diag(TABLE_2["ltv"]["Q"]), np.diag(TABLE_2["ltv"]["H0"])
-"""Of (10), (3, 3)."""
+"""Q and H(0) of (10), (3, 3)."""
 
 C = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """After (10): tilt and gimbal angle are measured."""

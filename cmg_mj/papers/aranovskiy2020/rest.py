@@ -1,4 +1,4 @@
-"""Where the closed loop of aranovskiy2020 rests: (7), (8) and the text after (10), on the six-body model."""
+"""The rest of aranovskiy2020's closed loop: (7), (8) and the text after (10), on the six-body model."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TRUE_RATE = "the true rate, (8)"
 
 
 class Case(NamedTuple):
-    """What the law is fed with."""
+    """The law's inputs in one case."""
 
     observer: str
     settings: Sequence[str]
@@ -62,7 +62,7 @@ class Rest(NamedTuple):
     """World 0."""
 
     def is_at_zero(self, expected_x_e: float) -> bool:
-        """Whether x rests at zero and the integrator where it should, within a twentieth of e and of the offset."""
+        """Return true if x rests at zero and the integrator where it should, to a twentieth of e and of the offset."""
         return abs(self.x1.mean) < BIAS_DEG / 20.0 and abs(self.x_e.mean / expected_x_e - 1.0) < 0.05
 
 
@@ -94,7 +94,7 @@ def _measure_rest(observer: str, trajectory: Trajectory) -> Rest:
 
 
 def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple[float, float]:
-    """What an observer makes of the rig at rest on average: y2 = 0, u = 0, y1 = -e and white noise.
+    """Replay an observer on the rig at rest on average: y2 = 0, u = 0, y1 = -e and white noise.
 
     The noise matters to (11) alone: its gains fall with the size of its error, so that noise adds to its bias.
 
@@ -152,7 +152,7 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
 
 
 def observers_claim(rests: Mapping[str, Rest]) -> Claim:
-    """With an observer in the law, which the bias biases.
+    """Judge the rest with an observer in the law, which the bias biases.
 
     Args:
         rests: By case, the true rate among them.

@@ -44,7 +44,7 @@ def _gentle(torque_n_m: float) -> list[str]:
 
 
 STRONG = Push("1 N m, e = 0.5 deg", [], (100.0, 200.0, DEFAULT_NOISE, 3200.0), 0.45)
-"""That of Figs 5 to 7."""
+"""The push of Figs 5 to 7."""
 PUSHES = (
     STRONG,
     Push("0.3 N m, e = 0", _gentle(0.3), (100.0, 200.0, DEFAULT_NOISE), 0.33),
@@ -54,7 +54,7 @@ PUSHES = (
 
 @dataclass(frozen=True)
 class TuningCase:
-    """What is tuned of an observer.
+    """The parameters of an observer that are tuned.
 
     Attributes:
         observer: Its name.
@@ -143,7 +143,7 @@ def level_at(study: TuningResult, noise_ug_rthz: float) -> NoiseLevelResult:
 
 
 def beats_zero(level: NoiseLevelResult) -> bool:
-    """Whether the tuned observer is closer to the gyro than an estimate of zero, on the held-out worlds."""
+    """Return true if the tuned observer is closer to the gyro than an estimate of zero, on the held-out worlds."""
     return float(level.rms.mean()) < level.zero_rms
 
 

@@ -13,9 +13,9 @@ from cmg_mj.simulation.experiment import Experiment, prepare
 DT = 0.005
 """The bench's control period [s]; the paper does not give its own."""
 DURATION_S = 10.0
-"""Of the runs that Figs 5 to 7 and their variations are made of [s]."""
+"""Duration of the runs that Figs 5 to 7 and their variations are made of [s]."""
 SEED_OF_10 = 71_000
-"""Of the run with (10) in the loop that several sections replay."""
+"""Seed of the run with (10) in the loop that several sections replay."""
 
 
 def push_recovery(observer: str, seed: int, settings: Sequence[str] = (), duration_s: float = DURATION_S) -> Experiment:

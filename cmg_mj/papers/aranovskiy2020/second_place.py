@@ -22,10 +22,10 @@ CASES: Mapping[str, tuple[str, Sequence[str]]] = {
     TEN_EXACT_GAIN: (f"{_HERE}:TenByEuler", ["observer.exact_gain=true"]),
     ELEVEN_BY_EULER: (f"{_HERE}:ElevenByEuler", []),
 }
-"""Which form -> the observer in the loop and its settings."""
+"""Form -> the observer in the loop and its settings."""
 
 Errors = Mapping[str, np.ndarray]
-"""Which form -> velocity RMS error in the loop, (n_worlds,) [rad/s]; NaN for a world that did not stand."""
+"""Form -> velocity RMS error in the loop, (n_worlds,) [rad/s]; NaN for a world that did not stand."""
 
 
 def errors_of(forms: Sequence[str], worlds: int, seed: int) -> dict[str, np.ndarray]:
@@ -41,7 +41,7 @@ def all_errors(known_errors: Errors, worlds: int, seed: int) -> dict[str, np.nda
 
 
 def cause(errors: Errors) -> Claim:
-    """What Section V puts the second place of (10) down to.
+    """Judge the cause that Section V gives for the second place of (10).
 
     Partly is more than nothing and less than all: by one method for both, the distance between (10) and (11) must be
     larger by Euler's than by an exact one, and must not vanish by the exact one.
@@ -92,5 +92,5 @@ def cause(errors: Errors) -> Claim:
 
 
 def _positive(interval: Interval | None) -> bool:
-    """Whether it lies above zero."""
+    """Return true if the interval lies above zero."""
     return interval is not None and interval.low > 0.0

@@ -63,7 +63,7 @@ class Servos(NamedTuple):
     """The runs, the same worlds each."""
 
     position: Result
-    """With the bench's servo."""
+    """Runs with the bench's servo."""
     velocity: Mapping[float, Result]
     """Deadband [rad/s] -> runs with the servo in velocity mode."""
     soft: Result
@@ -95,7 +95,7 @@ def measure_tracking(result: Result) -> Interval | None:
 
 
 def servo_claim(servos: Servos) -> Claim:
-    """Whether the commanded velocity can be taken for the gimbal's."""
+    """Judge whether the commanded velocity can be taken for the gimbal's."""
     smooth = servos.velocity[0.0]
     velocity, tilt = (
         {d: ratio_interval(result.values(key), smooth.values(key)) for d, result in servos.velocity.items()}

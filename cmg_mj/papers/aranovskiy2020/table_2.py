@@ -81,7 +81,7 @@ def _describe_all_pushes(case: TuningCase, studies: Studies) -> str:
 
 
 def _describe_first_push(case: TuningCase, studies: Studies) -> str:
-    """What they lose under the push of Figs 5 to 7, at the noise at which they lose least there."""
+    """Describe the loss under the push of Figs 5 to 7, at the noise at which it is least there."""
     push = next(iter(studies))
     level = least_lost(case, studies)
     zero_note = "" if beats_zero(level) else ", where an estimate of zero is closer than either"

@@ -23,14 +23,14 @@ JUDGED_DEG = 0.5
 
 
 class Gain(NamedTuple):
-    """Of e = x1 - y1: x1' has -l1 e, x2' has -l2 e, so that the error's poles without gravity are s^2 + l1 s + l2."""
+    """Gain on e = x1 - y1: x1' has -l1 e, x2' has -l2 e, so the error's poles without gravity are s^2 + l1 s + l2."""
 
     l1: float
     l2: float
 
     @property
     def speed(self) -> float:
-        """Of the error's poles, their distance from 0 [rad/s]."""
+        """Distance of the error's poles from 0 [rad/s]."""
         return math.sqrt(self.l2)
 
 
@@ -47,9 +47,9 @@ GAINS: dict[str, Gain] = {
     "fast": damped_gain(30.0),
     FROZEN: Gain(*settled_gains()),
 }
-"""From slow to fast. The predecessor's is of its Table II, the frozen one is where the Riccati equation settles."""
+"""Gains, the slow first. The predecessor's is of its Table II; the Riccati equation settles at the frozen one."""
 PRINTED = (PREDECESSOR, FROZEN)
-"""Those that the authors could have run: what the verdict goes by."""
+"""The gains that the authors could have run: the verdict goes by them."""
 
 LINEAR, MEASURED = "gravity at the estimate", "gravity at y1"
 MODELS = (LINEAR, MEASURED)
@@ -62,7 +62,7 @@ Cell = tuple[str, str]
 
 
 class Fate(NamedTuple):
-    """What became of the worlds at one bias."""
+    """The end of the worlds at one bias."""
 
     fell: float
     """Share that fell."""
@@ -116,7 +116,7 @@ def choose_observer(cell: Cell) -> tuple[str, list[str]]:
 
 
 def rate_bias(cell: Cell) -> float:
-    """Of the rate estimated at rest, per radian of e, in closed form [1/s]."""
+    """Return the bias of the rate estimated at rest, per radian of e, in closed form [1/s]."""
     (l1, l2), model = GAINS[cell[0]], printed_model()
     lever = model.gravity_torque / model.J1
     return l1 * lever / (l2 - lever if cell[1] == LINEAR else l2)
@@ -133,7 +133,7 @@ class Factorial(NamedTuple):
         return [e for e, fate in self.cells[cell].items() if fate.fell == 1.0]
 
     def stands_everywhere(self, cell: Cell) -> bool:
-        """Whether no world of a cell falls at any bias."""
+        """Return true if no world of a cell falls at any bias."""
         return all(fate.fell == 0.0 for fate in self.cells[cell].values())
 
     @property
@@ -193,7 +193,7 @@ def remark(experiment: Factorial) -> Claim:
 
 
 def _describe_model(experiment: Factorial, model: str) -> str:
-    """From which bias on each gain falls in every world."""
+    """Name the bias from which each gain falls in every world."""
     parts = []
     for gain, (_, l2) in GAINS.items():
         falls = experiment.falls_at((gain, model))
@@ -209,7 +209,7 @@ def _describe_safe_gains(gains: Sequence[str]) -> str:
 
 
 def _conditions(experiment: Factorial, safe_gains: Sequence[str]) -> str:
-    """What falls, and that it is not the constancy of the gain."""
+    """Name the cells that fall, and say that the constancy of the gain is not the cause."""
     cells = [f"the {gain} gain and {model}" for gain, model in experiment.failing]
     sentences = [f"At e = {JUDGED_DEG:g} deg, with {join_with_and(cells)}." if cells else "Nowhere."]
     if FROZEN in safe_gains:

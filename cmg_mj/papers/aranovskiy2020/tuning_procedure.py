@@ -14,7 +14,7 @@ from cmg_mj.results.intervals import Interval
 
 LOOP_WORLDS = 10
 LOOP_SHARE = 0.1
-"""Of the time that the section takes, the closed loops'."""
+"""Share of the section's time that the closed loops take."""
 
 
 class Trial(NamedTuple):
@@ -118,7 +118,7 @@ def _in_words(trial: Trial) -> str:
 
 
 def _describe_zero(loops: list[Trial]) -> str:
-    """Where an estimate of zero does better than the tuned, of the experiments whose loop was closed."""
+    """Name the experiments, of those whose loop was closed, in which an estimate of zero beats the tuned."""
     return "".join(
         f"At {trial.experiment.words} zero is closer than {join_with_and(trial.worse_than_zero)} at their best, which "
         "know the command, but not the push. "
@@ -128,7 +128,7 @@ def _describe_zero(loops: list[Trial]) -> str:
 
 
 def _describe_losses(loops: list[Trial]) -> str:
-    """What a fit to the gyro is not."""
+    """Name the experiments in which a fit to the gyro is none for the loop."""
     parts = [
         f"{join_with_and(trial.worse_in_loop)} at {trial.experiment.words}" for trial in loops if trial.worse_in_loop
     ]

@@ -21,16 +21,16 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 AXES = ("pitch", "roll")
 """The tilt axes y and x of the body; the cubes' gimbals lie across them."""
 HEIGHT_M = 0.134
-"""Of the cubes' centres above the joint, l/sqrt(2) as on the rig [m]."""
+"""Height of the cubes' centres above the joint, l/sqrt(2) as on the rig [m]."""
 MASS_KG = 4.0 * TABLE_1["m"]
 SPEED = TABLE_1["omega_d"]
 DURATION_S, PUSH_S = 3.0, 0.1
 PUSHES_N_M = (1.0, 2.0, 3.0)
 """On either axis, of a body of four cubes [N m]; the rig of two has 1."""
 SMALL = 0.05
-"""What the other axis changes by less than this of the largest tilt leaves the two separate."""
+"""Two axes are separate if either changes the other by less than this share of the largest tilt."""
 WEIGHTS = (426.0, 1.7, 0.01, 0.08)
-"""Of the law of either axis: a diagonal Q that gives Table 2's gains on the rig, to the digits printed."""
+"""Weights of the law of either axis: a diagonal Q that gives Table 2's gains on the rig, to the digits printed."""
 
 
 @cache
@@ -56,17 +56,17 @@ def _cube() -> Path:
 
 
 class Addresses(NamedTuple):
-    """Where an axis' things are."""
+    """Places of an axis in MuJoCo's arrays."""
 
     tilt: int
     gimbals: list[int]
     servos: list[int]
     signs: list[float]
-    """By which a command is multiplied, so that both cubes of the pair push the same way."""
+    """Factors of a command, so that both cubes of the pair push the same way."""
 
 
 def addresses(model: mujoco.MjModel, axis: int) -> Addresses:
-    """Of pitch, driven by the first two cubes, or of roll, by the others."""
+    """Find those of pitch, driven by the first two cubes, or of roll, by the others."""
     cubes = (2 * axis, 2 * axis + 1)
     tilt = int(model.joint(AXES[axis]).qposadr[0])
     gimbals = [int(model.joint(f"c{i}/gimbal").qposadr[0]) for i in cubes]
@@ -112,7 +112,7 @@ def reduced(model: mujoco.MjModel, axis: int) -> ReducedModel:
 
 
 class Motion(NamedTuple):
-    """What the body did."""
+    """The motion of the body."""
 
     tilts: np.ndarray
     """Pitch and roll tick by tick, (n_ticks, 2) [rad]."""

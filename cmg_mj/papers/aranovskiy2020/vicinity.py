@@ -20,18 +20,18 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 SEED = 77_000
 ALPHAS = (0.55, 0.7, 0.85, 1.0)
 SETTLING = ALPHAS[1:]
-"""Those without much chatter."""
+"""The exponents without much chatter."""
 BIASES_DEG = (0.125, 0.25, 0.5, 1.0, 2.0)
 NOISES_RAD = (0.0005, 0.001, 0.002, 0.004, 0.008)
 TICKS = 2000
 VANISHED = 1e-3
-"""Of the first error of the rate: what is left counts as none."""
+"""Share of the rate's first error that counts as none."""
 SEEN_RAD_S = 0.01
 """Biases of the rate above this one are compared with the closed form by their ratio, those below by the difference."""
 
 
 def remaining_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, span_s: float = 3.0) -> float:
-    """What is left of a wrong rate without bias, noise or motion, by its first size: largest of the last 0.5 s."""
+    """Return what is left of a wrong rate without bias, noise or motion, by its first size: the last 0.5 s' largest."""
     observer = make_observer("homogeneous", dt, printed_model(), alpha=alpha)
     rest_measurement = Measurement(0.0, 0.0)
     state = observer.init(rest_measurement)._replace(x1=0.05, x2=first_rad_s)
@@ -62,12 +62,12 @@ def bias_bound(alpha: float, e_rad: float) -> float:
 
 
 def hurwitz(b: float, c: float) -> bool:
-    """Whether s^2 + b s + c is."""
+    """Return true if s^2 + b s + c is Hurwitz."""
     return bool(np.roots([1.0, b, c]).real.max() < 0.0)
 
 
 class Vicinity(NamedTuple):
-    """How far from the true rate the estimate ends, at rest."""
+    """Distances from the true rate at which the estimate ends, at rest."""
 
     by_bias: dict[float, np.ndarray]
     """alpha -> error without noise, (n_biases,) [rad/s]."""
@@ -88,7 +88,7 @@ class Vicinity(NamedTuple):
 
     @property
     def exponents(self) -> dict[float, float]:
-        """With which power of the noise the error rises, by alpha."""
+        """Powers of the noise with which the error rises, by alpha."""
         sizes = np.log(NOISES_RAD)
         return {alpha: float(np.polyfit(sizes, np.log(error), 1)[0]) for alpha, error in self.by_noise.items()}
 

@@ -13,10 +13,10 @@ from cmg_mj.results.trajectory import Trajectory
 
 
 class Inertia(NamedTuple):
-    """What the momentum about the vertical consists of at the upright."""
+    """The parts of the momentum about the vertical at the upright."""
 
     yaw: float
-    """Of all that turns with body A [kg m^2]."""
+    """Inertia of all that turns with body A [kg m^2]."""
     gimbal: float
     """I_c + I_d of a gimbal about its own axis [kg m^2]."""
     spin: float

@@ -25,7 +25,7 @@ Cell = tuple[float, float]
 """Noise density [ug/rtHz] and equilibrium bias [deg]."""
 
 SHOWN: Cell = (400.0, 0.5)
-"""Whose lags and noise gains are drawn."""
+"""The cell whose lags and noise gains are drawn."""
 
 
 def claims(on_share: OnShare) -> list[Claim]:
@@ -77,7 +77,7 @@ def by_cell(rows: Sequence[Row]) -> dict[Cell, list[Row]]:
 
 
 def in_order(of_cell: Sequence[Row]) -> bool:
-    """Whether the paper's three observers come in its order."""
+    """Return true if the paper's three observers come in its order."""
     errors = {row["observer"]: row[ERROR] for row in of_cell}
     values = [errors[kind] for kind in ORDER]
     return None not in values and all(error < next_error for error, next_error in pairwise(values))

@@ -1,4 +1,4 @@
-"""What an observer does to a signal: its lag, its noise gain, and what an update costs."""
+"""An observer's answer to a signal: its lag, its noise gain, and the cost of an update."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def character(kind: str, motion: Motion) -> Character:
 
 
 def push_lag(observer: Observer, model: ReducedModel, dt: float) -> float | None:
-    """How long an observer takes to see a sudden push, without noise and with the gimbals still.
+    """Measure how late an observer sees a sudden push, without noise and with the gimbals still.
 
     From rest at the upright the rig is pushed with 1 N m for 0.1 s and left to itself: in linear terms its rate is
     a sinh. The lag is the time between the true rate and the estimate passing half of the rate at the push's end. In

@@ -19,7 +19,7 @@ KINDS = (ALONE, "adaptive", TOLD)
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """What feeding the estimated bias into (11) brings."""
+    """Judge the feeding of the estimated bias into (11)."""
     return [fed_bias_claim(fed_bias(WORLDS, SEED, on_share))]
 
 

@@ -16,7 +16,7 @@ WITH = {False: "without", True: "with"}
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """What a friction model in the observer brings."""
+    """Judge a friction model in the observer."""
     return [friction_claim(friction(WORLDS, SEED, on_share))]
 
 

@@ -19,7 +19,7 @@ from cmg_mj.results.result import Result
 NOISES_UG = (200.0, 400.0, 800.0)
 BIASES_DEG = (0.0, 0.5, 1.0)
 MEANS = (ERROR, "settle_time_s", "tilt_rms_deg", "command_rms_rad_s")
-"""What is shown of a run's summary."""
+"""The keys of a run's summary that are shown."""
 
 
 def league(
@@ -70,7 +70,7 @@ def league(
 
 
 def _cell(result: Result, floor: float) -> dict[str, Any]:
-    """What an observer does at one noise and bias."""
+    """Summarise an observer at one noise and bias."""
     worlds, n_stood = len(result.stood), int(result.stood.sum())
     share = binomtest(worlds - n_stood, worlds).proportion_ci(0.95)
     cell: dict[str, Any] = {

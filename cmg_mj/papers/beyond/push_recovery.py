@@ -12,7 +12,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 
 ERROR = "velocity_rms_error_rad_s"
-"""What is compared."""
+"""The measure that is compared."""
 
 
 def push_recovery(kind: str, seed: int, settings: Sequence[str] = ()) -> Experiment:
@@ -47,5 +47,5 @@ def on_rigs(experiment: Experiment, worlds: int, field: str, values: Sequence[fl
 
 
 def gain(errors_before: np.ndarray, errors_after: np.ndarray) -> Interval | None:
-    """By how much an error shrank, world by world, in those that stood both times; None if fewer than two did."""
+    """Return how much an error shrank, world by world, in those that stood both times; None if fewer than two did."""
     return known_interval(errors_before - errors_after)

@@ -32,7 +32,7 @@ def run(scenario: Scenario, biases_deg: Sequence[float], **options: Any) -> Resu
 
 
 def record(scenario: Scenario, biases_deg: Sequence[float]) -> Trajectory:
-    """What was recorded of one world a bias over seconds 5 to 10, (n_ticks, n_worlds)."""
+    """Record one world a bias over seconds 5 to 10, (n_ticks, n_worlds)."""
     return trajectory_of(run(scenario, biases_deg)).between(LATE_S, DURATION_S)
 
 

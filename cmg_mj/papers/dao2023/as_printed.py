@@ -1,4 +1,4 @@
-"""What is printed otherwise than it can be meant, and what the paper leaves open of its simulation."""
+"""The misprints, and the settings of the simulation that the paper leaves open."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def misprint_claim() -> Claim:
 
 
 def _corrections(*, row: bool, rearranged: bool) -> list[str]:
-    """What must be read otherwise than printed."""
+    """List the corrections to the printed equations."""
     sentences = [
         "(7) needs B2 u and the hats of its estimates; the example has B2 = 0, so that it does not show there."
     ]

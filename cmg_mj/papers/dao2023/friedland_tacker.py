@@ -153,7 +153,7 @@ class FriedlandTacker:
 
     @cached_property
     def _identities(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the dimensions n and p."""
+        """Identity matrices of the dimensions n and p."""
         return np.eye(self.L.shape[-2]), np.eye(self.L.shape[-1])
 
     def init(

@@ -1,4 +1,4 @@
-"""What (7) to (9) imply, checked along the robot: the separated errors, and the conventional observer's Upsilon."""
+"""The consequences of (7) to (9) along the robot: the separated errors, and the conventional observer's Upsilon."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def continuous_run(
 
 
 def continuous_deviation(sigma: float, duration: float, seed: int = 0, tolerance: float = 1e-11) -> tuple[float, float]:
-    """How far z = (x^ - x) - T (xm^ - xm) is from exp((A + L C2) t) z(0), in continuous time along the chaotic arm.
+    """Measure the deviation of z = (x^ - x) - T (xm^ - xm) from exp((A + L C2) t) z(0), along the chaotic arm.
 
     Args:
         sigma: The weight Sigma.

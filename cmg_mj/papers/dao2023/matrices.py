@@ -19,7 +19,7 @@ def require_shape(name: str, value: np.ndarray, shape: tuple[int, ...], words: s
 
 
 def require_real(name: str, value: Any) -> np.ndarray:
-    """As an array of floats; refuse what is not real numbers."""
+    """Return an array of floats; refuse what is not real numbers."""
     try:
         array = np.asarray(value)
     except ValueError as error:  # rows of different lengths

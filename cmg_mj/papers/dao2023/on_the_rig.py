@@ -32,7 +32,7 @@ def share_within(errors: np.ndarray, bound: float) -> float:
 
 
 def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
-    """What it finds of the equilibrium bias."""
+    """Judge the estimate of the equilibrium bias."""
     biases = rig.signed_biases(seed, worlds)
     result = rig.learnt_bias(seed, biases, keep_trajectory=True)
     rms = rig.errors(result, "bias_rms_error_deg")

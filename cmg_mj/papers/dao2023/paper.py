@@ -23,7 +23,7 @@ L_PRINTED = -np.array([[1.0, 1.0]])
 """A row, which does not fit: with one output L has one column."""
 GAMMA = np.diag([2.0, 2.0, 1.0, 1.0])
 SIGMAS = (10.0, 1000.0, 0.1)
-"""Of Fig. 3(a), (b), (c); the first is that of Fig. 2, too."""
+"""Weights of Fig. 3(a), (b), (c); the first is that of Fig. 2, too."""
 
 
 def torque(t: np.ndarray | float) -> np.ndarray:

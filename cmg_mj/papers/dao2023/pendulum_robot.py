@@ -58,7 +58,7 @@ def motion(start: np.ndarray, t: np.ndarray, coefficient: float = 1.0) -> np.nda
 
 @dataclass(frozen=True)
 class Errors:
-    """What an observer made of the motions.
+    """An observer's errors along the motions.
 
     Attributes:
         t: Times, (n_times,) [s].
@@ -110,7 +110,7 @@ def follow(
 
 
 def settle_times(size: np.ndarray, t: np.ndarray, band: float) -> np.ndarray:
-    """From when on a quantity stays inside a band: infinite if it is outside at the end.
+    """Find the time from which a quantity stays inside a band: infinite if it is outside at the end.
 
     Args:
         size: Its absolute value, (n_times, ...).

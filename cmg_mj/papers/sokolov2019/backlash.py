@@ -21,18 +21,18 @@ RELEASE_S, WINDOW_S = 24.0, 6.0
 
 
 class Cycle(NamedTuple):
-    """What the loop does by itself, let go without noise."""
+    """The loop's motion by itself, let go without noise."""
 
     sustained: bool
-    """Whether it oscillates without end."""
+    """True if it oscillates without end."""
     amplitude_deg: float
     """Half of the tilt's range over the last window [deg]."""
     frequency_hz: float
-    """Where the tilt rate's spectrum has its peak there [Hz]."""
+    """Frequency at which the tilt rate's spectrum has its peak there [Hz]."""
 
     @property
     def words(self) -> str:
-        """What it does."""
+        """The cycle in words."""
         if not self.sustained:
             return "comes to rest"
         return f"goes on oscillating by {self.amplitude_deg:.2f} deg to either side at {self.frequency_hz:.1f} Hz"

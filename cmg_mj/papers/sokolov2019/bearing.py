@@ -35,7 +35,7 @@ CASES = {
     "let go 1 deg off, no push": ("plant.initial_tilt_deg=1.0", "push=[]"),
     "let go upright, no push": (UPRIGHT, "push=[]"),
 }
-"""What happens to the rig on a free bearing."""
+"""The cases of the rig on a free bearing."""
 
 
 class Stiffness(NamedTuple):
@@ -48,7 +48,7 @@ class Stiffness(NamedTuple):
     gravity: float
     """m g l [N m/rad], the wrong way."""
     poles: np.ndarray
-    """Of the law with the true rate on the linearised rig [1/s]."""
+    """Poles of the law with the true rate on the linearised rig [1/s]."""
 
 
 def stiffness() -> Stiffness:

@@ -63,7 +63,7 @@ def best_claim(loops: Loops) -> Claim:
 
 
 def is_ranked(by_name: Mapping[str, Result]) -> bool:
-    """Whether (9) is better than (8), (10) better than (9), and neither of the two with a model falls."""
+    """Return true if (9) is better than (8), (10) better than (9), and neither of the two with a model falls."""
     with_model = is_better(by_name["luenberger"], by_name["linear"])
     nonlinear = is_better(by_name["homogeneous"], by_name["luenberger"])
     return with_model and nonlinear and not any(by_name[name].fell.any() for name in ("luenberger", "homogeneous"))

@@ -1,4 +1,4 @@
-"""What each loop does by itself behind the datasheet's gap, on MuJoCo and by the linear loop's describing function."""
+"""Each loop's cycle behind the datasheet's gap, on MuJoCo and by the linear loop's describing function."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ AFTER_S = 0.5
 """The push's window ends so long after the push."""
 WITH_Y2 = "luenberger and y2"
 L1, L2 = (row[0] for row in TABLE_II["luenberger"]["L"][:2])
-"""What (9) makes of y1 less its estimate [1/s, 1/s^2]."""
+"""Gains of (9) on y1 less its estimate [1/s, 1/s^2]."""
 
 
 def stiffness(model: ReducedModel) -> float:
@@ -52,7 +52,7 @@ class Tuning(NamedTuple):
     rates: Mapping[str, np.ndarray]
     """Estimated tilt rates, (n_ticks, n_worlds) [rad/s]."""
     window: np.ndarray
-    """Which ticks lie between the push's start and half a second after its end, (n_ticks,)."""
+    """True for ticks between the push's start and half a second after its end, (n_ticks,)."""
 
     @property
     def push(self) -> Push:
@@ -95,7 +95,7 @@ def predict_error(tuning: Tuning) -> np.ndarray:
 
 
 def y2_reaches_the_rate(prepared: Experiment, seed: int = 0) -> float:
-    """How much the rate of (9) changes if y2 is replaced by noise of 1 rad, over 200 samples [rad/s]."""
+    """Measure the change of (9)'s rate if y2 is replaced by noise of 1 rad, over 200 samples [rad/s]."""
     rng = np.random.default_rng(seed)
     y1, u = rng.normal(size=(2, 200))
     columns = {"y1_rad": y1, "u_rad_s": u}
@@ -143,7 +143,7 @@ def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
 
 
 def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
-    """What Section V says is the reason."""
+    """Judge the reason that Section V gives."""
     reach = y2_reaches_the_rate(tuning.prepared)
     error, with_y2, without_y2 = tuning.error_of_9, relative[WITH_Y2], relative["luenberger"]
     bias_error = error[tuning.trajectory["time_s"] < tuning.push.start_s][-20:].mean()

@@ -113,7 +113,7 @@ def figure_5(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
 
 
 def cause_of_figure_5(cycles: Cycles) -> Claim:
-    """What Section V puts the oscillation with (9) down to."""
+    """Judge the cause that Section V gives for the oscillation with (9)."""
     without_y2, with_y2 = cycles.ends["luenberger"], cycles.ends[WITH_Y2]
     predicted_cycles = {name: cycles.predicted[name] for name in ("linear", "luenberger")}
     cycles_text = " and ".join(

@@ -1,4 +1,4 @@
-"""Which cycle a gap makes of the linearised, sampled loop, by its describing function."""
+"""The cycle of the linearised, sampled loop behind a gap, by its describing function."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class PredictedCycle(NamedTuple):
     """A cycle of the linear loop with the gap."""
 
     amplitude_deg: float
-    """Of the tilt [deg]."""
+    """Amplitude of the tilt [deg]."""
     frequency_hz: float
 
 
 def describing_function(c: float) -> complex:
-    """What a gap passes of a sine: the fundamental of the gimbal's angle by that of the motor's.
+    """Return the fundamental of the gimbal's angle by that of the motor's, a sine, behind a gap.
 
     Args:
         c: gap/A - 1, with A the motor's amplitude: -1 without a gap, 1 where the motor only just crosses it.

@@ -31,7 +31,7 @@ LARGEST_S = 0.12
 
 
 class Prediction(NamedTuple):
-    """Of one observer in the linearised, sampled loop; None for what does not happen in the range searched."""
+    """One observer in the linearised, sampled loop; None for an event that is not in the range searched."""
 
     servo_lag_s: float | None
     """The least servo lag at which it oscillates, as stiff."""
@@ -59,7 +59,7 @@ Loop = Callable[..., np.ndarray]
 
 @cache
 def _rig() -> Experiment:
-    """With the physics step of the releases, in which latencies are counted."""
+    """Prepare the rig with the physics step of the releases, in which latencies are counted."""
     return experiment([FINE])
 
 
@@ -86,7 +86,7 @@ def linearise(observer: str | None, **parameters: float) -> tuple[Loop, Servo, f
 
 
 def predict(observer: str | None) -> Prediction:
-    """What the linearised loop does with a linear observer, or with the true rate (None)."""
+    """Predict the linearised loop's behaviour with a linear observer, or with the true rate (None)."""
     loop, servo, dt = linearise(observer)
 
     def growth(changed_servo: Servo, age_steps: int = 0) -> float:
@@ -118,10 +118,10 @@ class Lags(NamedTuple):
     thresholds: dict[str, Threshold]
     latencies: dict[str, Threshold]
     predictions: dict[str, Prediction]
-    """Of the linear observers and, under `truth`, of the true rate."""
+    """Predictions for the linear observers and, under `truth`, for the true rate."""
     tau: float | None
     own_lag_s: float
-    """Of the model's servo."""
+    """Lag of the model's servo."""
 
 
 def lags(on_share: OnShare) -> Lags:

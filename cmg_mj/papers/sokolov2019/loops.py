@@ -34,7 +34,7 @@ class Loops(NamedTuple):
     by_bias: dict[float, dict[str, Result]]
     """Without backlash: e [deg] -> observer -> runs."""
     gap: dict[str, Result]
-    """With the datasheet's, at the bias of the pictures."""
+    """Runs with the datasheet's backlash, at the bias of the pictures."""
     quiet: dict[str, Result]
     """Without backlash or noise, one world at the bias of the pictures: what the push leaves behind."""
     gyro: Result
@@ -80,7 +80,7 @@ def _late_signal(result: Result, name: str) -> np.ndarray:
 
 
 def main_frequency(result: Result) -> float:
-    """Where the tilt rate's spectrum has its late peak, averaged over the worlds that stood [Hz]."""
+    """Find the late peak of the tilt rate's spectrum, averaged over the worlds that stood [Hz]."""
     x2, t = _late_signal(result, "x2_rad_s"), trajectory_of(result)["time_s"]
     padded = 8 * len(x2)
     spectrum = (np.abs(np.fft.rfft(x2 - x2.mean(axis=0), padded, axis=0)) ** 2).mean(axis=1)
@@ -103,12 +103,12 @@ def tail(result: Result) -> float:
 
 
 def format_interval(interval: Interval | None) -> str:
-    """With three digits after the point, as these claims write them."""
+    """Write an interval with three digits after the point."""
     return plus_minus(interval, 3)
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """What a claim's figures say of it."""
+    """Return a result's numbers for a claim's figures."""
     intervals = {key: known_interval(result.values(key)) for key in ("velocity_rms_error_rad_s", "tilt_rms_deg")}
     intervals["late_tilt_deviation_deg"] = deviation(result)
     return {
@@ -118,13 +118,13 @@ def numbers(result: Result) -> dict[str, Any]:
 
 
 def is_smaller(a: Result, b: Result, key: str = "velocity_rms_error_rad_s") -> bool | None:
-    """Whether a's numbers are smaller than b's beyond chance, world by world; None if fewer than two stood in both."""
+    """Return true if a's numbers are smaller beyond chance, world by world; None if fewer than two stood in both."""
     difference = known_interval(b.values(key) - a.values(key))
     return None if difference is None else difference.low > 0.0
 
 
 def is_better(a: Result, b: Result) -> bool:
-    """Whether a has the smaller velocity error beyond chance and falls no more often, or stands where b always fell."""
+    """Return true if a's velocity error is smaller beyond chance and a falls no more often, or stands where b fell."""
     beyond_chance = is_smaller(a, b)
     if beyond_chance is None:
         return bool(a.stood.all() and b.fell.all())

@@ -19,7 +19,7 @@ REST_S = 35.0
 
 
 class Rest(NamedTuple):
-    """Where a run without noise comes to rest."""
+    """The rest of a run without noise."""
 
     x: np.ndarray
     """Largest |x1| [rad], |x2| [rad/s], |x3| [rad] over the last second, (3,)."""

@@ -1,4 +1,4 @@
-"""What sokolov2019 prints: Tables I and II, its equations, and the rests that follow from (9) and (10)."""
+"""sokolov2019 as printed: Tables I and II, its equations, and the rests that follow from (9) and (10)."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def error_matrix(model: ReducedModel) -> np.ndarray:
 
 
 def rest_of_9(model: ReducedModel, e: float) -> np.ndarray:
-    """What (9) estimates at x = 0, u = 0, y1 = -e: the solution of (A - L C) xhat + L y = 0, (3,)."""
+    """Solve (A - L C) xhat + L y = 0 for the estimate of (9) at x = 0, u = 0, y1 = -e, (3,)."""
     return np.linalg.solve(error_matrix(model), -np.array(TABLE_II["luenberger"]["L"]) @ [-e, 0.0])
 
 

@@ -36,7 +36,7 @@ LARGEST_LATENCY_STEPS = 64
 
 
 def is_sustained(trajectory: Trajectory, window_s: float = WINDOW_S) -> np.ndarray:
-    """Which worlds of a release oscillate without end, grow or fall, (n_worlds,).
+    """Find the worlds of a release that oscillate without end, grow or fall, (n_worlds,).
 
     Sustained: the tilt rate's peak over the last window is at least 98 % of that over the window before, and above 1e-3
     rad/s. A fall counts too.
@@ -70,12 +70,12 @@ class Sweep(NamedTuple):
     lags_s: np.ndarray
     """(n_lags,)."""
     sustained: np.ndarray
-    """Whether the loop oscillates by itself, (n_lags,)."""
+    """True where the loop oscillates by itself, (n_lags,)."""
     amplitude_deg: np.ndarray
     """Largest tilt over the last two seconds, (n_lags,); NaN where the rig fell."""
 
     def is_sustained_at(self, lag_s: float) -> bool:
-        """Whether it does so at the lag nearest to this one."""
+        """Return true if the loop oscillates by itself at the lag nearest to this one."""
         return bool(self.sustained[np.argmin(np.abs(self.lags_s - lag_s))])
 
 
@@ -93,7 +93,7 @@ def sweeps(observers: Sequence[str]) -> dict[str, Sweep]:
 
 
 class Threshold(NamedTuple):
-    """Where something begins: not yet at `low`, already at `high`; `high` is None if nowhere in the range."""
+    """The begin of something: not yet at `low`, already at `high`; `high` is None if nowhere in the range."""
 
     low: float
     high: float | None

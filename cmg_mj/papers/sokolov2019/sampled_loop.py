@@ -37,11 +37,11 @@ class Servo:
 
     @property
     def lag_s(self) -> float:
-        """How far the angle stays behind a setpoint that moves steadily [s]."""
+        """Delay of the angle behind a setpoint that moves steadily [s]."""
         return self.kv / self.kp
 
     def damp(self, lag_s: float) -> Servo:
-        """As stiff, with another lag: more damping."""
+        """Return a servo as stiff, with another lag: more damping."""
         return replace(self, kv=lag_s * self.kp)
 
     def soften(self, lag_s: float) -> Servo:

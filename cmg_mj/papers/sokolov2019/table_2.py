@@ -15,21 +15,21 @@ SEED, WORLDS = 85_000, 10
 WARM_UP_S = 0.5
 """Replayed before the window: many times the time constants of the three [s]."""
 NUMBERS = {"linear": ["tau"], "luenberger": ["L[0][0]", "L[1][0]"], "homogeneous": ["k1", "k2", "alpha"]}
-"""What is tuned of each; the entry of L that corrects x3 does not reach the rate."""
+"""The numbers tuned of each observer; the entry of L that corrects x3 does not reach the rate."""
 GENTLE = ("push.0.torque_n_m=0.15", "plant.equilibrium_bias_deg=0.0")
 """A push of which the model knows more, on a rig without bias."""
 PUSHES: dict[str, tuple[Sequence[str], Sequence[float]]] = {
     "0.5 N m, e = 0.5 deg": ((), (100.0, 400.0, 1600.0)),
     "0.15 N m, e = 0": (GENTLE, (400.0,)),
 }
-"""What pushes, and at which noises [ug/sqrt(Hz)]: the same for all three, which were tuned on one recording."""
+"""Push -> settings and noises [ug/sqrt(Hz)]: the same for all three, which were tuned on one recording."""
 
 Levels = Mapping[str, Mapping[str, Sequence[NoiseLevelResult]]]
 """Push -> observer -> what came out, one a noise."""
 
 
 def scenario_of(name: str, settings: Sequence[str], seed: int) -> Scenario:
-    """What an estimator is tuned in."""
+    """Build the scenario in which an estimator is tuned."""
     return experiment([f"seed={seed}", "duration_s=3.0", *settings], name, feedback="fog").scenario
 
 
@@ -72,7 +72,7 @@ def tune_all(
 
 
 def none_better(levels: Sequence[NoiseLevelResult]) -> bool:
-    """Whether at one noise none of the tuned estimators is better on the held-out seeds than the printed one."""
+    """Return true if none of the tuned estimators is better on the held-out seeds than the printed one."""
     return all(level.verdict != "better" for level in levels)
 
 

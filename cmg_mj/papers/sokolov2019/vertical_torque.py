@@ -1,4 +1,4 @@
-"""What one gimbal does about the vertical: its angular momentum, and the torque that a locked thrust bearing carries.
+"""One gimbal's momentum about the vertical, and the torque that a locked thrust bearing carries.
 
 With yaw at rest, the bodies' angular momentum about the vertical is, with q_c = pi/2 + x3,
 
@@ -57,7 +57,7 @@ class Locked(NamedTuple):
     time_s: np.ndarray
     motion: Motion
     torque: np.ndarray
-    """What the bearing carries about the vertical, by MuJoCo's inverse dynamics, (n_ticks,) [N m]."""
+    """Torque of the bearing about the vertical, by MuJoCo's inverse dynamics, (n_ticks,) [N m]."""
 
     def torque_between(self, start_s: float, end_s: float) -> np.ndarray:
         """The torque between two times, (n_ticks,) [N m]."""
