@@ -49,7 +49,7 @@ class Reproduction:
 
 
 def check_installed(papers: Iterable[str]) -> None:
-    """See whether all that the papers need is there, before anything is computed.
+    """Check that all packages that the papers need are there, before anything is computed.
 
     Args:
         papers: Their short names.
@@ -66,7 +66,7 @@ def check_installed(papers: Iterable[str]) -> None:
 
 
 def sections_of(paper: str) -> list[Section]:
-    """The sections in which a paper is reproduced."""
+    """Import the sections in which a paper is reproduced."""
     return importlib.import_module(f"cmg_mj.papers.{paper}").SECTIONS
 
 

@@ -52,7 +52,7 @@ PRINTED: dict[Paper, PrintedInertia] = {
 
 
 def papers_m1(paper: Paper, numbers: bool = False) -> Any:
-    """m1 as printed: with the symbols J1, J2 and I_c + I_d, or with the exact numbers of Table 1 (Table I)."""
+    """Return m1 as printed, with the symbols J1, J2 and I_c + I_d, or with the exact numbers of Table 1 (Table I)."""
     import sympy as sp
 
     q2 = coordinates()[1]
@@ -68,7 +68,7 @@ def papers_m1(paper: Paper, numbers: bool = False) -> Any:
 
 
 def inertia_factor(paper: Paper) -> Any:
-    """The factor s in m1 = s (J1 + J2 cos^2 q2)/(I_c + I_d) for which the equations of motion are those of diag(m1, 1).
+    """Return the s of m1 = s (J1 + J2 cos^2 q2)/(I_c + I_d) for which the motion is that of diag(m1, 1).
 
     With T = (M11 w_b^2 + M22 w_c^2)/2, the gimbal's equation is M22 w_c' - M11' w_b^2/2. In both papers the quotient of
     those terms is (J2/2) sin(2 q_c)/(I_c + I_d), with M11 = n (J1 + J2 cos^2 q_c) for n gimbals.
@@ -86,7 +86,7 @@ def inertia_factor(paper: Paper) -> Any:
 
 
 def jet(name: str) -> Any:
-    """A function by its value and first derivatives at q = 0, `name + name_1 q1 + name_2 q2`.
+    """Write a function by its value and first derivatives at q = 0, `name + name_1 q1 + name_2 q2`.
 
     B_(i) holds no higher derivatives, and q = 0 may be any point: what is so for these is so for all functions.
     """
@@ -98,14 +98,14 @@ def jet(name: str) -> Any:
 
 
 def any_psi() -> Any:
-    """Any Psi(q), to first order at q = 0, (2, 2)."""
+    """Return any Psi(q), to first order at q = 0, (2, 2)."""
     import sympy as sp
 
     return sp.Matrix([[jet("a"), jet("b")], [jet("c"), jet("d")]])
 
 
 def any_m1() -> Any:
-    """diag(m1(q2), 1) with any m1, to first order at q = 0, (2, 2)."""
+    """Return diag(m1(q2), 1) with any m1, to first order at q = 0, (2, 2)."""
     import sympy as sp
 
     return sp.diag(jet("m").subs(sp.Symbol("m_1"), 0), 1)
@@ -208,7 +208,7 @@ def proof(paper: Paper) -> Proof:
 
 
 def claim(paper: Paper) -> Claim:
-    """The appendix of aranovskiy2020, or Proposition 1 of sokolov2019, whose proof is not printed there."""
+    """Judge the appendix of aranovskiy2020, or Proposition 1 of sokolov2019, whose proof is not printed there."""
     result = proof(paper)
     symbolic, numeric = result.paper_decisions
     constant, *other_decisions = result.counter_checks

@@ -25,14 +25,14 @@ class UndecidedError(ValueError):
 
 
 def coordinates() -> tuple[Any, Any]:
-    """The symbols q1 (tilt) and q2 (gimbal angle)."""
+    """Return the symbols q1 (tilt) and q2 (gimbal angle)."""
     import sympy as sp
 
     return sp.symbols("q1 q2", real=True)
 
 
 def bracket(X: Any, Y: Any) -> Any:
-    """The Lie bracket [X, Y] = dY/dq X - dX/dq Y, as sokolov2019 prints it, (2, 1).
+    """Return the Lie bracket [X, Y] = dY/dq X - dX/dq Y, as sokolov2019 prints it, (2, 1).
 
     aranovskiy2020 prints q_i and q_j for q, which gives no vector.
     """
@@ -41,7 +41,7 @@ def bracket(X: Any, Y: Any) -> Any:
 
 
 def B(i: int, Psi: Any, M: Any, point: Mapping[Any, Any] | None = None) -> Any:
-    """B_(i), aranovskiy2020 appendix, (2, 2).
+    """Return B_(i), aranovskiy2020 appendix, (2, 2).
 
     Args:
         i: Number of the column of Psi, from 0.
@@ -67,7 +67,7 @@ def B(i: int, Psi: Any, M: Any, point: Mapping[Any, Any] | None = None) -> Any:
 
 
 def lie_derivative(X: Any, M: Any) -> Any:
-    """The Lie derivative of the inverse of M along X, (2, 2): zero exactly if X is a Killing field of M."""
+    """Return the Lie derivative of the inverse of M along X, (2, 2): zero exactly if X is a Killing field of M."""
     import sympy as sp
 
     q = coordinates()
@@ -103,7 +103,7 @@ def is_skew(matrix: Any) -> bool:
 
 
 def condition(m1: Any) -> Any:
-    """m1 (m1'/m1)', of which the paper's necessary condition is that it is constant, as m1'' - m1'^2/m1."""
+    """Return m1 (m1'/m1)' = m1'' - m1'^2/m1, which by the paper's necessary condition is constant."""
     import sympy as sp
 
     q2 = coordinates()[1]
@@ -111,7 +111,7 @@ def condition(m1: Any) -> Any:
 
 
 def explicit_psi(m1: Any, C: Any) -> Any:
-    """The Psi of step 3 for an m1 with m1 (m1'/m1)' = C, (2, 2)."""
+    """Return the Psi of step 3 for an m1 with m1 (m1'/m1)' = C, (2, 2)."""
     import sympy as sp
 
     q1, q2 = coordinates()

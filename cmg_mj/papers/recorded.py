@@ -15,11 +15,11 @@ def trajectory_of(result: Result) -> Trajectory:
 
 
 def push_intervals(trajectory: Trajectory) -> list[tuple[float, float]]:
-    """When the push acted on one world, as panels shade it [s]."""
+    """Find when the push acted on one world, as panels shade it [s]."""
     times = trajectory["time_s"][trajectory["push_n_m"] != 0.0]
     return [(float(times[0]), float(times[-1]))] if len(times) else []
 
 
 def rms(values: np.ndarray) -> np.ndarray:
-    """Root of the mean square over the ticks, (n_ticks, ...) -> (...)."""
+    """Return the root of the mean square over the ticks, (n_ticks, ...) -> (...)."""
     return np.sqrt(np.mean(values**2, axis=0))

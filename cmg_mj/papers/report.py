@@ -19,7 +19,7 @@ from cmg_mj.visualization.plots.run_plot import draw
 
 
 def figures_of(entries: Sequence[Reproduction]) -> dict[str, Any]:
-    """Everything but the pictures, as `--json` prints it."""
+    """Collect everything but the pictures, as `--json` prints it."""
     return {
         "versions": {name: version(name) for name in ("cmg_mj", "mujoco", "numpy", "scipy")}
         | {"python": platform.python_version()},
@@ -49,7 +49,7 @@ def _figures_of_claim(claim: Claim) -> dict[str, Any]:
 
 
 def verdict_table(entries: Sequence[Reproduction]) -> str:
-    """Every claim and its verdict, as a Markdown table."""
+    """Write every claim and its verdict as a Markdown table."""
     rows = [
         (entry.paper, claim.place + _owner_note(claim), claim.statement, verdict_words(claim))
         for entry in entries
@@ -67,12 +67,12 @@ OURS = {
 
 
 def verdict_words(claim: Claim) -> str:
-    """A claim's verdict, in the words for those of a paper or for ours."""
+    """Say a claim's verdict in the words for those of a paper or for ours."""
     return OURS[claim.verdict] if claim.is_ours else claim.verdict
 
 
 def report_text(entries: Sequence[Reproduction]) -> str:
-    """The whole report in Markdown."""
+    """Write the whole report in Markdown."""
     parts = [f"# {_title(entries)}", *_opening(entries), "## All claims", verdict_table(entries)]
     for entry in entries:
         parts.append(f"## {entry.paper}: {(PAPERS | BEYOND)[entry.paper]}")
@@ -120,7 +120,7 @@ def _title(entries: Sequence[Reproduction]) -> str:
 
 
 def _parts_of_claim(claim: Claim, log: SentenceLog) -> list[str]:
-    """A claim's paragraphs; conditions that an earlier claim of the paper had are not said again."""
+    """Write a claim's paragraphs, without the conditions that an earlier claim of the paper had."""
     parts = [
         f"### {claim.place}: {verdict_words(claim)}",
         f"**{'Ours' if claim.is_ours else 'The paper'}:** {claim.statement}",

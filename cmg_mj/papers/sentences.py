@@ -12,7 +12,7 @@ _END = re.compile(r"(?<=[.!?])(?<!\bFig\.)(?<!\be\.g\.)(?<!\bi\.e\.)\s+")
 
 
 def split_sentences(text: str) -> list[str]:
-    """The sentences of a text, in their order."""
+    """Split a text into its sentences."""
     return [part for part in _END.split(text.strip()) if part]
 
 
@@ -22,7 +22,7 @@ def count_words(sentence: str) -> int:
 
 
 def too_long(text: str) -> Iterator[str]:
-    """The sentences of a text that have more words than `LONGEST`."""
+    """Find the sentences of a text that have more words than `LONGEST`."""
     return (sentence for sentence in split_sentences(text) if count_words(sentence) > LONGEST)
 
 
@@ -33,7 +33,7 @@ class SentenceLog:
         self._places: dict[str, str] = {}
 
     def omit_repeats(self, text: str, place: str) -> str:
-        """A text without the sentences that earlier places had, which are named first.
+        """Return a text without the sentences that earlier places had, which are named first.
 
         Args:
             text: Whole sentences.

@@ -8,7 +8,7 @@ from cmg_mj.results.intervals import Interval
 
 
 def plus_minus(interval: Interval | None, digits: int = 4, *, with_sign: bool = False) -> str:
-    """A mean with half its interval, `0.0601 +- 0.0005`; a dash where there is none.
+    """Write a mean with half its interval, `0.0601 +- 0.0005`; a dash where there is none.
 
     Args:
         interval: The interval.
@@ -24,6 +24,6 @@ def plus_minus(interval: Interval | None, digits: int = 4, *, with_sign: bool = 
 
 
 def join_with_and(words: Sequence[str]) -> str:
-    """One or several things as a sentence lists them: `a`, `a and b`, `a, b and c`."""
+    """Join one or several things as a sentence lists them: `a`, `a and b`, `a, b and c`."""
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last

@@ -15,7 +15,7 @@ ROUNDING = 1e-9
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """(14), (15), Omega_1, Omega_2 and their order, the noise."""
+    """Judge (14), (15), Omega_1, Omega_2 and their order, the noise."""
     parts = [invariance, coordinates, increments, order_of_bounds, noise_level]
     results = []
     for i, part in enumerate(parts):
@@ -25,7 +25,7 @@ def claims(on_share: OnShare) -> list[Claim]:
 
 
 def least_inflow(reactor: Bioreactor, u_min: float, u_max: float, points: int = 401) -> float:
-    """Smallest component of the flow into M_eta over its boundary and all inputs; not negative if it is invariant."""
+    """Return the least component of the flow into M_eta over its boundary and all inputs, not below 0 if invariant."""
     u = np.linspace(u_min, u_max, points)[:, None]
     share = np.linspace(0.0, 1.0, points)[None, :]
     eps1, eps2 = reactor.eps1, reactor.eps2
@@ -37,7 +37,7 @@ def least_inflow(reactor: Bioreactor, u_min: float, u_max: float, points: int = 
 
 
 def invariance() -> Claim:
-    """M_eta."""
+    """Judge M_eta."""
     inflow = {hbar: least_inflow(Bioreactor(hbar), Bioreactor(hbar).u_min, U_MAX) for hbar in (HBAR, HBAR_OF_OBSERVERS)}
     inflow_at_larger_input = least_inflow(Bioreactor(HBAR), Bioreactor(HBAR).u_min, 1.1 * U_MAX)
     reactor = Bioreactor(HBAR)
@@ -60,7 +60,7 @@ def invariance() -> Claim:
 
 
 def coordinate_errors(hbar: float, count: int = 2000, seed: int = 0) -> tuple[float, float]:
-    """(15) against the chain rule along (14), by central differences of F; and F's inverse. Largest relative errors."""
+    """Return the largest relative errors of (15) along (14), by central differences of F, and of F's inverse."""
     reactor = Bioreactor(hbar)
     rng = np.random.default_rng(seed)
     eta1, eta2, _ = 0.02 + 0.94 * rng.dirichlet((1.0, 1.0, 1.0), count).T
@@ -76,7 +76,7 @@ def coordinate_errors(hbar: float, count: int = 2000, seed: int = 0) -> tuple[fl
 
 
 def coordinates() -> Claim:
-    """(15)."""
+    """Judge (15)."""
     errors = [coordinate_errors(hbar) for hbar in (HBAR, HBAR_OF_OBSERVERS)]
     slope, inverse = (max(column) for column in zip(*errors, strict=True))
     return Claim(
@@ -111,7 +111,7 @@ class Increments(NamedTuple):
 
 @functools.cache
 def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> Increments:
-    """Both inequalities of section 3 over a grid of (u, x1, x2, x2_hat)."""
+    """Evaluate both inequalities of section 3 over a grid of (u, x1, x2, x2_hat)."""
     reactor = Bioreactor(hbar)
     x1, x2, u = (grid[..., None] for grid in reactor.domain(points))
     low, high = reactor.x2_bounds(x1)
@@ -150,7 +150,7 @@ def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> Incre
 
 
 def increments() -> Claim:
-    """The two inequalities, and the misprint."""
+    """Judge the two inequalities, and the misprint."""
     quotients = increments_over_domain(HBAR_OF_OBSERVERS)
     bounds_hold = max(quotients.by_Omega1, quotients.by_Omega2, quotients.by_Omega2_local) <= 1.0 + ROUNDING
     misprint = (
@@ -179,7 +179,7 @@ def increments() -> Claim:
 
 
 def order_of_bounds() -> Claim:
-    """df2/dx2 <= Omega_2 <= Omega_1 <= df2_max."""
+    """Judge df2/dx2 <= Omega_2 <= Omega_1 <= df2_max."""
     quotients = increments_over_domain(HBAR_OF_OBSERVERS)
     exact_quotients = increments_over_domain(HBAR)
     df2_max = Bioreactor(HBAR_OF_OBSERVERS).df2_max
@@ -210,7 +210,7 @@ def order_of_bounds() -> Claim:
 
 
 def noise_level() -> Claim:
-    """10 % of the domain."""
+    """Judge the noise, said to be 10 % of the domain."""
     reactor = Bioreactor(HBAR)
     tenth = 0.1 * (1.0 - reactor.eps2 - reactor.eps1)
     return Claim(

@@ -14,7 +14,7 @@ from cmg_mj.papers.claim import Claim
 
 
 def theorem_2() -> Claim:
-    """Theorem 2, and Definition 1."""
+    """Judge Theorem 2, and Definition 1."""
     sizes, dimensions = (1e-3, 1.0, 1e3), (1, 2, 3)
     ends, limits = {}, {}
     for n in dimensions:
@@ -51,7 +51,7 @@ def theorem_2() -> Claim:
 
 
 def limits_error(correction: BiLimitCorrection, scale: float) -> tuple[float, float]:
-    """Definition 1: how far K, dilated, is from its approximations at 0 and at infinity, on |e1| <= 1.
+    """Measure, by Definition 1, the errors of K, dilated, from its approximations at 0 and at infinity, |e1| <= 1.
 
     Args:
         correction: K.
@@ -113,5 +113,5 @@ def chain_errors(
 
 
 def recursive_l(n: int, ratio: float = 2.0) -> tuple[float, ...]:
-    """l_i = ratio^(n - i)."""
+    """Return l_i = ratio^(n - i)."""
     return tuple(ratio ** (n - i) for i in range(1, n + 1))

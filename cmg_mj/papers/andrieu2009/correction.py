@@ -57,7 +57,7 @@ def correction(run: Run, reference: Replay) -> Claim:
 
 
 def simple_copy(study: Study) -> Claim:
-    """Footnote 1."""
+    """Judge Footnote 1."""
     errors = copy_errors(study.run, Bioreactor(HBAR_OF_OBSERVERS))
     copy = errors[1]
     error = float(rms_late(study.run, copy).mean())

@@ -70,7 +70,7 @@ def follow(columns: list[Column]) -> Response:
 
 
 def claims() -> list[Claim]:
-    """(11), then (12)."""
+    """Judge (11), then (12)."""
     disturbance_columns = [Column(**{kind: size}) for kind in KINDS for size in SIZES]
     columns = [*disturbance_columns, *(Column(error=e) for e in ERRORS), *(Column(gain=g) for g in GAINS)]
     columns += [Column(amplitude=a) for a in SOLUTIONS]
@@ -86,7 +86,7 @@ def claims() -> list[Claim]:
 
 
 def scaled_error(balls: np.ndarray, from_errors: np.ndarray) -> Claim:
-    """(11).
+    """Judge (11).
 
     Args:
         balls: Largest late scaled error under each of `KINDS` with each of `SIZES`, (3, 3).
@@ -114,7 +114,7 @@ def scaled_error(balls: np.ndarray, from_errors: np.ndarray) -> Claim:
 
 
 def gain_bound(from_errors: np.ndarray, from_gains: np.ndarray, of_solutions: np.ndarray, late: np.ndarray) -> Claim:
-    """(12).
+    """Judge (12).
 
     Args:
         from_errors: L from each of `ERRORS`, (n_times, 4).

@@ -35,7 +35,7 @@ class SearchResult(NamedTuple):
 
 
 def exponent_of_scaling(d_inf: float) -> float:
-    """b, half of what (21) and (22) allow with v_2 = d_inf, and 1 at most."""
+    """Return b, half of what (21) and (22) allow with v_2 = d_inf, and 1 at most."""
     return min(1.0, 0.5 * largest_b(2, d_inf, (d_inf,)))
 
 
@@ -51,7 +51,7 @@ def search(d_inf: float) -> SearchResult | None:
 
 
 def claim() -> Claim:
-    """(19) and (20)."""
+    """Judge (19) and (20)."""
     results = {d_inf: search(d_inf) for d_inf in DEGREES}
     successes = [success for success in results.values() if success is not None]
     rows = [

@@ -14,14 +14,14 @@ RATES = ("df2_max", "Omega_1", "Omega_2", "df2/dx2")
 
 
 def ordered_rates(study: Study) -> tuple[np.ndarray, np.ndarray]:
-    """Means of df2_max, Omega_1, Omega_2, df2/dx2 over windows and seeds, (4 rates, 4 windows); whether in order."""
+    """Return the means of `RATES` over windows and seeds, (4 rates, 4 windows), and the windows in order."""
     rates = [study.nominal[kind].rate for kind in KINDS]
     means = np.array([window_means(study.run, rate).mean(axis=1) for rate in (*rates, study.rate)])
     return means, np.asarray(np.all(np.diff(means, axis=0) <= 0.0, axis=0))
 
 
 def figure_1(study: Study) -> Claim:
-    """The estimates of the local incremental rate."""
+    """Judge the estimates of the local incremental rate."""
     means, in_order = ordered_rates(study)
     gains = {kind: window_means(study.run, study.nominal[kind].L).mean(axis=1) for kind in (UPDATED, HOMOGENEOUS)}
     gain_ratios = [

@@ -31,12 +31,12 @@ STRONG = 0.7
 
 
 def share_in_order(rms: np.ndarray) -> float:
-    """Share of the seeds in which constant > updated > updated and homogeneous."""
+    """Return the share of the seeds in which constant > updated > updated and homogeneous."""
     return float((np.diff(rms, axis=0) < 0.0).all(axis=0).mean())
 
 
 def figure_2(study: Study) -> Claim:
-    """The estimation errors."""
+    """Judge the estimation errors."""
     rms, loud = rms_by_kind(study.run, study.nominal), rms_by_kind(study.run, study.loud)
     share, share_loud = share_in_order(rms), share_in_order(loud)
     n = rms.shape[1]
@@ -90,17 +90,17 @@ def _picture(study: Study) -> Picture:
 
 
 def running_mean(t: np.ndarray, values: np.ndarray, span: float = 1.0) -> np.ndarray:
-    """Mean over a span of time about each sample, (n,)."""
+    """Return the mean over a span of time about each sample, (n,)."""
     return uniform_filter1d(values, max(1, round(span / float(t[1] - t[0]))), mode="nearest")
 
 
 def biases(run: Run, replays: dict[str, Replay]) -> np.ndarray:
-    """Mean error of eta2, (3 observers, 4 windows)."""
+    """Return the mean error of eta2, (3 observers, 4 windows)."""
     return np.array([window_means(run, replays[kind].eta2_error).mean(axis=1) for kind in KINDS])
 
 
 def bias(study: Study) -> Claim:
-    """The order of the biases in Fig. 2."""
+    """Judge the order of the biases in Fig. 2."""
     noisy, quiet = biases(study.run, study.nominal), biases(study.quiet_run, study.quiet)
     in_order = [(np.diff(values, axis=0) <= 0.0).all(axis=0) for values in (noisy, quiet)]
     rows = [
@@ -121,7 +121,7 @@ def bias(study: Study) -> Claim:
 
 
 def bias_left(study: Study) -> np.ndarray:
-    """Share of the bias that is left where the observers know hbar, (3 observers, 4 windows)."""
+    """Return the share of the bias that is left where the observers know hbar, (3 observers, 4 windows)."""
     return np.abs(biases(study.run, study.exact) / biases(study.run, study.nominal))
 
 
@@ -165,7 +165,7 @@ def bias_of_updated_gains(study: Study) -> Claim:
 
 
 def spread_correlation(study: Study) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Standard deviation of the errors beside the estimates used.
+    """Return the standard deviation of the errors beside the estimates used.
 
     Returns:
         Spreads (3 observers, 4 windows), rates (3, 4), the rank correlation over all twelve, the least over the three
@@ -182,7 +182,7 @@ def spread_correlation(study: Study) -> tuple[np.ndarray, np.ndarray, float, flo
 
 
 def spread(study: Study) -> Claim:
-    """The thickness of the curves in Fig. 2."""
+    """Judge the thickness of the curves in Fig. 2."""
     spreads, rates, overall, in_window = spread_correlation(study)
     ratio = spreads[:, [0, 2]].mean() / spreads[:, [1, 3]].mean()
     remark = (

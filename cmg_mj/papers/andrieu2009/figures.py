@@ -13,7 +13,7 @@ SEEDS = 20
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Section 3.1."""
+    """Judge section 3.1."""
     results = study(SEEDS)
     on_share(0.7)
     figure_claims = [figure_1(results), figure_2(results), bias(results), bias_of_constant_gain(results)]

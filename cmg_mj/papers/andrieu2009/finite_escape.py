@@ -40,7 +40,7 @@ class Escape(NamedTuple):
 
 
 def solution(p: float, x2: float, share_left: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-    """x2' = x2^(1+p), x1(0) = 0: x1 and x2, in closed form.
+    """Solve x2' = x2^(1+p), x1(0) = 0 for x1 and x2, in closed form.
 
     Args:
         p: Power, not 1.
@@ -54,7 +54,7 @@ def solution(p: float, x2: float, share_left: np.ndarray | float) -> tuple[np.nd
 
 
 def observer(p: float) -> UpdatedHighGain:
-    """(7), (8) for (1) with g = 0, u = 0, in continuous time; d_inf = 0.5 whatever p is, as Theorem 1 wants it."""
+    """Make (7), (8) for (1) with g = 0, u = 0, in continuous time; d_inf = 0.5 whatever p is, as Theorem 1 wants it."""
     return UpdatedHighGain(
         1e-3,
         (lambda u, y, x: 0.0 * y[0], lambda u, y, x: paper.f2(0.0, x[0], 0.0, p)),
@@ -100,7 +100,7 @@ def escape(p: float, x2: float, x2_hat: float = 0.0, tolerance: float = 1e-6) ->
 
 
 def no_observer_beyond_1() -> Claim:
-    """The remark on p > 1."""
+    """Judge the remark on p > 1."""
     runs = {p: [escape(p, start) for start in STARTS] for p in (INSIDE, BEYOND)}
     ends = {p: [float(run.error[-1]) for run in escapes] for p, escapes in runs.items()}
     moved = [run.moved for run in runs[BEYOND]]

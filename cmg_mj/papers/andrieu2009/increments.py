@@ -12,7 +12,7 @@ CORRECTED = "With the exponent that section 2.1 and (28) have, (1 - d_inf (n - i
 
 
 def increments_of_2(p: float, count: int = 4000, seed: int = 0) -> float:
-    """Worst quotient of |f2(x2) - f2(x2_hat)| and |g + 1| |x2 - x2_hat| at random g, x2, x2_hat, u."""
+    """Return the worst quotient of |f2(x2) - f2(x2_hat)| and |g + 1| |x2 - x2_hat| at random g, x2, x2_hat, u."""
     rng = np.random.default_rng(seed)
     g, u = rng.normal(size=(2, count))
     x2, x2_hat = rng.normal(size=(2, count)) * 10.0 ** rng.uniform(-2.0, 2.0, (2, count))
@@ -23,7 +23,7 @@ def increments_of_2(p: float, count: int = 4000, seed: int = 0) -> float:
 
 
 def linear_increments() -> Claim:
-    """(2)."""
+    """Judge (2)."""
     quotient, quotient_above_0 = increments_of_2(0.0), increments_of_2(0.1)
     return Claim(
         place="Section 1, (2)",
@@ -36,7 +36,7 @@ def linear_increments() -> Claim:
 
 
 def largest_increment(p: float) -> float:
-    """Worst quotient of the two sides of (3) for g = 0, over both signs and sizes from 1e-4 to 1e4.
+    """Return the worst quotient of the two sides of (3) for g = 0, over both signs and sizes from 1e-4 to 1e4.
 
     g adds |g| |x2 - x2_hat| to both sides at most.
     """
@@ -51,7 +51,7 @@ def largest_increment(p: float) -> float:
 
 
 def increments() -> Claim:
-    """(2), (3)."""
+    """Judge (2), (3)."""
     quotients = {p: largest_increment(p) for p in (0.1, 0.5, 0.9, 1.0, 1.5, 2.0)}
     largest_inside = max(quotient for p, quotient in quotients.items() if p < 1.0)
     return Claim(
@@ -72,12 +72,12 @@ def printed_exponent(n: int, i: int, j: int, d_inf: float) -> float:
 
 
 def exponent_of_section_2_1(n: int, i: int, j: int, d_inf: float) -> float:
-    """The same where section 2.1 discusses it, and in the proof, (28)."""
+    """Return the exponent where section 2.1 discusses it, and in the proof, (28)."""
     return (1.0 - d_inf * (n - i - 1)) / (1.0 - d_inf * (n - j))
 
 
 def quotient_of_6(exponent: float, p: float, size: float) -> float:
-    """Worst quotient of the sides of (6) for (1), c_inf = 1 and the Gamma and v_2 of section 2.1, up to a size of x2.
+    """Return the worst quotient of the sides of (6) for (1), c_inf = 1, Gamma, v_2 of section 2.1, up to a size of x2.
 
     With g = 0: |g| adds to both sides alike.
     """
@@ -91,7 +91,7 @@ def quotient_of_6(exponent: float, p: float, size: float) -> float:
 
 
 def exponent_of_6() -> Claim:
-    """The exponent in (6), for system (1)."""
+    """Judge the exponent in (6), for system (1)."""
     powers, sizes = (0.1, 0.5, 0.9), (1e4, 1e8)
     quotients = {p: quotient_of_6(exponent_of_section_2_1(2, 2, 2, p), p, sizes[-1]) for p in powers}
     printed_quotients = {p: [quotient_of_6(printed_exponent(2, 2, 2, p), p, size) for size in sizes] for p in powers}

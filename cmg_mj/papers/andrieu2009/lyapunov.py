@@ -32,7 +32,7 @@ class States(NamedTuple):
 
 
 def states(scales: np.ndarray = SCALES, angles: int = ANGLES) -> States:
-    """On squares of all scales, denser where s1 and s2 are nearly alike, and where one of them is small."""
+    """Return states on squares of all scales, denser where s1 and s2 are nearly alike or one of them is small."""
     share = np.linspace(-1.0, 1.0, angles)
     shares = np.concatenate([share, np.geomspace(1e-3, 1.0, 40), 1.0 - np.geomspace(1e-3, 1.0, 40)])
     ends = np.ones_like(shares)
@@ -62,40 +62,40 @@ class Lyapunov:
         return self.d_W - 1.0, self.d_W / r1 - 1.0
 
     def q1(self, s: np.ndarray) -> np.ndarray:
-        """q1, whose two terms are one if d_inf = 0."""
+        """Return q1, whose two terms are one if d_inf = 0."""
         return s if not self.K.d_inf else s + signed_power(s, self.K.exponents[0])
 
     def q1_slope(self, s: np.ndarray) -> np.ndarray:
-        """Its derivative."""
+        """Return the derivative of q1."""
         a = self.K.exponents[0]
         return np.ones_like(s) if not self.K.d_inf else 1.0 + a * np.abs(s) ** (a - 1.0)
 
     def h(self, s: np.ndarray) -> np.ndarray:
-        """The integrand of W."""
+        """Return the integrand of W."""
         first, second = self.powers
         return signed_power(s, first) + signed_power(s, second)
 
     def h_slope(self, s: np.ndarray) -> np.ndarray:
-        """Its derivative."""
+        """Return the derivative of h."""
         first, second = self.powers
         return first * np.abs(s) ** (first - 1.0) + second * np.abs(s) ** (second - 1.0)
 
     def H(self, s: np.ndarray) -> np.ndarray:
-        """Its integral."""
+        """Return the integral of h."""
         first, second = (power + 1.0 for power in self.powers)
         return np.abs(s) ** first / first + np.abs(s) ** second / second
 
     def E(self, points: States) -> tuple[np.ndarray, np.ndarray]:
-        """e1 and e2."""
+        """Return e1 and e2."""
         return points.s1 / self.K.l[0], self.q1(points.s2)
 
     def W(self, points: States) -> np.ndarray:
-        """W, (n,)."""
+        """Return W, (n,)."""
         first = self.H(points.s1) - self.H(points.s2) - self.h(points.s2) * (points.s1 - points.s2)
         return first + self.sigma * np.abs(self.q1(points.s2)) ** self.d_W / self.d_W
 
     def gradient(self, points: States) -> tuple[np.ndarray, np.ndarray]:
-        """dW/de1 and dW/de2, each (n,)."""
+        """Return dW/de1 and dW/de2, each (n,)."""
         by_s2 = -self.h_slope(points.s2) * (points.s1 - points.s2) / self.q1_slope(points.s2)
         return (
             self.K.l[0] * (self.h(points.s1) - self.h(points.s2)),

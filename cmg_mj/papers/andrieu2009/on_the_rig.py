@@ -34,14 +34,14 @@ VELOCITY, TILT = "velocity_rms_error_rad_s", "tilt_rms_deg"
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Velocity RMS errors beside those of aranovskiy2020's observers; how idle the update of the gain is."""
+    """Judge the velocity RMS errors beside those of aranovskiy2020's observers; how idle the update of the gain is."""
     on_share(0.0)
     results = run_kinds(list(KINDS), WORLDS, SEED)
     return [comparison_claim(results), idle_claim(results["high_gain"])]
 
 
 def experiment(label: str, seed: int) -> Experiment:
-    """One of `KINDS` in the loop of push_recovery, e = 0.5 degrees."""
+    """Prepare one of `KINDS` in the loop of push_recovery, e = 0.5 degrees."""
     kind, settings = KINDS[label]
     return prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], kind))
 
@@ -110,7 +110,7 @@ def _picture(errors: dict[str, np.ndarray]) -> Picture:
 
 
 def idle_claim(result: Result) -> Claim:
-    """The update of the gain has nothing to do."""
+    """Judge whether the update of the gain has nothing to do."""
     trajectory = trajectory_of(result)
     rig = experiment("high_gain", SEED)
     observer = make_observer("high_gain", rig.law.dt, rig.plant.reduced)
@@ -134,7 +134,7 @@ def idle_claim(result: Result) -> Claim:
 
 
 def largest_gain(Omega: np.ndarray, observer: HighGain, period: float) -> float:
-    """The largest L of the runs: the observer's own update along their Omega, (n_ticks, n_worlds) [1/s]."""
+    """Return the largest L of the runs: the observer's own update along their Omega, (n_ticks, n_worlds) [1/s]."""
     L = largest = np.full(Omega.shape[1], observer.phi2)
     for row in Omega:
         L = updated_gain(L, row, period, observer.phi1, observer.phi2, observer.phi3)

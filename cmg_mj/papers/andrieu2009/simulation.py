@@ -91,7 +91,7 @@ def run_plant(seeds: Sequence[int], noise: float | Sequence[float] = NOISE, dt: 
 
 
 def _integrate(model: Bioreactor, start: np.ndarray, u: np.ndarray, dt: float) -> np.ndarray:
-    """(14) from a start (2, runs) with inputs held from sample to sample, (2, n, runs)."""
+    """Integrate (14) from a start (2, runs) with inputs held from sample to sample, (2, n, runs)."""
     eta = np.empty((2, len(u), start.shape[1]))
     eta[:, 0] = state = start
     for k in range(len(u) - 1):
@@ -100,12 +100,12 @@ def _integrate(model: Bioreactor, start: np.ndarray, u: np.ndarray, dt: float) -
 
 
 def copy_errors(run: Run, model: Bioreactor) -> np.ndarray:
-    """Error of a copy of (14) without correction, from the observers' start, (2, n, seeds)."""
+    """Return the error of a copy of (14) without correction, from the observers' start, (2, n, seeds)."""
     return run.eta - _integrate(model, run.start, run.u, float(run.t[1]))
 
 
 def runge_kutta(slope: Callable[[np.ndarray], np.ndarray], state: np.ndarray, dt: float) -> np.ndarray:
-    """One classical step."""
+    """Take one classical step."""
     p = slope(state)
     q = slope(state + 0.5 * dt * p)
     r = slope(state + 0.5 * dt * q)
@@ -113,7 +113,7 @@ def runge_kutta(slope: Callable[[np.ndarray], np.ndarray], state: np.ndarray, dt
 
 
 def make_observer(kind: str, model: Bioreactor, dt: float, *, p: float = P, b: float = B) -> UpdatedHighGain:
-    """One of the three observers with the paper's parameters.
+    """Make one of the three observers with the paper's parameters.
 
     Args:
         kind: CONSTANT, UPDATED or HOMOGENEOUS.
@@ -182,7 +182,7 @@ def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B
 
 
 def select_seeds(part: Run | Replay, columns: slice) -> Any:
-    """The same of some of the seeds."""
+    """Return a part of some of the seeds."""
     common_fields = ("t", "u")
     return replace(
         part, **{f.name: getattr(part, f.name)[..., columns] for f in fields(part) if f.name not in common_fields}
@@ -190,32 +190,32 @@ def select_seeds(part: Run | Replay, columns: slice) -> Any:
 
 
 def replays(run: Run, model: Bioreactor) -> dict[str, Replay]:
-    """All three observers on one run."""
+    """Replay all three observers on one run."""
     return {kind: replay(kind, run, model) for kind in KINDS}
 
 
 def incremental_rate(run: Run, model: Bioreactor) -> np.ndarray:
-    """df2/dx2 of the f2 that the observers bound, at the true state, (n, seeds)."""
+    """Return df2/dx2 of the f2 that the observers bound, at the true state, (n, seeds)."""
     x1 = model.limit_x1(run.eta[0])
     x2 = model.limit_x2(x1, Bioreactor(HBAR).to_x2(*run.eta))
     return model.f2_slope(x1, x2, run.u)
 
 
 def split_windows(run: Run, values: np.ndarray) -> list[np.ndarray]:
-    """The samples in each window, (samples, seeds)."""
+    """Return the samples in each window, (samples, seeds)."""
     return [values[(run.t >= start) & (run.t < end)] for start, end in WINDOWS]
 
 
 def window_means(run: Run, values: np.ndarray) -> np.ndarray:
-    """Mean over each window, (4, seeds)."""
+    """Return the mean over each window, (4, seeds)."""
     return np.array([part.mean(axis=0) for part in split_windows(run, values)])
 
 
 def window_spreads(run: Run, values: np.ndarray) -> np.ndarray:
-    """Standard deviation over each window about a straight line through it, (4, seeds)."""
+    """Return the standard deviation over each window about a straight line through it, (4, seeds)."""
     return np.array([detrend(part, axis=0).std(axis=0) for part in split_windows(run, values)])
 
 
 def rms_late(run: Run, values: np.ndarray) -> np.ndarray:
-    """RMS after 5, one number a seed."""
+    """Return the RMS after 5, one number a seed."""
     return np.sqrt(np.mean(values[run.t > 5.0] ** 2, axis=0))

@@ -67,5 +67,5 @@ def study(seeds: int, seed: int = 0, dt: float = 0.01) -> Study:
 
 
 def rms_by_kind(run: Run, by_kind: dict[str, Replay]) -> np.ndarray:
-    """RMS error of eta2 after t = 5, (3 observers, seeds)."""
+    """Return the RMS error of eta2 after t = 5, (3 observers, seeds)."""
     return np.array([rms_late(run, by_kind[kind].eta2_error) for kind in KINDS])

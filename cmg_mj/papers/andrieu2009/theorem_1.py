@@ -26,7 +26,7 @@ Runs = dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
 def theorem_1() -> Claim:
-    """The three observers from large errors, and with a disturbance."""
+    """Judge the three observers from large errors, and with a disturbance."""
     runs = {kind: recoveries(kind, START_ERRORS) for kind in (PLAIN, UPDATED)}
     t, error, L = recoveries(HOMOGENEOUS, START_ERRORS, NOISE_AMPLITUDES)
     n = len(START_ERRORS)
@@ -93,7 +93,7 @@ def _finite(value: float) -> float | None:
 
 
 def system_1(kind: str, dt: float, p: float = 0.5) -> UpdatedHighGain:
-    """An observer for (1) with g(y) = y - 1, u being measured along with y."""
+    """Make an observer for (1) with g(y) = y - 1, u being measured along with y."""
 
     def g(y: np.ndarray) -> np.ndarray:
         return y - 1.0

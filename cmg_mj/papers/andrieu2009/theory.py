@@ -20,7 +20,7 @@ from cmg_mj.results import markdown
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Sections 1, 2 and 4."""
+    """Judge sections 1, 2 and 4."""
     parts = [
         lambda: [linear_increments(), increments(), exponent_of_6()],
         lambda: [no_observer_beyond_1(), scaling_conditions(), gain_tracking()],
@@ -37,7 +37,7 @@ def claims(on_share: OnShare) -> list[Claim]:
 
 
 def scaling_conditions() -> Claim:
-    """(21), (22) and the parameters of section 3.1."""
+    """Judge (21), (22) and the parameters of section 3.1."""
     lines = list_violations(2, P, B, (P,))
     bound = largest_b(2, P, (P,))
     return Claim(
@@ -55,7 +55,7 @@ def scaling_conditions() -> Claim:
 
 
 def tracking_error(rate: float, phi1: float = 0.5, phi2: float = 1.0, phi3: float = 1.0) -> tuple[float, float]:
-    """L behind phi2 + phi3/phi1 Omega for Omega = 2 + sin(rate t): the largest error, and the least L - phi2."""
+    """Track Omega = 2 + sin(rate t): return the largest |L - phi2 - phi3/phi1 Omega| and the least L - phi2."""
     dt = 0.01
     t = np.arange(0.0, 20.0 + 4.0 * math.pi / rate, dt)
     Omega = 2.0 + np.sin(rate * t)
@@ -69,7 +69,7 @@ def tracking_error(rate: float, phi1: float = 0.5, phi2: float = 1.0, phi3: floa
 
 
 def gain_tracking() -> Claim:
-    """(13) and the remark that L does not fall below phi2."""
+    """Judge (13) and the remark that L does not fall below phi2."""
     rates = (0.4, 0.2, 0.1, 0.05)
     errors, least = zip(*(tracking_error(rate) for rate in rates), strict=True)
     quotients = [a / b for a, b in itertools.pairwise(errors)]

@@ -121,7 +121,7 @@ class UpdatedHighGain:
 
     @classmethod
     def plain(cls, *, dt: float, f: Sequence[Function], l: Sequence[float], L: float, **extras: Any) -> UpdatedHighGain:  # noqa: E741
-        """The classical high-gain observer: linear correction, constant gain.
+        """Make the classical high-gain observer: linear correction, constant gain.
 
         Args:
             dt: Sample period [s].
@@ -150,7 +150,7 @@ class UpdatedHighGain:
         v: Sequence[float] = (),
         **extras: Any,
     ) -> UpdatedHighGain:
-        """The updated high-gain observer: linear correction, gain by (8).
+        """Make the updated high-gain observer: linear correction, gain by (8).
 
         Args:
             dt: Sample period [s].
@@ -170,11 +170,11 @@ class UpdatedHighGain:
         return cls(dt, tuple(f), BiLimitCorrection(tuple(l)), Omega, b, phi1, phi2, phi3, v=tuple(v), **extras)
 
     def list_violations(self) -> list[str]:
-        """A line for each of the inequalities (21), (22) that does not hold."""
+        """List the inequalities (21), (22) that do not hold."""
         return list_violations(self.correction.n, self.correction.d_inf, self.b, self.v)
 
     def init(self, y: Signals, x: Signals | None = None) -> State:
-        """The state at the first sample.
+        """Return the state at the first sample.
 
         Args:
             y: What is measured: the output, and after it whatever other measured signals f, a and Omega take.
@@ -223,7 +223,7 @@ class UpdatedHighGain:
         return State(x, L_end, tuple(y)), x
 
     def slope(self, x: Signals, L: Scalar, y: Signals, u: Any) -> Signals:
-        """The right-hand side of (7)."""
+        """Return the right-hand side of (7)."""
         n = self.correction.n
         limited_y, limited_x = self.saturate(y, x[1:])
         scale = signed_power(L, self.b)
@@ -242,5 +242,5 @@ class UpdatedHighGain:
 
 
 def _advance(x: Signals, span: float, slope: Signals) -> Signals:
-    """The point x + span slope."""
+    """Return the point x + span slope."""
     return tuple(x_i + span * slope_i for x_i, slope_i in zip(x, slope, strict=True))

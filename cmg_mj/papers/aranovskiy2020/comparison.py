@@ -32,7 +32,7 @@ MEASURES = (JUDGED, "velocity_rms_error_push_rad_s", "tilt_rms_deg", "command_rm
 
 
 def differences(numbers: Numbers) -> list[Interval | None]:
-    """The worse's less the better's, world by world, of each of `PAIRS`."""
+    """Subtract the better's numbers from the worse's, world by world, for each of `PAIRS`."""
     return [known_interval(numbers[worse] - numbers[better]) for worse, better in PAIRS]
 
 
@@ -93,7 +93,7 @@ def read_measures(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[M
 
 
 def order(measures: list[Measure]) -> Claim:
-    """Section V's ranking.
+    """Judge section V's ranking.
 
     Args:
         measures: The measures, that of `JUDGED` among them.
@@ -129,7 +129,7 @@ def order(measures: list[Measure]) -> Claim:
 
 
 def _in_words(measure: Measure) -> str:
-    """One measure's means and order on each kind of angles."""
+    """Write one measure's means and order on each kind of angles."""
     parts = []
     for angles, numbers in measure.numbers.items():
         means = [known_interval(numbers[name]) for name in ("homogeneous", "ltv", "linear")]

@@ -65,7 +65,7 @@ Sweeps = Mapping[str, Mapping[float, Transient]]
 
 
 def lowest_rate(method: str, sweep: Mapping[float, Transient], passes: Callable[[Transient], bool]) -> float | None:
-    """The rate above which a method does well, by bisection to 0.1 Hz; None if it does at the lowest tried [Hz]."""
+    """Return the rate above which a method passes, by bisection to 0.1 Hz; None if it does at the lowest tried [Hz]."""
     failing_rates = [rate for rate, result in sweep.items() if not passes(result)]
     if not failing_rates:
         return None
@@ -77,7 +77,7 @@ def lowest_rate(method: str, sweep: Mapping[float, Transient], passes: Callable[
 
 
 def matrices_along(run: Trajectory) -> np.ndarray:
-    """H of this package's observer along a run, from the second sample on, (n_ticks - 1, 3, 3)."""
+    """Return H of this package's observer along a run, from the second sample on, (n_ticks - 1, 3, 3)."""
     observer = make_exact()
     y1, y2, u = (run[name].tolist() for name in ("y1_rad", "y2_rad", "u_rad_s"))
     state, matrices = observer.init(Measurement(y1[0], y2[0])), []
@@ -92,7 +92,7 @@ def _down_to(rate: float | None) -> str:
 
 
 def delicacy(seed: int = SEED_OF_10) -> Claim:
-    """Condition and definiteness of H over step size and method."""
+    """Judge the condition and definiteness of H over step size and method."""
     sweeps = {name: {rate: transient(name, rate) for rate in RATES_HZ} for name in METHODS}
     definite = {name: lowest_rate(name, sweeps[name], lambda t: t.least > 0.0) for name in METHODS}
     finite = {name: lowest_rate(name, sweeps[name], lambda t: math.isfinite(t.error)) for name in METHODS}
@@ -169,5 +169,5 @@ def _picture(sweeps: Sweeps, at_200: Mapping[str, Transient]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The delicacy."""
+    """Judge the delicacy."""
     return [delicacy()]

@@ -58,7 +58,7 @@ def largest_by_smallest(errors: Mapping[str, Interval]) -> float:
 
 
 def figure_4(worlds: int = WORLDS, seed: int = SEED) -> Claim:
-    """Are the three comparable, from the push to a second after it?
+    """Judge whether the three are comparable, from the push to a second after it.
 
     Over the whole run, most of which is stillness, they are judged by their noise: there zero is closer than any.
     """
@@ -94,7 +94,7 @@ def figure_4(worlds: int = WORLDS, seed: int = SEED) -> Claim:
 
 
 def _find_beaten(errors: Mapping[str, Interval]) -> list[str]:
-    """The equations that an estimate of zero is closer than."""
+    """Return the equations that an estimate of zero is closer than."""
     return [equation for name, equation in OBSERVERS.items() if errors[name].mean > errors["zero"].mean]
 
 
@@ -131,5 +131,5 @@ def _picture(example: Trajectory) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Fig. 4."""
+    """Judge Fig. 4."""
     return [figure_4()]

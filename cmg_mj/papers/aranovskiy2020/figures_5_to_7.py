@@ -30,14 +30,14 @@ WORLDS = 20
 def close_loops(
     observers: Sequence[str], angles: AngleSource, worlds: int, seed: int, duration_s: float = DURATION_S
 ) -> dict[str, Result]:
-    """Each observer's estimate in the law, a push at 2 s."""
+    """Close the loop on each observer, a push at 2 s."""
     settings = [f'controller.angle_source="{angles}"']
     runs = [run_of(push_recovery(observer, seed, settings, duration_s), worlds) for observer in observers]
     return dict(zip(observers, run_side_by_side(runs), strict=True))
 
 
 def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
-    """One of Figs 5 to 7."""
+    """Judge one of Figs 5 to 7."""
     error = {angles: known_interval(result.values("velocity_rms_error_rad_s")) for angles, result in results.items()}
     tilt = {angles: known_interval(result.values("tilt_rms_deg")) for angles, result in results.items()}
     fall_shares = {angles: float(result.fell.mean()) for angles, result in results.items()}
@@ -75,7 +75,7 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
 
 
 def _picture(name: str, examples: Mapping[AngleSource, Trajectory]) -> Picture:
-    """Two columns: the law on measured angles, the law on estimated ones."""
+    """Draw two columns: the law on measured angles, the law on estimated ones."""
     rows: list[list[Panel]] = [[], [], [], []]
     for angles, example in examples.items():
         t, shaded = example["time_s"], push_intervals(example)
@@ -104,7 +104,7 @@ def _picture(name: str, examples: Mapping[AngleSource, Trajectory]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The three figures, and what Section V concludes from the same runs."""
+    """Judge the three figures, and what Section V concludes from the same runs."""
     results: dict[AngleSource, dict[str, Result]] = {}
     for i, angles in enumerate(ANGLES):
         results[angles] = close_loops(list(OBSERVERS), angles, WORLDS, SEED)

@@ -96,7 +96,7 @@ def decay(alpha: float) -> Decay:
 
 
 def observer_decay_time(alpha: float) -> float:
-    """The same of the bench's observer, sampled often: from when on its error stays below `SEEN` [s]."""
+    """Return the time from which the bench's observer, sampled often, has an error below `SEEN` [s]."""
     observer = make_observer("homogeneous", FINE_DT, printed_model(), alpha=alpha)
     rest_measurement = Measurement(0.0, 0.0)
     state = observer.init(rest_measurement)._replace(x2=1.0)
@@ -108,7 +108,7 @@ def observer_decay_time(alpha: float) -> float:
 
 
 def finite_time_claim() -> Claim:
-    """Finite for alpha below 1, not for 1."""
+    """Judge whether the time is finite for alpha below 1, not for 1."""
     decays = {alpha: decay(alpha) for alpha in ALPHAS}
     finite = {alpha: d for alpha, d in decays.items() if alpha < 1.0}
     predicted_factors = {alpha: 10.0 ** ((alpha - 1.0) * d.decades_a_turn) for alpha, d in decays.items()}
@@ -152,5 +152,5 @@ def _picture(decays: dict[float, Decay]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Finite time."""
+    """Judge finite time."""
     return [finite_time_claim()]

@@ -22,12 +22,12 @@ Method = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 
 
 def euler(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
-    """One explicit Euler step."""
+    """Take one explicit Euler step."""
     return H + H.dtype.type(h) * riccati_slope(H, A)
 
 
 def rk4(H: np.ndarray, A: np.ndarray, h: float, first: np.ndarray | None = None) -> np.ndarray:
-    """One classical Runge-Kutta step."""
+    """Take one classical Runge-Kutta step."""
     t = H.dtype.type(h)
     k1 = riccati_slope(H, A, first)
     k2 = riccati_slope(H + t / 2 * k1, A, first)
@@ -36,12 +36,12 @@ def rk4(H: np.ndarray, A: np.ndarray, h: float, first: np.ndarray | None = None)
 
 
 def rk4_as_printed(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
-    """The same with the printed first term, H A^T with A of (6)."""
+    """Take the step with the printed first term, H A^T with A of (6)."""
     return rk4(H, A, h, printed_model().A)
 
 
 def exact_step(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
-    """One sample of this package's observer at rest, where A is that of `A_prime()`."""
+    """Take one sample of this package's observer at rest, where A is that of `A_prime()`."""
     observer = make_exact(h)
     rest_measurement = Measurement(0.0, 0.0)
     entries = {"h11": H[0, 0], "h12": H[0, 1], "h22": H[1, 1], "h33": H[2, 2]}
@@ -61,12 +61,12 @@ METHODS: dict[str, Method] = {
 
 @cache
 def make_exact(dt: float = DT) -> LinearTimeVarying:
-    """This package's (10)."""
+    """Make this package's (10)."""
     return LinearTimeVarying(dt=dt, model=printed_model())
 
 
 def matrix_of(state: State) -> np.ndarray:
-    """H of this package's observer, (3, 3)."""
+    """Return H of this package's observer, (3, 3)."""
     return np.array([[state.h11, state.h12, 0.0], [state.h12, state.h22, 0.0], [0.0, 0.0, state.h33]], dtype=float)
 
 

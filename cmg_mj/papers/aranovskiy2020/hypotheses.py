@@ -66,7 +66,7 @@ def measure_yaw(runs: MismatchRuns, mismatch: Mismatch, size: float) -> Yaw:
 
 
 def symmetric_claim(runs: MismatchRuns) -> Claim:
-    """Hypotheses 1 and 2 kept."""
+    """Judge Hypotheses 1 and 2 kept."""
     turn = float(np.degrees(np.abs(trajectory_of(runs.symmetric)["angle/yaw_rad"]).max()))
     return Claim(
         place="Hypotheses 1 and 2",
@@ -82,7 +82,7 @@ def symmetric_claim(runs: MismatchRuns) -> Claim:
 
 
 def broken_claim(runs: MismatchRuns) -> Claim:
-    """Hypotheses 1 and 2 broken."""
+    """Judge Hypotheses 1 and 2 broken."""
     yaws = {(m, size): measure_yaw(runs, m, size) for m in MISMATCHES for size in m.sizes}
     ratios = [y.predicted_deg / y.drift_deg for y in yaws.values() if not math.isnan(y.predicted_deg)]
     examples = [(m, m.sizes[-2]) for m in MISMATCHES]
@@ -160,7 +160,7 @@ def _picture(runs: MismatchRuns, yaws: dict[tuple[Mismatch, float], Yaw]) -> Pic
 
 
 def hypothesis_3(runs: MismatchRuns) -> Claim:
-    """The flywheels' speed is constant."""
+    """Judge whether the flywheels' speed is constant."""
     plant, run = runs.plant, trajectory_of(runs.symmetric)
     names = plant.joint_names
     speeds = np.stack([np.abs(run[f"rate/{names[module.flywheel]}_rad_s"]) for module in plant.modules])
@@ -195,7 +195,7 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Hypotheses 1 and 2 kept, then broken, and Hypothesis 3."""
+    """Judge Hypotheses 1 and 2 kept, then broken, and Hypothesis 3."""
     on_share(0.0)
     runs = run_all(MISMATCHES, WORLDS, SEED, DURATION_S)
     on_share(0.9)

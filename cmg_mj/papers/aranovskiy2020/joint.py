@@ -51,7 +51,7 @@ class JointExperiment(NamedTuple):
 
 
 def experiments(studies: Studies) -> Iterator[JointExperiment]:
-    """All that were tried."""
+    """Generate all experiments that were tried."""
     for push, by_name in studies.items():
         for level in by_name["linear"].levels:
             noise = level.noise_ug_rthz
@@ -59,7 +59,7 @@ def experiments(studies: Studies) -> Iterator[JointExperiment]:
 
 
 def list_experiments(joint_experiments: Sequence[JointExperiment]) -> str:
-    """Experiments push by push: `1 N m, e = 0.5 deg at 100, 200; 0.3 N m, e = 0 at 100 ug/rtHz`."""
+    """List experiments push by push: `1 N m, e = 0.5 deg at 100, 200; 0.3 N m, e = 0 at 100 ug/rtHz`."""
     noises: dict[str, list[str]] = {}
     for experiment in joint_experiments:
         noises.setdefault(experiment.push, []).append(f"{experiment.noise_ug_rthz:g}")
@@ -67,7 +67,7 @@ def list_experiments(joint_experiments: Sequence[JointExperiment]) -> str:
 
 
 def nearest_joint(studies: Studies) -> JointExperiment:
-    """The experiment at which the worst of the three loses least, of those worth tuning in if there are any."""
+    """Return the experiment at which the worst of the three loses least, of those worth tuning in if there are any."""
     candidates = list(experiments(studies))
     return min(
         [experiment for experiment in candidates if experiment.beats_zero] or candidates,

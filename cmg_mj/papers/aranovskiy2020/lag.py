@@ -58,7 +58,7 @@ def predict_trade(tau: float) -> Trade:
 
 
 def lag_claim(seed: int = SEED) -> Claim:
-    """A longer tau: less noise, more lag."""
+    """Judge a longer tau: less noise, more lag."""
     trades = {tau: trade(tau, seed) for tau in TAUS_S}
     lag_error = max(abs(t.lag_s / predict_trade(tau).lag_s - 1.0) for tau, t in trades.items())
     noise_error = max(abs(t.noise_gain_1_s / predict_trade(tau).noise_gain_1_s - 1.0) for tau, t in trades.items())
@@ -105,5 +105,5 @@ def _picture(trades: dict[float, Trade]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The trade."""
+    """Judge the trade."""
     return [lag_claim()]

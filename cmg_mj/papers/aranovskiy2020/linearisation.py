@@ -18,7 +18,7 @@ from cmg_mj.papers.linear_check import (
 
 
 def linearisation() -> Claim:
-    """(6) and the controllability of (A_e, B_e)."""
+    """Judge (6) and the controllability of (A_e, B_e)."""
     model = printed_model()
     error = finite_difference_error(model)
     margin = controllability_margin(model.A_e, model.B_e)
@@ -42,7 +42,7 @@ def linearisation() -> Claim:
 
 
 def law_equilibria() -> Claim:
-    """Equilibria of (7) and (8) on the linearisation."""
+    """Judge equilibria of (7) and (8) on the linearisation."""
     model = printed_model()
     rest_7, poles_7 = equilibrium(model.A, model.B, np.array(K_E[:3]), 1.0)
     rest_8, poles_8 = equilibrium(model.A_e, model.B_e, np.array(K_E), 1.0)
@@ -77,5 +77,5 @@ def law_equilibria() -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """(6), and (7) with (8)."""
+    """Judge (6), and (7) with (8)."""
     return [linearisation(), law_equilibria()]

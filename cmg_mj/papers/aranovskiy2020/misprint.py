@@ -29,7 +29,7 @@ class Misprint(NamedTuple):
 
 
 def settle(method: Method, h: float = 1e-3) -> np.ndarray:
-    """H where a method settles at rest, (3, 3)."""
+    """Return H where a method settles at rest, (3, 3)."""
     H = H_0
     for _ in range(round(SETTLING_S / h)):
         H = method(H, A_prime(), h)
@@ -43,7 +43,7 @@ def misprint(seed: int = SEED_OF_10) -> Misprint:
 
 
 def misprint_claim(seed: int = SEED_OF_10) -> Claim:
-    """The Riccati equation as printed."""
+    """Judge the Riccati equation as printed."""
     H, printed_H, rate = misprint(seed)
     asymmetry = float(abs(printed_H[0, 1] - printed_H[1, 0]) / printed_H[1, 0])
     gain = float(np.abs(printed_H[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
@@ -79,5 +79,5 @@ def misprint_claim(seed: int = SEED_OF_10) -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The misprint."""
+    """Judge the misprint."""
     return [misprint_claim()]

@@ -20,12 +20,12 @@ SEED = 70_000
 
 @cache
 def balanced_rig() -> Plant:
-    """The scissored pair without a bias."""
+    """Return the scissored pair without a bias."""
     return load_plant(equilibrium_bias_deg=0.0)
 
 
 def table_1() -> Claim:
-    """The constants of the compiled six-body model beside those of Table 1."""
+    """Judge the constants of the compiled six-body model beside those of Table 1."""
     compiled, paper = balanced_rig().reduced, printed_model()
     names = ("J1", "J2", "J_d", "omega_d", "gravity_torque")
     largest_error = max(abs(getattr(compiled, name) / getattr(paper, name) - 1.0) for name in names)
@@ -134,7 +134,7 @@ def residuals(states: int, seed: int) -> Residuals:
 
 
 def equations_2_to_4(r: Residuals, states: int) -> Claim:
-    """(3) and (4) against MuJoCo's six bodies."""
+    """Judge (3) and (4) against MuJoCo's six bodies."""
     return Claim(
         place="(2) to (4)",
         statement="Under Hypotheses 1 to 3 the six bodies move as one pendulum with one gimbal, and body A stands "
@@ -154,7 +154,7 @@ def equations_2_to_4(r: Residuals, states: int) -> Claim:
 
 
 def gimbals_line(r: Residuals, states: int) -> Claim:
-    """The second line of (2), which the velocity servos make superfluous later."""
+    """Judge the second line of (2), which the velocity servos make superfluous later."""
     return Claim(
         place="(2), tau_c",
         statement="A gimbal's torque is (I_c + I_d) omega_c' + J_d omega_b omega_d sin q_c + J2 sin(2 q_c) "
@@ -175,7 +175,7 @@ def gimbals_line(r: Residuals, states: int) -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Table 1, and (2) to (4)."""
+    """Judge Table 1, and (2) to (4)."""
     states = 500
     rms = residuals(states, SEED)
     return [table_1(), equations_2_to_4(rms, states), gimbals_line(rms, states)]

@@ -14,13 +14,13 @@ from cmg_mj.papers.linear_check import rank_margin
 
 
 def observability_margin(a: float, outputs: np.ndarray = C) -> float:
-    """Rank margin of [C; C A'; C A'^2], for the outputs C."""
+    """Return the rank margin of [C; C A'; C A'^2], for the outputs C."""
     A = A_prime(a)
     return rank_margin(np.vstack([outputs, outputs @ A, outputs @ A @ A]))
 
 
 def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, float]:
-    """Least and largest eigenvalue of the observability Gramian over every span of a run.
+    """Return the least and largest eigenvalue of the observability Gramian over every span of a run.
 
     Phi(t, s) of A' has the first row [1, phi, 0] with phi' = exp(integral of a): Simpson's rule over the span, a held
     between ticks.
@@ -51,7 +51,7 @@ def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, floa
 
 
 def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
-    """The uniform observability that (10) needs."""
+    """Judge the uniform observability that (10) needs."""
     grid = [
         (u, y2)
         for u in np.linspace(-StateFeedback.rate_limit, StateFeedback.rate_limit, 21)
@@ -92,5 +92,5 @@ def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The uniform observability that (10) needs."""
+    """Judge the uniform observability that (10) needs."""
     return [observability()]

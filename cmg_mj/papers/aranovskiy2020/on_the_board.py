@@ -51,7 +51,7 @@ def count() -> dict[str, float]:
 
 
 def instructions() -> Instructions:
-    """Counted where that can be done, recorded elsewhere."""
+    """Count the instructions where that can be done; elsewhere read the recorded ones."""
     if available():
         return Instructions(count(), True)
     return Instructions(json.loads(RECORDED.read_text(encoding="utf-8")), False)

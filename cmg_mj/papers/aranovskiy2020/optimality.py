@@ -29,7 +29,7 @@ class Inverse(NamedTuple):
 
 
 def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
-    """Is K the LQR gain of x' = A x + B u for some cost x' Q x + u^2?
+    """Decide whether K is the LQR gain of x' = A x + B u for some cost x' Q x + u^2.
 
     With d the open-loop and p the closed-loop polynomial and n_i/d the transfer function to x_i, a cost Q = diag(q)
     gives |p(jw)|^2 - |d(jw)|^2 = sum of q_i |n_i(jw)|^2, and Q = c c' gives |sum of c_i n_i|^2.
@@ -67,7 +67,7 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
 
 
 def _squared(polynomial: np.ndarray) -> np.ndarray:
-    """|p(jw)|^2 as a polynomial in w^2, highest power first."""
+    """Return |p(jw)|^2 as a polynomial in w^2, highest power first."""
     n = len(polynomial) - 1
     mirrored = polynomial * (-1.0) ** (n - np.arange(n + 1))
     even = np.convolve(polynomial, mirrored)[::2]  # p(s) p(-s) in s^2
@@ -86,7 +86,7 @@ class Diagonal(NamedTuple):
 
 
 def lqr_gain(A: np.ndarray, B: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
-    """The gain for Q = diag(diagonal), R = 1, (n,)."""
+    """Return the gain for Q = diag(diagonal), R = 1, (n,)."""
     return (B.T @ solve_continuous_are(A, B, np.diag(diagonal), np.eye(1)))[0]
 
 
@@ -176,5 +176,5 @@ def lqr_gains() -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The gains of (8)."""
+    """Judge the gains of (8)."""
     return [lqr_gains()]

@@ -49,7 +49,7 @@ C = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 @cache
 def printed_model() -> ReducedModel:
-    """J1, J2, J_d omega_d and m g l/sqrt(2) by the closed forms below (2), from Table 1's numbers alone."""
+    """Return J1, J2, J_d omega_d and m g l/sqrt(2) by the closed forms below (2), from Table 1's numbers alone."""
     t = TABLE_1
     return ReducedModel(
         J1=t["I_d"] + t["J_b"] + t["K_c"] + t["m"] * t["l"] ** 2 / 2.0,
@@ -61,7 +61,7 @@ def printed_model() -> ReducedModel:
 
 
 def gimbal_torque(x2: float, x3: float, gimbal_acceleration: float, omega_d: float) -> float:
-    """tau_c, the second line of (2), with q_c = x3 + pi/2 [N m].
+    """Return tau_c, the second line of (2), with q_c = x3 + pi/2 [N m].
 
     Args:
         x2: omega_b [rad/s].
@@ -91,7 +91,7 @@ def integrator_rest(e: float) -> float:
 
 
 def damping(u: float | np.ndarray, y2: float | np.ndarray) -> float | np.ndarray:
-    """A = -u J2 sin(2 y2)/(J1 + J2 sin(y2)^2), the one entry of A' in (10) that varies [1/s]."""
+    """Return a = -u J2 sin(2 y2)/(J1 + J2 sin(y2)^2), the one entry of A' in (10) that varies [1/s]."""
     return -u * printed_model().terms(0.0, y2)[2]
 
 

@@ -126,7 +126,7 @@ def expected_integrator(case: str, e_deg: float, sigma: float, seed: int = SEED)
 
 
 def laws_claim(rest: Rest, static: Rest) -> Claim:
-    """(8), and (7), which has no integrator."""
+    """Judge (8), and (7), which has no integrator."""
     x_e, x3 = integrator_rest(math.radians(BIAS_DEG)), gimbal_rest(BIAS_DEG)
     return Claim(
         place="(7), (8) on the rig",
@@ -207,7 +207,7 @@ def _picture(rests: Mapping[str, Rest]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The laws with the true rate, then with observers."""
+    """Judge the laws with the true rate, then with observers."""
     without_integrator = (TRUE_RATE, 2, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
     *case_rests, static = find_rests([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
     on_share(0.9)

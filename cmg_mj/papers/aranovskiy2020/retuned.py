@@ -39,7 +39,7 @@ class Push:
 
 
 def _gentle(torque_n_m: float) -> list[str]:
-    """A weaker push on a rig without bias, of which (11) has less to learn."""
+    """Return a weaker push on a rig without bias, of which (11) has less to learn."""
     return [f"push.0.torque_n_m={torque_n_m}", "plant.equilibrium_bias_deg=0.0"]
 
 
@@ -138,7 +138,7 @@ def all_studies(
 
 
 def level_at(study: TuningResult, noise_ug_rthz: float) -> NoiseLevelResult:
-    """The level of one noise."""
+    """Return the level of one noise."""
     return next(level for level in study.levels if level.noise_ug_rthz == noise_ug_rthz)
 
 

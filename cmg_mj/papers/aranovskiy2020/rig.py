@@ -19,7 +19,7 @@ SEED_OF_10 = 71_000
 
 
 def push_recovery(observer: str, seed: int, settings: Sequence[str] = (), duration_s: float = DURATION_S) -> Experiment:
-    """Figs 5 to 7: an observer's estimate in the law, and a push of 1 N m for 0.1 s at 2 s.
+    """Prepare Figs 5 to 7: an observer's estimate in the law, and a push of 1 N m for 0.1 s at 2 s.
 
     Args:
         observer: Its name.

@@ -36,7 +36,7 @@ def errors_of(forms: Sequence[str], worlds: int, seed: int) -> dict[str, np.ndar
 
 
 def all_errors(known_errors: Errors, worlds: int, seed: int) -> dict[str, np.ndarray]:
-    """The errors of every form, those that are known among them."""
+    """Return the errors of every form, those that are known among them."""
     return dict(known_errors) | errors_of([form for form in CASES if form not in known_errors], worlds, seed)
 
 

@@ -166,5 +166,5 @@ def _picture(servos: Servos) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The servos."""
+    """Judge the servos."""
     return [servo_claim(run(WORLDS, SEED))]

@@ -19,7 +19,7 @@ from cmg_mj.studies.tuning import NoiseLevelResult
 
 
 def table_2_claim(case: TuningCase, studies: Studies, experiment: JointExperiment) -> Claim:
-    """Table 2's line of one observer, judged in the experiment that all three lines come nearest to.
+    """Judge Table 2's line of one observer in the experiment that all three lines come nearest to.
 
     Args:
         case: What was tuned.
@@ -99,7 +99,7 @@ def _describe_single_line(case: TuningCase, studies: Studies) -> str:
 
 
 def least_lost(case: TuningCase, studies: Studies) -> NoiseLevelResult:
-    """The level at which Table 2's line loses least under the first push, that of Figs 5 to 7."""
+    """Return the level at which Table 2's line loses least under the first push, that of Figs 5 to 7."""
     return min(next(iter(studies.values()))[case.observer].levels, key=lambda level: level.ratio.mean)
 
 
@@ -112,7 +112,7 @@ def _ratio(level: NoiseLevelResult) -> str:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Section V's procedure, whether Table 2 is one experiment's, and a line of it an observer."""
+    """Judge section V's procedure, whether Table 2 is one experiment's, and a line of it an observer."""
     studies = all_studies(SEED, WORLDS, lambda share: on_share((1.0 - LOOP_SHARE) * share))
     experiment = nearest_joint(studies)
     loops = run_trials(studies, experiment, lambda share: on_share(1.0 - LOOP_SHARE * (1.0 - share)))

@@ -35,7 +35,7 @@ class Gain(NamedTuple):
 
 
 def damped_gain(speed: float) -> Gain:
-    """The gain whose poles lie 45 degrees off the real axis, as those of the frozen Riccati gain do [rad/s]."""
+    """Return the gain whose poles lie 45 degrees off the real axis, as those of the frozen Riccati gain do [rad/s]."""
     return Gain(math.sqrt(2.0) * speed, speed**2)
 
 
@@ -105,7 +105,7 @@ def find_fates(
 
 
 def choose_observer(cell: Cell) -> tuple[str, list[str]]:
-    """The observer with that gain and model, and its settings.
+    """Return the observer with that gain and model, and its settings.
 
     With alpha = 1, (11) is the first two states of (10) with a constant gain.
     """
@@ -129,7 +129,7 @@ class Factorial(NamedTuple):
     whole: Mapping[float, Fate]
 
     def falls_at(self, cell: Cell) -> list[float]:
-        """The biases at which every world of a cell falls [deg]."""
+        """Return the biases at which every world of a cell falls [deg]."""
         return [e for e, fate in self.cells[cell].items() if fate.fell == 1.0]
 
     def stands_everywhere(self, cell: Cell) -> bool:
@@ -145,7 +145,7 @@ class Factorial(NamedTuple):
 
 
 def remark(experiment: Factorial) -> Claim:
-    """The remark, over gain, model and bias.
+    """Judge the remark, over gain, model and bias.
 
     Args:
         experiment: The fates.
@@ -262,5 +262,5 @@ def factorial(worlds: int, seed: int, duration_s: float = DURATION_S) -> Factori
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The remark."""
+    """Judge the remark."""
     return [remark(factorial(WORLDS, SEED))]

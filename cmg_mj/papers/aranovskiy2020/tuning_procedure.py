@@ -55,7 +55,7 @@ def run_trials(studies: Studies, joint_experiment: JointExperiment, on_share: On
 
 
 def procedure_claim(studies: Studies, loops: list[Trial]) -> Claim:
-    """The procedure.
+    """Judge the procedure.
 
     Args:
         studies: Of all three, under every push.

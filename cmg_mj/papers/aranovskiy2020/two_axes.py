@@ -87,7 +87,7 @@ def _mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
 
 
 def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
-    """Upright, spin axes upright, the wheels of a pair turning against each other."""
+    """Return the body upright, spin axes upright, the wheels of a pair turning against each other."""
     data = mujoco.MjData(model)
     for i in range(4):
         gimbal = int(model.joint(f"c{i}/gimbal").qposadr[0])
@@ -121,7 +121,7 @@ class Motion(NamedTuple):
 
 
 def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Motion:
-    """The motion under a push on each axis at 0.2 s, each axis with a law of its own that knows its own state alone.
+    """Simulate a push on each axis at 0.2 s, each axis with a law of its own that knows its own state alone.
 
     Args:
         pushes_n_m: On pitch and roll [N m].
@@ -155,7 +155,7 @@ def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Moti
 
 
 def _about_the_joint(data: mujoco.MjData, body: int) -> float:
-    """Vertical part of the momentum of all that hangs on a body, about the world's origin [N m s]."""
+    """Return the vertical part of the momentum of all that hangs on a body, about the world's origin [N m s]."""
     arm, moving = data.subtree_com[body], data.subtree_linvel[body] * MASS_KG
     return data.subtree_angmom[body][2] + arm[0] * moving[1] - arm[1] * moving[0]
 
@@ -191,7 +191,7 @@ def coupling(push_n_m: float) -> Coupling:
 
 
 def axes_claim(couplings: dict[float, Coupling]) -> Claim:
-    """Each axis alone."""
+    """Judge each axis alone."""
     separate_pushes = [push for push, c in couplings.items() if c.share < SMALL]
     first = next(iter(couplings))
     tilts_text = ", ".join(f"{push:g} N m: {c.largest_deg:.1f} deg, {c.share:.2%}" for push, c in couplings.items())
@@ -240,7 +240,7 @@ def _picture(couplings: dict[float, Coupling]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The two axes."""
+    """Judge the two axes."""
     couplings = {}
     for i, push in enumerate(PUSHES_N_M):
         couplings[push] = coupling(push)

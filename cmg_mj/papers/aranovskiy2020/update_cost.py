@@ -18,7 +18,7 @@ from cmg_mj.studies.benchmark import time_of_update
 
 
 def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, float]:
-    """Median time of an update [us], the observers taking turns.
+    """Return the median time of an update [us], the observers taking turns.
 
     Args:
         worlds: So many at once, on arrays; None for one, on floats, and then the plain forms of (10) too.
@@ -79,5 +79,5 @@ def cost() -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The cost."""
+    """Judge the cost."""
     return [cost()]

@@ -43,7 +43,7 @@ def remaining_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, spa
 
 
 def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
-    """RMS of the rate estimated at rest, whose true value is zero, (n_worlds,) [rad/s].
+    """Return the RMS of the rate estimated at rest, whose true value is zero, (n_worlds,) [rad/s].
 
     Args:
         alpha: The exponent.
@@ -109,7 +109,7 @@ def vicinity(rng: np.random.Generator) -> Vicinity:
 
 
 def vicinity_claim(seed: int = SEED) -> Claim:
-    """Convergence to a vicinity of the origin, and how large it is."""
+    """Judge convergence to a vicinity of the origin, and how large it is."""
     rng = np.random.default_rng(seed)
     errors_left, errors_at_2000_hz = ({alpha: remaining_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
     # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
@@ -186,5 +186,5 @@ def _picture(measures: Vicinity) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The vicinity."""
+    """Judge the vicinity."""
     return [vicinity_claim()]

@@ -35,7 +35,7 @@ def inertia_of(plant: Plant) -> Inertia:
 
 
 def carried_momentum(plant: Plant, trajectory: Trajectory) -> np.ndarray:
-    """Momentum of gimbals and flywheels about the vertical, (n_ticks, ...) [N m s].
+    """Return the momentum of gimbals and flywheels about the vertical, (n_ticks, ...) [N m s].
 
     The gimbals' axis is b_x, whose vertical part is -sin q_b; the flywheels' is b_y cos q_c + b_z sin q_c, whose
     vertical part is cos q_b sin q_c.

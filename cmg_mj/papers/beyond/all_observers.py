@@ -29,12 +29,12 @@ SHOWN: Cell = (400.0, 0.5)
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """All observers, and where the papers' order holds."""
+    """Judge all observers, and where the papers' order holds."""
     return [order_claim(league(WORLDS, SEED, on_share))]
 
 
 def order_claim(rows: Sequence[Row]) -> Claim:
-    """The claim.
+    """Judge the papers' order.
 
     Args:
         rows: What `league` found.
@@ -69,7 +69,7 @@ def order_claim(rows: Sequence[Row]) -> Claim:
 
 
 def by_cell(rows: Sequence[Row]) -> dict[Cell, list[Row]]:
-    """The rows of each noise and bias, the smallest velocity error first."""
+    """Return the rows of each noise and bias, the smallest velocity error first."""
     cells: dict[Cell, list[Row]] = {}
     for row in rows:
         cells.setdefault((row["noise_ug_rthz"], row["bias_deg"]), []).append(row)
@@ -84,7 +84,7 @@ def in_order(of_cell: Sequence[Row]) -> bool:
 
 
 def league_table(rows: Sequence[Row]) -> str:
-    """The table, one block a noise and bias, the smallest velocity error first."""
+    """Return the table, one block a noise and bias, the smallest velocity error first."""
     error, *other_headings = (heading(key) for key in MEANS)
     headings = (
         "observer",
@@ -120,7 +120,7 @@ def _line(row: Row) -> list[str]:
 
 
 def _mean(row: Row, key: str) -> str:
-    """A mean and half its interval, with the digits that the key has in every table."""
+    """Return a mean and half its interval, with the digits that the key has in every table."""
     if row[key] is None:
         return "-"
     half = Interval(row[key], row[f"{key}_low"], row[f"{key}_high"]).half
@@ -128,7 +128,7 @@ def _mean(row: Row, key: str) -> str:
 
 
 def _trade_off(rows: Sequence[Row]) -> Picture:
-    """Lag against noise gain, a mark an observer."""
+    """Draw lag against noise gain, a mark an observer."""
     of_cell = [row for row in rows if (row["noise_ug_rthz"], row["bias_deg"]) == SHOWN]
     visible_rows = [row for row in of_cell if row["push_lag_s"] is not None]
     marks = [

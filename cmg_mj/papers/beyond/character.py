@@ -134,7 +134,7 @@ def _first_passing(time_s: np.ndarray, values: np.ndarray, level: float) -> floa
 
 
 def update_us(kind: str, motion: Motion) -> float:
-    """Microseconds of one update on floats, along half a second of the motion.
+    """Measure the microseconds of one update on floats, along half a second of the motion.
 
     Args:
         kind: The observer.

@@ -26,7 +26,7 @@ def claims(on_share: OnShare) -> list[Claim]:
 def fed_bias(
     worlds: int, seed: int, on_share: OnShare, biases_deg: Sequence[float] = BIASES_DEG, settings: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
-    """(11) alone, `adaptive` alone, and (11) told the bias by `adaptive`, at several biases.
+    """Run (11) alone, `adaptive` alone, and (11) told the bias by `adaptive`, at several biases.
 
     Args:
         worlds: How many a bias, the same ones each time.
@@ -54,7 +54,7 @@ def fed_bias(
 
 
 def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
-    """The claim.
+    """Judge the gain by the bias fed in.
 
     Args:
         rows: What `fed_bias` found.

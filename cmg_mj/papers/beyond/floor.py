@@ -11,7 +11,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 
 
 def kalman_filter(model: ReducedModel, dt: float, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The stationary Kalman filter of the linearised rig with every torque on it known, and its error.
+    """Return the stationary Kalman filter of the linearised rig with every torque on it known, and its error.
 
     Knowing the gimbals' motion, the push and e exactly, the error obeys x' = [[0, 1], [M/J1, 0]] x without any process
     noise: only the measurement's noise is left. The rig being unstable, the error does not die out even so. In
@@ -33,5 +33,5 @@ def kalman_filter(model: ReducedModel, dt: float, sigma: float) -> tuple[np.ndar
 
 
 def velocity_floor(model: ReducedModel, dt: float, sigma: float) -> float:
-    """RMS velocity error of that filter [rad/s]; no unbiased estimate from the same samples is better."""
+    """Return the RMS velocity error of that filter [rad/s]; no unbiased estimate from the same samples is better."""
     return math.sqrt(kalman_filter(model, dt, sigma)[2][1, 1])

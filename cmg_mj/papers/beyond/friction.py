@@ -21,7 +21,7 @@ def claims(on_share: OnShare) -> list[Claim]:
 
 
 def friction(worlds: int, seed: int, on_share: OnShare, settings: Sequence[str] = ()) -> dict[str, Any]:
-    """Dry friction in the plant and in the observer, each with and without the other.
+    """Run dry friction in the plant and in the observer, each with and without the other.
 
     Args:
         worlds: How many, the same ones each time.
@@ -57,7 +57,7 @@ def friction(worlds: int, seed: int, on_share: OnShare, settings: Sequence[str] 
 
 
 def friction_claim(figures: dict[str, Any]) -> Claim:
-    """The claim.
+    """Judge the gain by a friction model.
 
     Args:
         figures: What `friction` found.

@@ -16,7 +16,7 @@ ERROR = "velocity_rms_error_rad_s"
 
 
 def push_recovery(kind: str, seed: int, settings: Sequence[str] = ()) -> Experiment:
-    """The scenario with an observer.
+    """Prepare the scenario with an observer.
 
     Args:
         kind: The observer.
@@ -30,7 +30,7 @@ def push_recovery(kind: str, seed: int, settings: Sequence[str] = ()) -> Experim
 
 
 def on_rigs(experiment: Experiment, worlds: int, field: str, values: Sequence[float]) -> list[Result]:
-    """The same worlds on rigs that differ in one setting, all in one batch.
+    """Run the same worlds on rigs that differ in one setting, all in one batch.
 
     Args:
         experiment: The experiment; its own value of the setting does not count.

@@ -21,13 +21,13 @@ DURATION_S, LATE_S = 10.0, 5.0
 
 
 def without_push(seed: int, *settings: str, pushes: Sequence[Push] = ()) -> Scenario:
-    """The scenario push_recovery for ten seconds, without its push, or with others."""
+    """Build the scenario push_recovery for ten seconds, without its push, or with others."""
     scenario = load_scenario("push_recovery", [f"seed={seed}", f"duration_s={DURATION_S}", *settings])
     return scenario.model_copy(update={"push": list(pushes)})
 
 
 def run(scenario: Scenario, biases_deg: Sequence[float], **options: Any) -> Result:
-    """One world a bias, side by side; options are those of `simulate`."""
+    """Run one world a bias, side by side; options are those of `simulate`."""
     return prepare(scenario).run_many(len(biases_deg), vary={"equilibrium_bias_deg": biases_deg}, **options)
 
 
@@ -37,18 +37,18 @@ def record(scenario: Scenario, biases_deg: Sequence[float]) -> Trajectory:
 
 
 def errors(result: Result, key: str) -> np.ndarray:
-    """An error of every world, (n_worlds,); infinite for one that ended early."""
+    """Return an error of every world, (n_worlds,); infinite for one that ended early."""
     return np.nan_to_num(result.values(key), nan=np.inf)
 
 
 def rms_in_time(error: np.ndarray) -> np.ndarray:
-    """RMS over the ticks, (n_ticks, n_worlds) -> (n_worlds,); infinite for a world that ended early."""
+    """Return the RMS over the ticks, (n_ticks, n_worlds) -> (n_worlds,); infinite for a world that ended early."""
     ended = np.isnan(error).any(axis=0)
     return np.where(ended, np.inf, rms(np.where(ended, 0.0, error)))
 
 
 def signed_biases(seed: int, worlds: int, low_deg: float = 0.3, high_deg: float = 1.5) -> list[float]:
-    """Biases of both signs, their sizes spread evenly over the range, in a random order [deg]."""
+    """Draw biases of both signs, their sizes spread evenly over the range, in a random order [deg]."""
     rng = np.random.default_rng(seed)
     sizes = np.linspace(low_deg, high_deg, worlds) * rng.choice([-1.0, 1.0], worlds)
     return rng.permutation(sizes).tolist()
@@ -77,14 +77,14 @@ def learnt_bias(
 
 
 def bias_errors(seed: int, biases_deg: Sequence[float]) -> np.ndarray:
-    """RMS error of the bias over seconds 5 to 10, (n_worlds,) [deg]."""
+    """Return the RMS error of the bias over seconds 5 to 10, (n_worlds,) [deg]."""
     return errors(learnt_bias(seed, biases_deg), "bias_rms_error_deg")
 
 
 def velocity_errors(
     seed: int, worlds: int, observers: Sequence[str], biases_deg: Sequence[float]
 ) -> dict[str, np.ndarray]:
-    """Velocity RMS error over ten seconds with each observer in the loop, no push.
+    """Return the velocity RMS error over ten seconds with each observer in the loop, no push.
 
     Args:
         seed: Of the sensors' noise; world i of every observer has the same.
@@ -109,7 +109,7 @@ def velocity_errors(
 
 
 def gait(amplitude_n_m: float, frequency_hz: float, piece_s: float = 0.005) -> list[Push]:
-    """A sinusoidal torque on the rig, as short pushes."""
+    """Build a sinusoidal torque on the rig, as short pushes."""
     starts = np.arange(0.0, DURATION_S, piece_s)
     torques = amplitude_n_m * np.sin(2.0 * math.pi * frequency_hz * (starts + piece_s / 2.0))
     return [
@@ -121,7 +121,7 @@ def gait(amplitude_n_m: float, frequency_hz: float, piece_s: float = 0.005) -> l
 def learnt_gait(
     seed: int, biases_deg: Sequence[float], amplitude_n_m: float = 0.3, frequency_hz: float = 1.0
 ) -> dict[str, np.ndarray]:
-    """`adaptive` that knows a gait's frequency, and one that does not, each in the loop under that gait.
+    """Run `adaptive` that knows a gait's frequency, and one that does not, each in the loop under that gait.
 
     Args:
         seed: Of the sensors' noise.
@@ -150,7 +150,7 @@ def learnt_gait(
 
 
 def learnt_torque(seed: int, worlds: int, torque_n_m: float = 0.1, bias_deg: float = 0.5) -> np.ndarray:
-    """RMS error over seconds 5 to 10 of a constant torque that acts from the start, e being known, (worlds,) [N m]."""
+    """Return the RMS error over seconds 5 to 10 of a constant torque from the start, e being known, (worlds,) [N m]."""
     scenario = without_push(
         seed,
         "observer.kind=adaptive",

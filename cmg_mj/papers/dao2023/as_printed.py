@@ -14,12 +14,12 @@ DT, DURATION_S = 0.005, 80.0
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The sampling and the misprints."""
+    """Judge the sampling and the misprints."""
     return [sampling_claim(lambda share: on_share(0.6 * share)), misprint_claim()]
 
 
 def sampling_claim(on_share: OnShare) -> Claim:
-    """A sampled observer at Sigma = 1000; what an explicit step does is told beside it, and does not count."""
+    """Judge a sampled observer at Sigma = 1000; an explicit step is shown beside it, and does not count."""
     t = DT * np.arange(round(DURATION_S / DT) + 1)
     x = motion(starts(1, 4), t)
     rms = follow(make_proposed(DT, (1000.0,)), t, x, on_share).tail_rms()[0]
@@ -39,7 +39,7 @@ def sampling_claim(on_share: OnShare) -> Claim:
 
 
 def explicit_escape(sigma: float, dt: float, duration: float, seed: int = 0) -> float:
-    """When a classical Runge-Kutta step of (7) to (9) at a sample rate has left every bound: infinite if never [s].
+    """Find when a Runge-Kutta step of (7) to (9) at a sample rate has left every bound: infinite if never [s].
 
     Args:
         sigma: The weight Sigma.
@@ -72,7 +72,7 @@ def explicit_escape(sigma: float, dt: float, duration: float, seed: int = 0) -> 
 
 
 def misprint_claim() -> Claim:
-    """L as a row, and (10) against (14)."""
+    """Judge L as a row, and (10) against (14)."""
     row, column = (L.shape[1] == paper.system(0.0, 0.0).C2.shape[0] for L in (paper.L_PRINTED, paper.L))
     polynomial, amplitude = np.poly(paper.error_matrix()), amplitude_under_10()
     by_10, by_14 = abs(amplitude / paper.THETA[1] - 1.0).max(), abs(amplitude - 1.0).max()
@@ -105,7 +105,7 @@ def _corrections(*, row: bool, rearranged: bool) -> list[str]:
 
 
 def amplitude_under_10() -> np.ndarray:
-    """Amplitude of the disturbance that the observer finds of an arm that moves by (10), one a motion [rad/s^2]."""
+    """Estimate the amplitude of the disturbance on an arm that moves by (10), one a motion [rad/s^2]."""
     t = DT * np.arange(round(DURATION_S / DT) + 1)
     x = motion(starts(3, 3), t, coefficient=paper.THETA[1])
     late = t >= 0.8 * DURATION_S

@@ -16,12 +16,12 @@ QUICK = 10.0
 
 
 def claims(study: Study) -> list[Claim]:
-    """(a), (b), and how fast (b) is."""
+    """Judge (a), (b), and how fast (b) is."""
     return [conventional(study), proposed(study), speed_claim(study)]
 
 
 def conventional(study: Study) -> Claim:
-    """(a)."""
+    """Judge (a)."""
     rms = study.conventional.tail_rms()[0]
     return Claim(
         place="Fig. 2(a)",
@@ -56,7 +56,7 @@ def _picture(study: Study) -> Picture:
 
 
 def proposed(study: Study) -> Claim:
-    """(b)."""
+    """Judge (b)."""
     rms, plain = study.proposed.tail_rms()[0], study.conventional.tail_rms()[0]
     return Claim(
         place="Fig. 2(b)",
@@ -71,7 +71,7 @@ def proposed(study: Study) -> Claim:
 
 
 def speed_claim(study: Study) -> Claim:
-    """(b), how fast."""
+    """Judge (b), how fast."""
     learning_times, ideal_times = state_settle_times(study.proposed)
     middle, yardstick = float(np.median(learning_times)), float(np.median(ideal_times))
     meaning = (
@@ -95,7 +95,7 @@ def speed_claim(study: Study) -> Claim:
 
 
 def state_settle_times(errors: Errors) -> tuple[np.ndarray, np.ndarray]:
-    """When the state's error, as a vector, stays below `SETTLED`, with the first of the weights.
+    """Find when the state's error, as a vector, stays below `SETTLED`, with the first of the weights.
 
     Args:
         errors: What the observers made of the motions.

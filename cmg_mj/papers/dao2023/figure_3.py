@@ -28,12 +28,12 @@ TESTED = (
 
 
 def claims(study: Study) -> list[Claim]:
-    """(a) to (c), what (b) comes to, and the conclusion."""
+    """Judge (a) to (c), what (b) comes to, and the conclusion."""
     return [settling_order(study), parameters(study), larger_gains(study)]
 
 
 def settling_order(study: Study) -> Claim:
-    """(a), (b), (c)."""
+    """Judge (a), (b), (c)."""
     times = exogenous_settle_times(study.proposed)[:3]
     ten, thousand, tenth = times
     motions_in_order = (thousand < ten) & (ten <= tenth) & np.isfinite(thousand)
@@ -85,7 +85,7 @@ def _picture(study: Study) -> Picture:
 
 
 def parameters(study: Study) -> Claim:
-    """(b), where it ends."""
+    """Judge (b), where it ends."""
     errors = np.abs(study.proposed.exogenous[-1, 1, :, :2])
     rms = study.proposed.tail_rms()[1]
     sampling_remark = f"{UNSTATED} At 400 Hz; at 200 Hz the straight line between samples leaves up to 3e-3 in theta1."
@@ -106,7 +106,7 @@ def parameters(study: Study) -> Claim:
 
 
 def larger_gains(study: Study) -> Claim:
-    """The conclusion."""
+    """Judge the conclusion."""
     medians = dict(zip(SIGMAS, np.median(exogenous_settle_times(study.proposed), axis=-1).tolist(), strict=True))
     in_order = medians[1000.0] < medians[10.0] <= medians[0.1]
     order_goes_on = medians[10_000.0] < medians[1000.0]

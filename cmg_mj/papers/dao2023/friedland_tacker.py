@@ -121,7 +121,7 @@ class FriedlandTacker:
 
     @classmethod
     def conventional(cls, dt: float, L: np.ndarray, Gamma: np.ndarray, Sigma: np.ndarray) -> FriedlandTacker:
-        """The adaptive observer of Zhang (2002) and Liu, Zhang, Su (2011): r constant, Am = 0, Cm = I.
+        """Make the adaptive observer of Zhang (2002) and Liu, Zhang, Su (2011): r constant, Am = 0, Cm = I.
 
         Args:
             dt: Sample period [s].
@@ -163,7 +163,7 @@ class FriedlandTacker:
         xm: np.ndarray | None = None,
         T: np.ndarray | None = None,
     ) -> State:
-        """The state at the first sample.
+        """Return the state at the first sample.
 
         Args:
             y: The first measurement, (..., p).
@@ -266,7 +266,7 @@ class FriedlandTacker:
     def slope(
         self, t: float, x: np.ndarray, xm: np.ndarray, T: np.ndarray, system: System, u: np.ndarray, y: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The observer in continuous time, (7) to (9) as they are printed, with B2 u and the hats put back.
+        """Evaluate the observer in continuous time, (7) to (9) as they are printed, with B2 u and the hats put back.
 
         Args:
             t: Time [s].

@@ -16,12 +16,12 @@ from cmg_mj.papers.dao2023.pendulum_robot import make_single, motion, starts
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The separated errors and Upsilon."""
+    """Judge the separated errors and Upsilon."""
     return [separated_errors(on_share), upsilon()]
 
 
 def separated_errors(on_share: OnShare) -> Claim:
-    """The error of the state parts from that of the exosystem."""
+    """Judge whether the error of the state parts from that of the exosystem."""
     errors, sizes = {}, []
     for i, (sigma, duration) in enumerate(((0.1, 6.0), (10.0, 6.0), (1000.0, 1.5))):
         errors[f"continuous_sigma_{sigma:g}"], size = continuous_deviation(sigma, duration)
@@ -43,7 +43,7 @@ def separated_errors(on_share: OnShare) -> Claim:
 def continuous_run(
     sigma: float, start: np.ndarray, state: np.ndarray, t: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The arm and (7) to (9) in continuous time, integrated as one.
+    """Integrate the arm and (7) to (9) in continuous time, as one.
 
     Args:
         sigma: The weight Sigma.
@@ -89,7 +89,7 @@ def continuous_deviation(sigma: float, duration: float, seed: int = 0, tolerance
 
 
 def sampled_deviation(sigma: float, dt: float, duration: float, seed: int = 0) -> tuple[float, float]:
-    """The same in discrete time: z+ = (I - h/2 M)^-1 (I + h/2 M) z for the arm by the implicit midpoint rule.
+    """Measure the deviation in discrete time: z+ = (I - h/2 M)^-1 (I + h/2 M) z for the arm by the midpoint rule.
 
     Args:
         sigma: The weight Sigma.
@@ -121,7 +121,7 @@ def sampled_deviation(sigma: float, dt: float, duration: float, seed: int = 0) -
 
 
 def _midpoint_step(q: float, rate: float, input_acceleration: float, dt: float) -> tuple[float, float]:
-    """The arm after one step of the implicit midpoint rule, its input's share of the acceleration held."""
+    """Take one step of the implicit midpoint rule, the input's share of the arm's acceleration held."""
     q_next, rate_next = q, rate
     for _ in range(12):  # a contraction by dt^2 theta1/4 each time
         rate_next = rate + dt * (input_acceleration - paper.THETA[0] * math.sin((q + q_next) / 2.0))
@@ -130,7 +130,7 @@ def _midpoint_step(q: float, rate: float, input_acceleration: float, dt: float) 
 
 
 def upsilon() -> Claim:
-    """The relation between Upsilon and T."""
+    """Judge the relation between Upsilon and T."""
     matrix_gap, estimate_gap = upsilon_gaps(10.0, 0.005, 15.0)
     correction = (
         "Upsilon's equation must have (B0 + L D20) Cm exp(Am t), not (B0 + L D20), unless Am = 0. So read, the "
@@ -149,7 +149,7 @@ def upsilon() -> Claim:
 
 
 def upsilon_gaps(sigma: float, dt: float, duration: float, seed: int = 0) -> tuple[float, float]:
-    """The proposed observer beside the conventional one of the constant xm(0), whose regressor is B0 Cm exp(Am t).
+    """Run the observer beside the conventional one of the constant xm(0), whose regressor is B0 Cm exp(Am t).
 
     Args:
         sigma: The weight Sigma.

@@ -30,7 +30,7 @@ def require_real(name: str, value: Any) -> np.ndarray:
 
 
 def require_real_matrix(name: str, value: Any) -> np.ndarray:
-    """The same with at least two dimensions, and finite."""
+    """Return an array of floats with at least two dimensions; refuse what is not finite."""
     matrix = require_real(name, value)
     if matrix.ndim < 2 or not np.isfinite(matrix).all():
         fault = f"not of shape {matrix.shape}" if matrix.ndim else f"not a scalar; for one number write [[{matrix:g}]]"
@@ -49,7 +49,7 @@ def require_positive_definite(name: str, matrix: np.ndarray) -> None:
 
 
 def times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Matrix times vector, (..., a, b) and (..., b) -> (..., a)."""
+    """Multiply matrix and vector, (..., a, b) and (..., b) -> (..., a)."""
     return (matrix @ vector[..., None])[..., 0]
 
 

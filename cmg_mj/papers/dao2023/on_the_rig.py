@@ -17,7 +17,7 @@ WITHIN_DEG = 0.15
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The bias, the velocity, torques."""
+    """Judge the bias, the velocity, torques."""
     results = [bias()]
     on_share(0.25)
     results.append(velocity())
@@ -27,7 +27,7 @@ def claims(on_share: OnShare) -> list[Claim]:
 
 
 def share_within(errors: np.ndarray, bound: float) -> float:
-    """The share of worlds whose error is at most a bound."""
+    """Return the share of worlds whose error is at most a bound."""
     return float(np.mean(errors <= bound))
 
 
@@ -76,7 +76,7 @@ def _picture_of_bias(trajectory: Trajectory, biases: list[float]) -> Picture:
 
 
 def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
-    """The velocity's error beside that of observers that take e for zero."""
+    """Judge the velocity's error beside that of observers that take e for zero."""
     biases = (0.0, 0.5, 1.0, 1.5)
     errors = rig.velocity_errors(seed, worlds, ("adaptive", *OTHERS), biases)
     biased_cases = [i for i, value in enumerate(biases) if value >= 0.5]
@@ -122,7 +122,7 @@ def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
 
 
 def torques(seed: int = 52_000, worlds: int = 4) -> Claim:
-    """A gait's torque, and a constant one."""
+    """Judge a gait's torque, and a constant one."""
     gait = rig.learnt_gait(seed, rig.signed_biases(seed, worlds))
     torque = rig.learnt_torque(seed + 1, worlds)
     remark = f"As above, {worlds} worlds; a torque of 0.3 N m at 1 Hz with e unknown; 0.1 N m, constant, with e known."

@@ -13,28 +13,28 @@ from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, System
 
 
 def make_proposed(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
-    """The paper's observer; its leading dimensions are those of the weights sigma, then one for the motions."""
+    """Make the paper's observer; its leading dimensions are the weights sigma, then one for the motions."""
     return FriedlandTacker(dt, paper.A_M, paper.C_M, paper.L, paper.GAMMA, np.reshape(sigmas, (-1, 1, 1, 1)))
 
 
 def make_conventional(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
-    """The observer it is compared with, which knows of no disturbance; leading dimensions as above."""
+    """Make the observer compared with it, which knows of no disturbance; leading dimensions as above."""
     return FriedlandTacker.conventional(dt, paper.L, paper.GAMMA[:2, :2], np.reshape(sigmas, (-1, 1, 1, 1)))
 
 
 def make_single(dt: float, sigma: float) -> FriedlandTacker:
-    """The paper's observer without leading dimensions."""
+    """Make the paper's observer without leading dimensions."""
     return FriedlandTacker(dt, paper.A_M, paper.C_M, paper.L, paper.GAMMA, np.array([[sigma]]))
 
 
 def starts(seed: int, n: int) -> np.ndarray:
-    """Initial angles within half a turn and rates within 2 rad/s, (n, 2) [rad, rad/s]."""
+    """Return the initial angles within half a turn and rates within 2 rad/s, (n, 2) [rad, rad/s]."""
     rng = np.random.default_rng(seed)
     return np.stack([rng.uniform(-np.pi, np.pi, n), rng.uniform(-2.0, 2.0, n)], axis=-1)
 
 
 def motion(start: np.ndarray, t: np.ndarray, coefficient: float = 1.0) -> np.ndarray:
-    """The arm's own motion.
+    """Integrate the arm's own motion.
 
     It is chaotic: after some time two integrators no longer agree. Each computed motion is still, to the tolerance,
     one that the arm can make, and that is what an observer is given.
@@ -71,7 +71,7 @@ class Errors:
     exogenous: np.ndarray
 
     def tail_rms(self) -> np.ndarray:
-        """RMS of the state error's norm over the last fifth, (n_sigmas, n)."""
+        """Return the RMS of the state error's norm over the last fifth, (n_sigmas, n)."""
         tail = self.t >= self.t[0] + 0.8 * (self.t[-1] - self.t[0])
         return np.sqrt(np.mean(np.sum(self.state[tail] ** 2, axis=-1), axis=0))
 

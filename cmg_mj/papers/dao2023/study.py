@@ -68,15 +68,15 @@ def study(
 
 
 def exogenous_settle_times(errors: robot.Errors, band: float = SETTLED) -> np.ndarray:
-    """When the errors of theta1, theta2 and d settle, (n_sigmas, n) [s]; infinite if they do not."""
+    """Find when the errors of theta1, theta2 and d settle, (n_sigmas, n) [s]; infinite if they do not."""
     return robot.settle_times(np.linalg.norm(errors.exogenous, axis=-1), errors.t, band)
 
 
 def words_of_time(time: float) -> str:
-    """A settling time in words."""
+    """Write a settling time in words."""
     return f"{time:.0f} s" if math.isfinite(time) else "not within 200 s"
 
 
 def finite_times(times: np.ndarray) -> list[float | None]:
-    """Settling times as JSON can hold them."""
+    """Return settling times as JSON can hold them."""
     return [float(time) if math.isfinite(time) else None for time in times]

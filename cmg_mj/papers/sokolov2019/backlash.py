@@ -39,7 +39,7 @@ class Cycle(NamedTuple):
 
 
 def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Experiment:
-    """The rig let go with a gap.
+    """Prepare the rig let go with a gap.
 
     Args:
         observer: In the loop.
@@ -55,7 +55,7 @@ def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -
 
 
 def find_cycles(releases: Sequence[Experiment]) -> list[Cycle]:
-    """The cycles that rigs let go end in, one world each."""
+    """Find the cycles that rigs let go end in, one world each."""
     return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(release, 1) for release in releases])]
 
 

@@ -105,7 +105,7 @@ def study(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Study:
 
 
 def claim(runs: Study) -> Claim:
-    """The thrust bearing, which the model of one tilt angle leaves out."""
+    """Judge the thrust bearing, which the model of one tilt angle leaves out."""
     worlds, error, k = len(runs.locked), runs.closed_form_error, stiffness()
     peak = mean_interval([float(np.abs(run.torque_between(1.0, 1.6)).max()) for run in runs.locked])
     noise_torque = mean_interval([float(rms(run.torque_between(0.5, 1.0))) for run in runs.locked])
@@ -181,5 +181,5 @@ def _picture(runs: Study) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Fig. 2."""
+    """Judge Fig. 2."""
     return [claim(study(on_share))]

@@ -11,7 +11,7 @@ from cmg_mj.papers.sokolov2019.loops import loops
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Figs 4 to 6 need the lags and the cycles: what oscillates by itself is told there, without noise."""
+    """Judge the loops; Figs 4 to 6 need the lags and the cycles, which show what oscillates without noise."""
     lags = lag.lags(lambda share: on_share(0.2 * share))
     ends = cycles()
     results = loops(lambda share: on_share(0.3 + 0.7 * share))

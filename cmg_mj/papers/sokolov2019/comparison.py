@@ -29,7 +29,7 @@ def _table(loops: Loops) -> str:
 
 
 def best_claim(loops: Loops) -> Claim:
-    """Section V: (10) against the other two."""
+    """Judge section V: (10) against the other two."""
     wins = {
         setting: all(is_better(by_name["homogeneous"], by_name[name]) for name in ("linear", "luenberger"))
         for setting, by_name in loops.all_settings.items()
@@ -70,7 +70,7 @@ def is_ranked(by_name: Mapping[str, Result]) -> bool:
 
 
 def model_based(loops: Loops) -> Claim:
-    """Section VI: with a model better than without, and the nonlinear one better than the linear one."""
+    """Judge section VI: with a model better than without, and the nonlinear one better than the linear one."""
     holds_at = [setting for setting, by_name in loops.all_settings.items() if is_ranked(by_name)]
     not_at = [setting for setting in loops.all_settings if setting not in holds_at]
     return Claim(

@@ -21,7 +21,7 @@ class Cycles(NamedTuple):
 
 
 def cycles() -> Cycles:
-    """All of them."""
+    """Find all cycles."""
     releases = {name: make_release(name) for name in OBSERVERS}
     # (9) but for J2, cos y2 and the sine: see `figure_3.nine_with_y2`.
     nine = {"k1": L1, "k2": stiffness(experiment().plant.reduced), "alpha": 1.0}

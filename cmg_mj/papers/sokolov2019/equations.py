@@ -23,12 +23,12 @@ from cmg_mj.plant.plant import Plant
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Sections II and III."""
+    """Judge sections II and III."""
     return [table_i(), equations_of_motion(), law_equilibria()]
 
 
 def table_i() -> Claim:
-    """The constants of the compiled rig beside those of Table I."""
+    """Judge the constants of the compiled rig beside those of Table I."""
     compiled, paper_model = experiment().plant.reduced, paper.printed_model()
     names = ("J1", "J2", "J_d", "omega_d", "gravity_torque")
     largest_error = max(abs(getattr(compiled, name) / getattr(paper_model, name) - 1.0) for name in names)
@@ -54,7 +54,7 @@ def table_i() -> Claim:
 
 
 def equation_residual(plant: Plant, model: ReducedModel, states: int, seed: int) -> float:
-    """Largest difference between (1) and MuJoCo's inverse dynamics at random states [N m].
+    """Return the largest difference between (1) and MuJoCo's inverse dynamics at random states [N m].
 
     Args:
         plant: The rig on a locked bearing.
@@ -75,7 +75,7 @@ def equation_residual(plant: Plant, model: ReducedModel, states: int, seed: int)
 
 
 def equations_of_motion(states: int = 300, seed: int = 81_000) -> Claim:
-    """(1) against the compiled bodies."""
+    """Judge (1) against the compiled bodies."""
     plant = experiment(["plant.equilibrium_bias_deg=0.0"]).plant
     model = plant.reduced
     residual = equation_residual(plant, model, states, seed)
@@ -98,7 +98,7 @@ def equations_of_motion(states: int = 300, seed: int = 81_000) -> Claim:
 
 
 def law_equilibria() -> Claim:
-    """Section III: linearisation, controllability, and where (6) and (7) rest."""
+    """Judge section III: linearisation, controllability, and where (6) and (7) rest."""
     model, K_e = paper.printed_model(), np.array(paper.K_E)
     K = K_e[:3]
     error, margin = finite_difference_error(model), controllability_margin(model.A_e, model.B_e)

@@ -31,12 +31,12 @@ L1, L2 = (row[0] for row in TABLE_II["luenberger"]["L"][:2])
 
 
 def stiffness(model: ReducedModel) -> float:
-    """150 - m g l/J1: with (s + 20) s its sum is the characteristic polynomial of (9) in x1 and x2 [1/s^2]."""
+    """Return 150 - m g l/J1: plus (s + 20) s it is the characteristic polynomial of (9) in x1 and x2 [1/s^2]."""
     return L2 - model.gravity_torque / model.J1
 
 
 def nine_with_y2(prepared: Experiment) -> Observer:
-    """(9) with all of the model's terms in y2.
+    """Make (9) with all of the model's terms in y2.
 
     (9) has x2' = M/J1 xhat1 + b u + 150 (y1 - xhat1) with M = m g l, or M/J1 y1 + b u + (150 - M/J1)(y1 - xhat1). So
     (10) with alpha = 1 and k2 = 150 - M/J1 is (9) but for J2, cos y2 and the sine.
@@ -78,13 +78,13 @@ def tuning_experiment(worlds: int = WORLDS, seed: int = SEED) -> Tuning:
 
 
 def relative_errors(tuning: Tuning) -> dict[str, Interval]:
-    """RMS of estimate less gyro over the push's window, by the gyro's own RMS there; an estimate of zero has 1."""
+    """Return the RMS of estimate less gyro in the push's window, by the gyro's RMS there; an estimate of zero has 1."""
     gyro = tuning.trajectory["fog_rad_s"][tuning.window]
     return {name: mean_interval(rms(rates[tuning.window] - gyro) / rms(gyro)) for name, rates in tuning.rates.items()}
 
 
 def predict_error(tuning: Tuning) -> np.ndarray:
-    """The error in the rate of (9) that the push alone makes, (n_ticks,) [rad/s].
+    """Return the error in the rate of (9) that the push alone makes, (n_ticks,) [rad/s].
 
     The observer does not know the push: d/J1 passes through (s + 20)/(s^2 + 20 s + 150 - M/J1), with the sign turned.
     """
@@ -105,7 +105,7 @@ def y2_reaches_the_rate(prepared: Experiment, seed: int = 0) -> float:
 
 
 def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
-    """Fig. 3."""
+    """Judge Fig. 3."""
     other_errors = {name: relative[name] for name in OBSERVERS if name != "luenberger"}
     at_end = int(np.argmin(np.abs(tuning.trajectory["time_s"] - tuning.push.end_s)))
     ends = {name: mean_interval(rates[at_end]) for name, rates in tuning.rates.items()}
@@ -197,7 +197,7 @@ def _picture(tuning: Tuning) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Fig. 3, and what Section V says of (9) there."""
+    """Judge Fig. 3, and what Section V says of (9) there."""
     tuning = tuning_experiment()
     on_share(0.8)
     relative = relative_errors(tuning)

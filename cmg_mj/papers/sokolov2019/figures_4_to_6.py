@@ -33,7 +33,7 @@ def _setting(loops: Loops) -> str:
 
 
 def _standing(loops: Loops, name: str) -> str:
-    """The tilt's late deviation in both rigs, and what of it the push's tail is, in words."""
+    """Describe the tilt's late deviation in both rigs, and the push's tail in it."""
     no_gap, gap = loops.by_bias[SHOWN_DEG][name], loops.gap[name]
     return (
         f"{_setting(loops)}: {format_interval(deviation(no_gap))} deg without backlash, "
@@ -56,7 +56,7 @@ def _figures(loops: Loops, name: str, cycles: Cycles) -> dict:
 
 
 def figure_4(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
-    """(8): sustained oscillations."""
+    """Judge (8): sustained oscillations."""
     oscillates_by_itself, cycle = bool(lags.sweeps["linear"].sustained[0]), cycles.ends["linear"]
     threshold, prediction = lags.thresholds["linear"].middle, lags.predictions["linear"]
     no_gap = loops.by_bias[SHOWN_DEG]["linear"]
@@ -85,7 +85,7 @@ def figure_4(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
 
 
 def figure_5(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
-    """(9): much the same."""
+    """Judge (9): much the same."""
     oscillates_by_itself, cycle = bool(lags.sweeps["luenberger"].sustained[0]), cycles.ends["luenberger"]
     falls = {e: float(by_name["luenberger"].fell.mean()) for e, by_name in loops.by_bias.items()}
     falls_text = ", ".join(f"{share:.0%} at e = {e:g} deg" for e, share in falls.items())
@@ -143,7 +143,7 @@ def cause_of_figure_5(cycles: Cycles) -> Claim:
 
 
 def figure_6(loops: Loops, cycles: Cycles) -> Claim:
-    """(10): stabilised."""
+    """Judge (10): stabilised."""
     falls = {setting: float(by_name["homogeneous"].fell.mean()) for setting, by_name in loops.all_settings.items()}
     error = known_interval(loops.by_bias[SHOWN_DEG]["homogeneous"].values("velocity_rms_error_rad_s"))
     return Claim(
@@ -162,7 +162,7 @@ def figure_6(loops: Loops, cycles: Cycles) -> Claim:
 
 
 def figure_6_at_rest(lags: Lags, cycles: Cycles) -> Claim:
-    """(10): without the oscillations of the others, on the rig on which they have them."""
+    """Judge (10): without the oscillations of the others, on the rig on which they have them."""
     eight, nine, ten = (cycles.ends[name] for name in ("linear", "luenberger", "homogeneous"))
     ratios_text = " and ".join(
         f"{ten.amplitude_deg / cycle.amplitude_deg:.2f}" for cycle in (eight, nine) if cycle.sustained

@@ -32,7 +32,7 @@ def describing_function(c: float) -> complex:
 
 
 def predict_cycle(observer: str, points: int = 60) -> PredictedCycle | None:
-    """The largest motion that neither grows nor decays, of which larger ones decay and smaller ones grow.
+    """Return the largest motion that neither grows nor decays, of which larger ones decay and smaller ones grow.
 
     Args:
         observer: A linear one, in the loop.
@@ -44,7 +44,7 @@ def predict_cycle(observer: str, points: int = 60) -> PredictedCycle | None:
     loop, servo, dt = linearise(observer)
 
     def turning(c: float) -> tuple[complex, np.ndarray]:
-        """The least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
+        """Return the least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
         factors, shapes = np.linalg.eig(loop(servo, share=describing_function(c)))
         forward = np.angle(factors) > dt
         index = int(np.argmax(np.where(forward, np.abs(factors), 0.0)))

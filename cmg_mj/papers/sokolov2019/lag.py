@@ -64,7 +64,7 @@ def _rig() -> Experiment:
 
 
 def linearise(observer: str | None, **parameters: float) -> tuple[Loop, Servo, float]:
-    """The sampled loop with an observer, or with the true rate (None).
+    """Linearise the sampled loop with an observer, or with the true rate (None).
 
     Args:
         observer: Its name.
@@ -102,7 +102,7 @@ def predict(observer: str | None) -> Prediction:
 
 
 def largest_tau() -> float | None:
-    """The time constant of (8) from which the loop oscillates with the model's servo [s]; its own lag is 2 tau."""
+    """Find the time constant of (8) from which the loop oscillates with the model's servo [s]; its lag is 2 tau."""
 
     def growth(tau: float) -> float:
         loop, servo, dt = linearise("linear", tau=tau)
@@ -125,7 +125,7 @@ class Lags(NamedTuple):
 
 
 def lags(on_share: OnShare) -> Lags:
-    """Sweep, sharpen, and predict."""
+    """Sweep, sharpen and predict all lags."""
     lag_sweeps = sweeps(list(OBSERVERS))
     thresholds = lag_thresholds(lag_sweeps)
     latencies: dict[str, Threshold] = {}
@@ -137,12 +137,12 @@ def lags(on_share: OnShare) -> Lags:
 
 
 def in_ms(seconds: float | None, otherwise: str = "none") -> str:
-    """A time in words."""
+    """Write a time in words."""
     return otherwise if seconds is None else f"{1e3 * seconds:.1f} ms"
 
 
 def claim(results: Lags) -> Claim:
-    """Section V: the differentiator's lag."""
+    """Judge section V: the differentiator's lag."""
     own_lag, lag_thresholds, latencies = results.own_lag_s, results.thresholds, results.latencies
     linear = results.predictions["linear"]
     linear_threshold, other_lags = (
@@ -211,7 +211,7 @@ def _table(results: Lags) -> str:
 
 
 def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
-    """Growth of the tilt's oscillation over the servo lag [1/s]."""
+    """Return the growth of the tilt's oscillation over the servo lag [1/s]."""
     loop, servo, dt = linearise(observer)
     return [oscillation(loop(servo.damp(float(lag))), dt).real for lag in lags_s]
 

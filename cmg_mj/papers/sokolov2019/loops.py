@@ -74,7 +74,7 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
 
 
 def _late_signal(result: Result, name: str) -> np.ndarray:
-    """A signal over the last `LATE_S` of the worlds that stood, (n_ticks, n_stood)."""
+    """Return a signal over the last `LATE_S` of the worlds that stood, (n_ticks, n_stood)."""
     t = trajectory_of(result)["time_s"]
     return trajectory_of(result)[name].reshape(len(t), -1)[t >= t[-1] - LATE_S][:, result.stood]
 
@@ -88,17 +88,17 @@ def main_frequency(result: Result) -> float:
 
 
 def deviations(result: Result) -> np.ndarray:
-    """Standard deviation of the tilt over the last `LATE_S`, one a world that stood [deg]."""
+    """Return the standard deviation of the tilt over the last `LATE_S`, one a world that stood [deg]."""
     return np.degrees(_late_signal(result, "x1_rad")).std(axis=0)
 
 
 def deviation(result: Result) -> Interval | None:
-    """Its mean over these worlds [deg]."""
+    """Return the mean of `deviations` [deg]."""
     return known_interval(deviations(result))
 
 
 def tail(result: Result) -> float:
-    """The same of a single run without noise: what the push has left behind [deg]."""
+    """Return the late deviation of a single run without noise: what the push has left behind [deg]."""
     return float(deviations(result).max())
 
 

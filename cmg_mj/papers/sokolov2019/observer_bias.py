@@ -41,7 +41,7 @@ def find_rest(observer: str, e_deg: float, angles: str) -> Rest:
 
 
 def biased_luenberger(e_deg: float = 0.25) -> Claim:
-    """Section IV-B: the integrator compensates the offset even if (9) is biased."""
+    """Judge section IV-B: the integrator compensates the offset even if (9) is biased."""
     model, e = paper.printed_model(), math.radians(e_deg)
     poles = np.linalg.eigvals(paper.error_matrix(model))
     x_hat = paper.rest_of_9(model, e)
@@ -78,7 +78,7 @@ def biased_luenberger(e_deg: float = 0.25) -> Claim:
 
 
 def homogeneous_vicinity(biases_deg: Sequence[float] = (0.0, 0.25, 0.5)) -> Claim:
-    """Section IV-C: the error of (10) ends in a vicinity of the origin, whose size e decides."""
+    """Judge section IV-C: the error of (10) ends in a vicinity of the origin, whose size e decides."""
     model = paper.printed_model()
     estimates = {e: find_rest("homogeneous", e, "measured").x2_estimate for e in biases_deg}
     closed_forms = {e: paper.rest_of_10(model, math.radians(e)) for e in biases_deg}
@@ -102,7 +102,7 @@ def homogeneous_vicinity(biases_deg: Sequence[float] = (0.0, 0.25, 0.5)) -> Clai
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Section IV but for Proposition 1."""
+    """Judge section IV but for Proposition 1."""
     first = biased_luenberger()
     on_share(0.4)
     return [first, homogeneous_vicinity()]

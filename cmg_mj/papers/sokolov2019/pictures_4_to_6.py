@@ -14,7 +14,7 @@ NUMBERS = {"linear": 4, "luenberger": 5, "homogeneous": 6}
 
 
 def picture(name: str, loops: Loops) -> Picture:
-    """World 0 without backlash and with it, side by side."""
+    """Draw world 0 without backlash and with it, side by side."""
     runs = {
         "without backlash": loops.by_bias[SHOWN_DEG][name],
         f"{GAP_ARCMIN:g} arcmin of backlash": loops.gap[name],

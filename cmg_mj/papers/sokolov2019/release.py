@@ -60,7 +60,7 @@ def releases(servos: Mapping[str, Sequence[Servo]], settings: Sequence[str] = ()
 
 
 def release(observer: str, servos: Sequence[Servo], settings: Sequence[str] = ()) -> Trajectory:
-    """The same for one observer."""
+    """Let the rig go with one observer."""
     return releases({observer: servos}, settings)[observer]
 
 
@@ -105,7 +105,7 @@ class Threshold(NamedTuple):
 
 
 def lag_thresholds(sweep_by_observer: Mapping[str, Sweep], parts: int = 10) -> dict[str, Threshold]:
-    """The least servo lag at which each loop oscillates by itself, as stiff, to a tenth of the sweep's spacing [s]."""
+    """Find the least servo lag at which each loop oscillates by itself, to a tenth of the sweep's spacing [s]."""
     thresholds, grids = {}, {}
     for observer, sweep in sweep_by_observer.items():
         first = np.flatnonzero(sweep.sustained)
@@ -124,7 +124,7 @@ def lag_thresholds(sweep_by_observer: Mapping[str, Sweep], parts: int = 10) -> d
 
 
 def latency_threshold(observer: str, largest_steps: int = LARGEST_LATENCY_STEPS) -> Threshold:
-    """The least latency of the accelerometers at which the loop oscillates by itself, to one physics step [s].
+    """Find the least latency of the accelerometers at which the loop oscillates, to one physics step [s].
 
     They are sampled at every physics step here, so that the latency is not rounded up to control periods.
     """

@@ -30,7 +30,7 @@ RK4_LIMIT = 2.7
 
 
 def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feedback: str = "observer") -> Experiment:
-    """The scenario `single_gimbal` with Table II.
+    """Prepare the scenario `single_gimbal` with Table II.
 
     Args:
         settings: Settings `section.field=value` that differ.
@@ -46,12 +46,12 @@ def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feed
 
 
 def estimator(name: str, prepared: Experiment, **changes: Any) -> Observer:
-    """An observer with Table II's parameters or others, for the rig and control period of an experiment."""
+    """Make an observer with Table II's parameters or others, for an experiment's rig and control period."""
     return make_observer(name, prepared.law.dt, prepared.plant.reduced, **TABLE_II[name] | changes)
 
 
 def read_servo(plant: Plant) -> Servo:
-    """The gimbal servo that the model file describes."""
+    """Read the gimbal servo off the model file."""
     (servo,) = plant.axis.servos
     (module,) = plant.modules
     dof = int(plant.model.jnt_dofadr[module.gimbal])
@@ -63,7 +63,7 @@ def read_servo(plant: Plant) -> Servo:
 
 
 def make_rig(settings: PlantSettings, servo: Servo) -> Plant:
-    """The rig with another servo.
+    """Load the rig with another servo.
 
     Raises:
         ValueError: The servo is too stiffly damped for RK4 at this timestep: it would chatter by itself.

@@ -45,13 +45,13 @@ class Servo:
         return replace(self, kv=lag_s * self.kp)
 
     def soften(self, lag_s: float) -> Servo:
-        """Critically damped, with another lag: less stiffness."""
+        """Return a critically damped servo with another lag: less stiffness."""
         kp = 4.0 * self.inertia / lag_s**2
         return replace(self, kp=kp, kv=lag_s * kp)
 
 
 def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
-    """sokolov2019 (1) with the servo's torque, linearised upright: x' = A x + B u.
+    """Linearise sokolov2019 (1) with the servo's torque upright: x' = A x + B u.
 
     The state is tilt, tilt rate, gimbal angle, gimbal rate and setpoint. The flywheel's torque -J_d w_d x2 drives the
     gimbal back.
@@ -80,7 +80,7 @@ def period_map(
     age_steps: int = 0,
     share: complex = 1.0,
 ) -> np.ndarray:
-    """The matrix that takes the loop from one control tick to the next.
+    """Return the matrix that takes the loop from one control tick to the next.
 
     Args:
         model: The reduced model.
@@ -119,19 +119,19 @@ def period_map(
 
 
 def modes(matrix: np.ndarray, dt: float) -> np.ndarray:
-    """The poles s = log(z)/dt of a period's map, the least damped first [1/s]."""
+    """Return the poles s = log(z)/dt of a period's map, the least damped first [1/s]."""
     z = np.linalg.eigvals(matrix)
     s = np.log(z[np.abs(z) > 1e-9].astype(complex)) / dt
     return s[np.argsort(-s.real)]
 
 
 def oscillation(matrix: np.ndarray, dt: float) -> complex:
-    """The least damped oscillating pole with a frequency above 1 rad/s [1/s]: the integrator's pair is slower."""
+    """Find the least damped oscillating pole with a frequency above 1 rad/s [1/s]: the integrator's pair is slower."""
     return complex(next(s for s in modes(matrix, dt) if s.imag > 1.0))
 
 
 def first_crossing(value: Callable[[float], float], low: float, high: float, points: int = 40) -> float | None:
-    """The smallest argument at which a function rises through zero; None if it does not."""
+    """Return the smallest argument at which a function rises through zero; None if it does not."""
     grid = np.linspace(low, high, points)
     values = [value(float(x)) for x in grid]
     for a, b, at_a, at_b in zip(grid, grid[1:], values, values[1:], strict=False):

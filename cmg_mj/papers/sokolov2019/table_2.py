@@ -77,7 +77,7 @@ def none_better(levels: Sequence[NoiseLevelResult]) -> bool:
 
 
 def claim(results: Levels) -> Claim:
-    """The printed values beside the best ones."""
+    """Judge the printed values beside the best ones."""
     settings = [
         (push, i, level.noise_ug_rthz)
         for push, by_observer in results.items()
@@ -156,5 +156,5 @@ def _table(results: Levels) -> str:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Table II."""
+    """Judge Table II."""
     return [claim(tune_all(on_share))]

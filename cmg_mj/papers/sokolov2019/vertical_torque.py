@@ -30,7 +30,7 @@ class Motion(NamedTuple):
 
 
 def vertical_momentum(plant: Plant, motion: Motion) -> np.ndarray:
-    """H of the module's docstring, (...) [N m s]."""
+    """Return H of the module's docstring, (...) [N m s]."""
     r, inertia = plant.reduced, read_servo(plant).inertia
     q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.modules[0].gimbal_zero
     w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
@@ -39,7 +39,7 @@ def vertical_momentum(plant: Plant, motion: Motion) -> np.ndarray:
 
 
 def vertical_torque(plant: Plant, motion: Motion) -> np.ndarray:
-    """dH/dt, (...) [N m]."""
+    """Return dH/dt, (...) [N m]."""
     r, inertia = plant.reduced, read_servo(plant).inertia
     q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.modules[0].gimbal_zero
     w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
@@ -60,7 +60,7 @@ class Locked(NamedTuple):
     """Torque of the bearing about the vertical, by MuJoCo's inverse dynamics, (n_ticks,) [N m]."""
 
     def torque_between(self, start_s: float, end_s: float) -> np.ndarray:
-        """The torque between two times, (n_ticks,) [N m]."""
+        """Return the torque between two times, (n_ticks,) [N m]."""
         return self.torque[(self.time_s > start_s) & (self.time_s < end_s)]
 
 
