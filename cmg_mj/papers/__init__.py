@@ -87,18 +87,16 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
     sections = {paper: sections_of(paper) for paper in papers}
     entries = [Reproduction(paper) for paper in papers]
     total = sum(section.seconds for paper_sections in sections.values() for section in paper_sections)
-    seconds_before = 0.0
+    begin = 0.0
     try:
         for entry in entries:
             for section in sections[entry.paper]:
-                on_share = _on_share(
-                    on_progress, f"{entry.paper}: {section.title}", seconds_before, section.seconds, total
-                )
+                on_share = _on_share(on_progress, f"{entry.paper}: {section.title}", begin, section.seconds, total)
                 on_share(0.0)
                 start = time.perf_counter()
                 entry.claims += section.claims(on_share)
                 entry.seconds += time.perf_counter() - start
-                seconds_before += section.seconds
+                begin += section.seconds
             entry.complete = True
     except KeyboardInterrupt:
         pass
@@ -106,7 +104,7 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
 
 
 def _on_share(
-    on_progress: Callable[[str, float], None], label: str, seconds_before: float, seconds: float, total: float
+    on_progress: Callable[[str, float], None], label: str, begin: float, seconds: float, total: float
 ) -> Callable[[float], None]:
     """Turn a section's share into that of the whole, of which so many seconds lie before the section."""
-    return lambda share: on_progress(label, (seconds_before + share * seconds) / total)
+    return lambda share: on_progress(label, (begin + share * seconds) / total)

@@ -89,7 +89,7 @@ def test_20_with_a_b_of_its_own(b: float) -> None:
         ahead, behind = (invert(W, x * (1.0 + b * s), z * (1.0 + (1.0 + b) * s)) for s in (step, -step))
         growth = (W.W(ahead) - W.W(behind))[0] / (2.0 * step)
         quotients.append(growth / W.W(invert(W, x, z))[0])
-    assert decay(W, b, points=grid).c2 == pytest.approx(min(quotients), rel=1e-3)
+    assert decay(W, b, grid=grid).c2 == pytest.approx(min(quotients), rel=1e-3)
 
 
 def test_constants_hold_on_a_finer_grid() -> None:

@@ -45,7 +45,7 @@ def test_the_tuned_are_set_in_the_loop() -> None:
     """Table 2's own gains are as good as Table 2's, and slower ones worse by far."""
     table_level = dataclasses.replace(level(200.0, 1.0), parameters=TABLE_2["linear"])
     slow_level = dataclasses.replace(table_level, sizes={"tau": 0.04}, parameters={"tau": 0.04})
-    ratios = retuned.compare_in_loop([(retuned.LINEAR, case, STRONG) for case in (table_level, slow_level)], 3, SEED)
+    ratios = retuned.loop_ratios([(retuned.LINEAR, case, STRONG) for case in (table_level, slow_level)], 3, SEED)
     assert ratios[0] == pytest.approx((1.0, 1.0, 1.0))
     assert ratios[1].high < 0.5  # Table 2's by that of the slow
 
@@ -146,12 +146,12 @@ def test_the_loops_are_those_of_the_default_and_of_the_joint_experiment(monkeypa
     requests = []
 
     def compare(
-        trials: list[tuple[retuned.TuningCase, NoiseLevelResult, retuned.Push]], worlds: int, seed: int
+        trials: list[tuple[retuned.Tuning, NoiseLevelResult, retuned.Push]], worlds: int, seed: int
     ) -> list[Interval]:
         requests.extend((case.observer, level.noise_ug_rthz, push.words) for case, level, push in trials)
         return [ONE] * len(trials)
 
-    monkeypatch.setattr("cmg_mj.papers.aranovskiy2020.tuning_procedure.compare_in_loop", compare)
+    monkeypatch.setattr("cmg_mj.papers.aranovskiy2020.tuning_procedure.loop_ratios", compare)
     studies = {STRONG.words: make_studies((200.0, GOOD, 0.1), (400.0, BAD, 0.1))["a push"]}
     first = next(joint.experiments(studies))
     default, other = run_trials(studies, first, lambda share: None)

@@ -269,12 +269,7 @@ def test_a_package_that_keeps_the_rules(package: Path) -> None:
         (incomplete, "papers/a2020/lag.py", "def claims(): ...", "a2020/lag.py does not export claims"),
         (incomplete, "papers/a2020/paper.py", None, "a2020 has no paper.py"),
         (incomplete, "papers/a2020/lag.py", None, "a2020/lag.py does not export claims"),
-        (
-            incomplete,
-            "papers/a2020/__init__.py",
-            '"""A."""\nSECTIONS = []',
-            "a2020/__init__.py lists no section",
-        ),
+        (incomplete, "papers/a2020/__init__.py", '"""A."""\nSECTIONS = []', "a2020/__init__.py lists no section"),
         (
             incomplete,
             "papers/a2020/__init__.py",

@@ -62,17 +62,15 @@ def limits_error(correction: BiLimitCorrection, scale: float) -> tuple[float, fl
     """
     e1 = np.linspace(-1.0, 1.0, 41)
     r = weights(correction.n, correction.d_inf)
-    error_at_0 = error_at_infinity = 0.0
+    zero_error = inf_error = 0.0
     linear, power = e1, e1
     dilated = correction(e1 / scale), correction(scale ** r[0] * e1)
     for i in range(correction.n):
         linear = correction.l[i] * linear
         power = signed_power(correction.l[i] * power, r[i + 1] / r[i])
-        error_at_0 = max(error_at_0, float(np.abs(scale * dilated[0][i] + linear).max() / np.abs(linear).max()))
-        error_at_infinity = max(
-            error_at_infinity, float(np.abs(dilated[1][i] / scale ** r[i + 1] + power).max() / np.abs(power).max())
-        )
-    return error_at_0, error_at_infinity
+        zero_error = max(zero_error, float(np.abs(scale * dilated[0][i] + linear).max() / np.abs(linear).max()))
+        inf_error = max(inf_error, float(np.abs(dilated[1][i] / scale ** r[i + 1] + power).max() / np.abs(power).max()))
+    return zero_error, inf_error
 
 
 def chain_errors(

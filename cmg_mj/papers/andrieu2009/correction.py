@@ -15,20 +15,18 @@ SEEN_NOISE = 0.05
 """An observer feels the noise if that changes its estimate by so much of its error."""
 
 
-def correction(run: Run, reference: Replay) -> Claim:
+def correction(run: Run, nominal: Replay) -> Claim:
     """Judge the part of the homogeneous terms in the example."""
     model = Bioreactor(HBAR_OF_OBSERVERS)
     linear = replay(HOMOGENEOUS, run, model, p=0.0)
     b_inside = 0.5 * largest_b(2, P, (P,))
-    replay_inside = replay(HOMOGENEOUS, run, model, b=b_inside)
+    bounded = replay(HOMOGENEOUS, run, model, b=b_inside)
     late = run.t > 5.0
-    largest = float(reference.argument[late].max())
+    largest = float(nominal.argument[late].max())
     after_q1 = largest * 0.01
     share_q1, share_q2 = largest ** (1.0 / (1.0 - P) - 1.0), after_q1**P
-    rms, rms_linear, rms_inside = (
-        float(rms_late(run, part.eta2_error).mean()) for part in (reference, linear, replay_inside)
-    )
-    difference = float(np.abs(reference.eta2_error - linear.eta2_error)[late].max())
+    rms, rms_linear, rms_inside = (float(rms_late(run, part.eta2_error).mean()) for part in (nominal, linear, bounded))
+    difference = float(np.abs(nominal.eta2_error - linear.eta2_error)[late].max())
     return Claim(
         place="Section 3.1, the homogeneous correction",
         statement="In Fig. 2 the homogeneous correction is linear for all that matters: the third observer is the best "

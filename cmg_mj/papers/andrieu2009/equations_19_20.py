@@ -53,31 +53,25 @@ def search(d_inf: float) -> SearchResult | None:
 def claim() -> Claim:
     """Judge (19) and (20)."""
     results = {d_inf: search(d_inf) for d_inf in DEGREES}
-    successes = [success for success in results.values() if success is not None]
+    pairs = [pair for pair in results.values() if pair is not None]
     rows = [
-        (
-            f"{success.d_inf:g}",
-            f"{success.b:.3g}",
-            f"{success.l1:g}",
-            f"{success.sigma:g}",
-            *(f"{c:.3f}" for c in success.decay),
-        )
-        for success in successes
+        (f"{pair.d_inf:g}", f"{pair.b:.3g}", f"{pair.l1:g}", f"{pair.sigma:g}", *(f"{c:.3f}" for c in pair.decay))
+        for pair in pairs
     ]
     return Claim(
         place="Section 4.2, (19) and (20)",
         statement="There are K and a proper W, homogeneous in the bi-limit, that satisfy (19) and (20) for all A(t) "
         "within (17) and the B of section 4.3.",
         result=f"For n = 2, A1 and A2 within {SPREAD:g} of 1 and d_W = 2 + d_inf, a K and a W are found for "
-        f"{len(successes)} of {len(results)} d_inf. c1 and c2 are the largest constants at {len(FINE)} scales from "
+        f"{len(pairs)} of {len(results)} d_inf. c1 and c2 are the largest constants at {len(FINE)} scales from "
         f"{FINE[0]:.0e} to {FINE[-1]:.0e}, {ANGLES} directions and more each.",
         table=markdown.table(("d_inf", "b", "l1", "sigma", "c1", "c2"), rows, text_columns=0),
-        holds=len(successes) == len(results) and all(min(success.decay) > 0.0 for success in successes),
+        holds=len(pairs) == len(results) and all(min(pair.decay) > 0.0 for pair in pairs),
         conditions="For two dimensions, by numbers; a d_inf near its limit asks for a larger l1.",
         otherwise="For some d_inf none was found, which does not say that there is none.",
         figures={
-            "c1_by_d_inf": {str(success.d_inf): success.decay.c1 for success in successes},
-            "c2_by_d_inf": {str(success.d_inf): success.decay.c2 for success in successes},
-            "l1_by_d_inf": {str(success.d_inf): success.l1 for success in successes},
+            "c1_by_d_inf": {str(pair.d_inf): pair.decay.c1 for pair in pairs},
+            "c2_by_d_inf": {str(pair.d_inf): pair.decay.c2 for pair in pairs},
+            "l1_by_d_inf": {str(pair.d_inf): pair.l1 for pair in pairs},
         },
     )

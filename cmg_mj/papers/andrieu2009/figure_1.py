@@ -24,9 +24,7 @@ def figure_1(study: Study) -> Claim:
     """Judge the estimates of the local incremental rate."""
     means, in_order = ordered_rates(study)
     gains = {kind: window_means(study.run, study.nominal[kind].L).mean(axis=1) for kind in (UPDATED, HOMOGENEOUS)}
-    gain_ratios = [
-        gains[kind] / (PHI2 + PHI3 / PHI1 * means[i]) for i, kind in enumerate((UPDATED, HOMOGENEOUS), start=1)
-    ]
+    ratios = [gains[kind] / (PHI2 + PHI3 / PHI1 * means[i]) for i, kind in enumerate((UPDATED, HOMOGENEOUS), start=1)]
 
     def words(values: np.ndarray) -> str:
         return ", ".join(f"{value:.2f}" for value in values)
@@ -36,12 +34,12 @@ def figure_1(study: Study) -> Claim:
         statement="With noise, too, the means come as df2_max >= Omega_1 >= Omega_2 >= df2/dx2.",
         result=f"Means over t = 5-10, 15-20, 28-35, 42-50 and {study.run.y.shape[1]} seeds: df2_max "
         f"{words(means[0])}; Omega_1 {words(means[1])}; Omega_2 {words(means[2])}; df2/dx2 {words(means[3])}: in order "
-        f"in {in_order.sum()} of 4 windows. L is {min(map(np.min, gain_ratios)):.3f} to "
-        f"{max(map(np.max, gain_ratios)):.3f} times phi2 + (phi3/phi1) Omega, as (13) says.",
+        f"in {in_order.sum()} of 4 windows. L is {min(map(np.min, ratios)):.3f} to "
+        f"{max(map(np.max, ratios)):.3f} times phi2 + (phi3/phi1) Omega, as (13) says.",
         holds=bool(in_order.all()),
         otherwise="The means are not in order in every window.",
         figures={f"{name}_mean_per_time": row.tolist() for name, row in zip(RATES, means, strict=True)}
-        | {"L_over_tracked_ratio": [row.tolist() for row in gain_ratios]},
+        | {"L_over_tracked_ratio": [row.tolist() for row in ratios]},
         pictures=[_picture(study, means)],
     )
 

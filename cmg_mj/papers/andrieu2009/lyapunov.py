@@ -85,21 +85,21 @@ class Lyapunov:
         first, second = (power + 1.0 for power in self.powers)
         return np.abs(s) ** first / first + np.abs(s) ** second / second
 
-    def E(self, points: States) -> tuple[np.ndarray, np.ndarray]:
+    def E(self, grid: States) -> tuple[np.ndarray, np.ndarray]:
         """Return e1 and e2."""
-        return points.s1 / self.K.l[0], self.q1(points.s2)
+        return grid.s1 / self.K.l[0], self.q1(grid.s2)
 
-    def W(self, points: States) -> np.ndarray:
+    def W(self, grid: States) -> np.ndarray:
         """Return W, (n,)."""
-        first = self.H(points.s1) - self.H(points.s2) - self.h(points.s2) * (points.s1 - points.s2)
-        return first + self.sigma * np.abs(self.q1(points.s2)) ** self.d_W / self.d_W
+        first = self.H(grid.s1) - self.H(grid.s2) - self.h(grid.s2) * (grid.s1 - grid.s2)
+        return first + self.sigma * np.abs(self.q1(grid.s2)) ** self.d_W / self.d_W
 
-    def gradient(self, points: States) -> tuple[np.ndarray, np.ndarray]:
+    def gradient(self, grid: States) -> tuple[np.ndarray, np.ndarray]:
         """Return dW/de1 and dW/de2, each (n,)."""
-        by_s2 = -self.h_slope(points.s2) * (points.s1 - points.s2) / self.q1_slope(points.s2)
+        by_s2 = -self.h_slope(grid.s2) * (grid.s1 - grid.s2) / self.q1_slope(grid.s2)
         return (
-            self.K.l[0] * (self.h(points.s1) - self.h(points.s2)),
-            by_s2 + self.sigma * signed_power(self.q1(points.s2), self.d_W - 1.0),
+            self.K.l[0] * (self.h(grid.s1) - self.h(grid.s2)),
+            by_s2 + self.sigma * signed_power(self.q1(grid.s2), self.d_W - 1.0),
         )
 
 
@@ -110,24 +110,24 @@ class Decay(NamedTuple):
     c2: float
 
 
-def decay(W: Lyapunov, b: float, spread: float = 0.0, points: States | None = None) -> Decay:
+def decay(W: Lyapunov, b: float, spread: float = 0.0, grid: States | None = None) -> Decay:
     """Try (19) and (20).
 
     Args:
         W: The function.
         b: Exponent of the scaling: B = diag(b, 1 + b) in (20).
         spread: A1 and A2 are anywhere in [1 - spread, 1 + spread]; both sides of (19) are linear in them.
-        points: Where; by default on all scales.
+        grid: Where; by default on all scales.
 
     Returns:
         c1 and c2.
     """
-    points = states() if points is None else points
-    distinct = np.abs(points.s1 - points.s2) > 1e-9 * np.maximum(
-        np.abs(points.s1), np.abs(points.s2)
+    grid = states() if grid is None else grid
+    distinct = np.abs(grid.s1 - grid.s2) > 1e-9 * np.maximum(
+        np.abs(grid.s1), np.abs(grid.s2)
     )  # else W is rounding errors
-    points = States(points.s1[distinct], points.s2[distinct])
-    (e1, e2), (by_e1, by_e2), value = W.E(points), W.gradient(points), W.W(points)
+    grid = States(grid.s1[distinct], grid.s2[distinct])
+    (e1, e2), (by_e1, by_e2), value = W.E(grid), W.gradient(grid), W.W(grid)
     k1, k2 = W.K(e1)
     slopes = by_e1 * (e2 + k1), by_e2 * k2
     largest = sum(np.maximum((1.0 - spread) * part, (1.0 + spread) * part) for part in slopes)

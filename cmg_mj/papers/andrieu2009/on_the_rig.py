@@ -58,9 +58,7 @@ def comparison_claim(results: dict[str, Result]) -> Claim:
     errors = {label: result.values(VELOCITY) for label, result in results.items()}
     standing_counts = {label: int(result.stood.sum()) for label, result in results.items()}
     worlds = len(errors["high_gain"])
-    differences = {
-        label: known_interval(errors["high_gain"] - errors[label]) for label in errors if label != "high_gain"
-    }
+    excess = {label: known_interval(errors["high_gain"] - errors[label]) for label in errors if label != "high_gain"}
 
     def words(label: str, difference: Interval | None) -> str:
         if difference is None:
@@ -81,7 +79,7 @@ def comparison_claim(results: dict[str, Result]) -> Claim:
         statement="The observer, as `high_gain`, holds the scissored pair through the push.",
         result=f"high_gain holds it in {standing_counts['high_gain']} of {worlds} worlds. Velocity RMS error [rad/s]: "
         f"{means(VELOCITY)}. Less theirs, over the worlds in which both stand: "
-        + "; ".join(words(label, difference) for label, difference in differences.items())
+        + "; ".join(words(label, difference) for label, difference in excess.items())
         + f". Tilt RMS [deg]: {means(TILT)}.",
         holds=standing_counts["high_gain"] == worlds,
         conditions=remark,
@@ -90,7 +88,7 @@ def comparison_claim(results: dict[str, Result]) -> Claim:
             "stood_count": standing_counts,
             VELOCITY: {label: result.mean(VELOCITY) for label, result in results.items()},
             TILT: {label: result.mean(TILT) for label, result in results.items()},
-            "high_gain_less_other_rad_s": {label: d and list(d) for label, d in differences.items()},
+            "high_gain_less_other_rad_s": {label: d and list(d) for label, d in excess.items()},
         },
         pictures=[_picture(errors)],
         is_ours=True,

@@ -183,10 +183,8 @@ def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B
 
 def select_seeds(part: Run | Replay, columns: slice) -> Any:
     """Return a part of some of the seeds."""
-    common_fields = ("t", "u")
-    return replace(
-        part, **{f.name: getattr(part, f.name)[..., columns] for f in fields(part) if f.name not in common_fields}
-    )
+    common = ("t", "u")
+    return replace(part, **{f.name: getattr(part, f.name)[..., columns] for f in fields(part) if f.name not in common})
 
 
 def replays(run: Run, model: Bioreactor) -> dict[str, Replay]:

@@ -97,9 +97,7 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
     definite = {name: lowest_rate(name, sweeps[name], lambda t: t.least > 0.0) for name in METHODS}
     finite = {name: lowest_rate(name, sweeps[name], lambda t: math.isfinite(t.error)) for name in METHODS}
     at_200 = {name: transient(name, 1.0 / DT) for name in METHODS}
-    single_precision = {
-        name: transient(name, 1.0 / DT, single_precision=True) for name in ("explicit Euler", "Runge-Kutta 4")
-    }
+    float32 = {name: transient(name, 1.0 / DT, single_precision=True) for name in ("explicit Euler", "Runge-Kutta 4")}
     comparison = compare_euler(seed)
     matrices = matrices_along(run_of_10(seed))
     condition = float(np.linalg.cond(matrices).max())
@@ -117,7 +115,7 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
             f"the exact step {_down_to(definite['exact step (ours)'])}. At 200 Hz H12 is off, by its steady "
             f"value, by up to {at_200['explicit Euler'].error:.0%} (Euler), {at_200['Runge-Kutta 4'].error:.1e} "
             f"(Runge-Kutta 4) and {at_200['exact step (ours)'].error:.0e} (exact); in single precision by "
-            f"{single_precision['explicit Euler'].error:.0%} and {single_precision['Runge-Kutta 4'].error:.1e}. Along "
+            f"{float32['explicit Euler'].error:.0%} and {float32['Runge-Kutta 4'].error:.1e}. Along "
             f"a closed-loop run H's condition number rises to {condition:.2g}, its least eigenvalue stays above "
             f"{least:.2f}; all twelve equations by Euler would change the estimated rate by "
             f"{comparison.difference:.3f} rad/s RMS and its error from {comparison.error:.3f} to "
@@ -134,7 +132,7 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
             "definite_above_hz": definite,
             "finite_above_hz": finite,
             "error_of_H12_at_200_hz": {name: t.error for name, t in at_200.items()},
-            "error_of_H12_at_200_hz_single": {name: t.error for name, t in single_precision.items()},
+            "error_of_H12_at_200_hz_single": {name: t.error for name, t in float32.items()},
             "rate_changed_by_euler_rad_s": comparison.difference,
             "rate_error_euler_rad_s": comparison.other_error,
             "rate_error_exact_rad_s": comparison.error,

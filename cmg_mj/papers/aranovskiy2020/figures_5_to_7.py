@@ -40,13 +40,11 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
     """Judge one of Figs 5 to 7."""
     error = {angles: known_interval(result.values("velocity_rms_error_rad_s")) for angles, result in results.items()}
     tilt = {angles: known_interval(result.values("tilt_rms_deg")) for angles, result in results.items()}
-    fall_shares = {angles: float(result.fell.mean()) for angles, result in results.items()}
-    settle_shares = {
-        angles: float(np.isfinite(result.values("settle_time_s")).mean()) for angles, result in results.items()
-    }
+    falls = {angles: float(result.fell.mean()) for angles, result in results.items()}
+    settles = {angles: float(np.isfinite(result.values("settle_time_s")).mean()) for angles, result in results.items()}
     sentences = " ".join(
         f"On {angles} angles the velocity RMS error is {plus_minus(error[angles])} rad/s, the tilt RMS "
-        f"{plus_minus(tilt[angles], 3)} deg; {fall_shares[angles]:.0%} fall, {settle_shares[angles]:.0%} settle within "
+        f"{plus_minus(tilt[angles], 3)} deg; {falls[angles]:.0%} fall, {settles[angles]:.0%} settle within "
         "1 deg."
         for angles in results
     )
@@ -58,7 +56,7 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
             f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, the law on measured or "
             f"on estimated angles. {sentences}"
         ),
-        holds=max(fall_shares.values()) == 0.0 and min(settle_shares.values()) == 1.0,
+        holds=max(falls.values()) == 0.0 and min(settles.values()) == 1.0,
         otherwise="It falls in some worlds, or does not settle.",
         figures={
             key: value
@@ -66,8 +64,8 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
             for key, value in (
                 (f"velocity_rms_error_{angles}_angles_rad_s", error[angles]),
                 (f"tilt_rms_{angles}_angles_deg", tilt[angles]),
-                (f"fell_fraction_{angles}_angles", fall_shares[angles]),
-                (f"settled_fraction_{angles}_angles", settle_shares[angles]),
+                (f"fell_fraction_{angles}_angles", falls[angles]),
+                (f"settled_fraction_{angles}_angles", settles[angles]),
             )
         },
         pictures=[_picture(name, {angles: trajectory_of(result).world(0) for angles, result in results.items()})],

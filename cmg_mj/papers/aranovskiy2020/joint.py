@@ -69,10 +69,7 @@ def list_experiments(joint_experiments: Sequence[JointExperiment]) -> str:
 def nearest_joint(studies: Studies) -> JointExperiment:
     """Return the experiment at which the worst of the three loses least, of those worth tuning in if there are any."""
     candidates = list(experiments(studies))
-    return min(
-        [experiment for experiment in candidates if experiment.beats_zero] or candidates,
-        key=lambda experiment: experiment.largest_ratio,
-    )
+    return min([case for case in candidates if case.beats_zero] or candidates, key=lambda case: case.largest_ratio)
 
 
 def joint_claim(studies: Studies) -> Claim:

@@ -120,12 +120,10 @@ def nearest_diagonal(
         except LinAlgError:  # Q with entries too far apart for the solver
             return math.inf
 
-    logarithms_of_best = np.log(np.maximum(start, 0.01))
+    optimum = np.log(np.maximum(start, 0.01))
     for _ in range(searches):
-        logarithms_of_best = minimize(
-            off, logarithms_of_best, method="Nelder-Mead", options={"maxiter": 150, "xatol": 1e-3, "fatol": 1e-3}
-        ).x
-    return Diagonal(weights(logarithms_of_best), lqr_gain(A, B, weights(logarithms_of_best)), off(logarithms_of_best))
+        optimum = minimize(off, optimum, method="Nelder-Mead", options={"maxiter": 150, "xatol": 1e-3, "fatol": 1e-3}).x
+    return Diagonal(weights(optimum), lqr_gain(A, B, weights(optimum)), off(optimum))
 
 
 def lqr_gains() -> Claim:

@@ -68,21 +68,18 @@ class Rest(NamedTuple):
 
 def find_rests(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list[Rest]:
     """Let the rig come to rest, without a push: a case of `CASES`, how many worlds, and settings beside its own."""
-    common_settings = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
+    common = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
     runs = []
-    for case, worlds, extra_settings in cases:
+    for case, worlds, extra in cases:
         observer, settings, *_ = CASES[case]
-        runs.append(
-            run_of(push_recovery(observer, seed, [*common_settings, *settings, *extra_settings], DURATION_S), worlds)
-        )
+        runs.append(run_of(push_recovery(observer, seed, [*common, *settings, *extra], DURATION_S), worlds))
     results = run_side_by_side(runs)
     return [
-        _measure_rest(CASES[case].observer, trajectory_of(result))
-        for (case, *_), result in zip(cases, results, strict=True)
+        _average(CASES[case].observer, trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)
     ]
 
 
-def _measure_rest(observer: str, trajectory: Trajectory) -> Rest:
+def _average(observer: str, trajectory: Trajectory) -> Rest:
     late = trajectory["time_s"] >= DURATION_S - AVERAGED_S
 
     def mean(name: str, factor: float = 1.0) -> Interval:

@@ -53,7 +53,7 @@ PUSHES = (
 
 
 @dataclass(frozen=True)
-class TuningCase:
+class Tuning:
     """The parameters of an observer that are tuned.
 
     Attributes:
@@ -71,21 +71,21 @@ class TuningCase:
     share: float
 
 
-LINEAR = TuningCase("linear", "(9)", ["tau"], "tau = 0.02", 0.15)
-LTV = TuningCase("ltv", "(10)", ["Q[1]"], "Q = diag(1, 5e6, 1)", 0.4)
-HOMOGENEOUS = TuningCase("homogeneous", "(11)", ["k1", "k2", "alpha"], "[k1, k2, alpha] = [20, 150, 0.85]", 0.45)
+LINEAR = Tuning("linear", "(9)", ["tau"], "tau = 0.02", 0.15)
+LTV = Tuning("ltv", "(10)", ["Q[1]"], "Q = diag(1, 5e6, 1)", 0.4)
+HOMOGENEOUS = Tuning("homogeneous", "(11)", ["k1", "k2", "alpha"], "[k1, k2, alpha] = [20, 150, 0.85]", 0.45)
 CASES = (LINEAR, LTV, HOMOGENEOUS)
 
 Studies = Mapping[str, Mapping[str, TuningResult]]
 """Words of the push -> observer -> its study."""
 
 
-def _scenario(case: TuningCase, push: Push, seed: int) -> Scenario:
+def _scenario(case: Tuning, push: Push, seed: int) -> Scenario:
     return load_scenario("observer_tuning", [f"seed={seed}", *push.settings], case.observer)
 
 
 def tune_case(
-    case: TuningCase,
+    case: Tuning,
     push: Push,
     seed: int,
     worlds: int,
@@ -118,7 +118,7 @@ def tune_case(
 
 
 def all_studies(
-    seed: int, worlds: int, on_share: OnShare, pushes: Sequence[Push] = PUSHES, cases: Sequence[TuningCase] = CASES
+    seed: int, worlds: int, on_share: OnShare, pushes: Sequence[Push] = PUSHES, cases: Sequence[Tuning] = CASES
 ) -> dict[str, dict[str, TuningResult]]:
     """Tune every observer on the same recordings of every push."""
     studies: dict[str, dict[str, TuningResult]] = {}
@@ -147,9 +147,7 @@ def beats_zero(level: NoiseLevelResult) -> bool:
     return float(level.rms.mean()) < level.zero_rms
 
 
-def compare_in_loop(
-    trials: Sequence[tuple[TuningCase, NoiseLevelResult, Push]], worlds: int, seed: int
-) -> list[Interval]:
+def loop_ratios(trials: Sequence[tuple[Tuning, NoiseLevelResult, Push]], worlds: int, seed: int) -> list[Interval]:
     """Velocity RMS error in the closed loop, Table 2's by the tuned, world by world, under that push and noise."""
     runs = []
     for case, level, push in trials:

@@ -101,17 +101,15 @@ def servo_claim(servos: Servos) -> Claim:
         {d: ratio_interval(result.values(key), smooth.values(key)) for d, result in servos.velocity.items()}
         for key in ("velocity_rms_error_rad_s", "tilt_rms_deg")
     )
-    fall_shares = {d: float(result.fell.mean()) for d, result in servos.velocity.items()}
+    falls = {d: float(result.fell.mean()) for d, result in servos.velocity.items()}
     harmless = [
-        d
-        for d in fall_shares
-        if fall_shares[d] == 0.0 and max(abs(velocity[d].mean - 1.0), abs(tilt[d].mean - 1.0)) < WITHIN
+        d for d in falls if falls[d] == 0.0 and max(abs(velocity[d].mean - 1.0), abs(tilt[d].mean - 1.0)) < WITHIN
     ]
-    tracking_errors = {d: measure_tracking(result) for d, result in servos.velocity.items()}
-    safe_deadbands = [d for d in fall_shares if fall_shares[d] == 0.0]
+    errors = {d: measure_tracking(result) for d, result in servos.velocity.items()}
+    safe_deadbands = [d for d in falls if falls[d] == 0.0]
     ratios_text = ", ".join(f"{d:g}: {velocity[d].mean:.2f} and {tilt[d].mean:.2f}" for d in safe_deadbands if d > 0.0)
-    falling = [f"{d:g}" for d in fall_shares if fall_shares[d] > 0.0]
-    error_at_resolution = tracking_errors[RESOLUTION]
+    falling = [f"{d:g}" for d in falls if falls[d] > 0.0]
+    fine_error = errors[RESOLUTION]
     bench = ratio_interval(*(r.values("velocity_rms_error_rad_s") for r in (servos.position, smooth)))
     return Claim(
         place="After (2), the servos",
@@ -119,14 +117,14 @@ def servo_claim(servos: Servos) -> Claim:
         result=(
             f"Servos in velocity mode with a lag of {1e3 * LAG_S:g} ms and a deadband, (11) in the loop, "
             f"{len(smooth.outcomes)} seeds, the push of Figs 5 to 7. Over {MEANS_S:g} s the gimbal is off its command "
-            f"by {_share(tracking_errors[0.0])} of it (RMS) without a deadband, by {_share(error_at_resolution)} with "
+            f"by {_share(errors[0.0])} of it (RMS) without a deadband, by {_share(fine_error)} with "
             f"the resolution of the MX-106, {RESOLUTION:g} rad/s. With a lag of {1e3 * SOFT_LAG_S:g} ms, and so less "
             f"torque against the flywheel's, it is {_share(measure_tracking(servos.soft))}. By deadband [rad/s], "
             f"velocity RMS error and tilt RMS by those without: {ratios_text}. The rig falls with "
             f"{', '.join(falling) or 'none'}. The bench's own servo, which integrates its command, has "
             f"{bench.mean:.2f} times the velocity error."
         ),
-        holds=RESOLUTION in harmless and error_at_resolution is not None and error_at_resolution.mean < WITHIN,
+        holds=RESOLUTION in harmless and fine_error is not None and fine_error.mean < WITHIN,
         conditions=(
             f"With a servo that stiff, up to a deadband of {max(harmless, default=0.0):g} rad/s, with which the "
             f"estimate's error and the tilt stay within {WITHIN:.0%}; the paper says nothing of one."
@@ -136,9 +134,9 @@ def servo_claim(servos: Servos) -> Claim:
             "deadband_rad_s": list(DEADBANDS),
             "velocity_rms_error_by_none": list(velocity.values()),
             "tilt_rms_by_none": list(tilt.values()),
-            "tracking_error_share": list(tracking_errors.values()),
+            "tracking_error_share": list(errors.values()),
             "tracking_error_share_soft": measure_tracking(servos.soft),
-            "fell_fraction": list(fall_shares.values()),
+            "fell_fraction": list(falls.values()),
             "bench_servo_velocity_rms_error_by_none": bench,
         },
         pictures=[_picture(servos)],

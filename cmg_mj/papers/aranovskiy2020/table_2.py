@@ -9,7 +9,7 @@ from cmg_mj.papers.aranovskiy2020.retuned import (
     SEED,
     WORLDS,
     Studies,
-    TuningCase,
+    Tuning,
     all_studies,
     beats_zero,
 )
@@ -18,7 +18,7 @@ from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.studies.tuning import NoiseLevelResult
 
 
-def table_2_claim(case: TuningCase, studies: Studies, experiment: JointExperiment) -> Claim:
+def table_2_claim(case: Tuning, studies: Studies, experiment: JointExperiment) -> Claim:
     """Judge Table 2's line of one observer in the experiment that all three lines come nearest to.
 
     Args:
@@ -67,7 +67,7 @@ def table_2_claim(case: TuningCase, studies: Studies, experiment: JointExperimen
     )
 
 
-def _describe_all_pushes(case: TuningCase, studies: Studies) -> str:
+def _describe_all_pushes(case: Tuning, studies: Studies) -> str:
     """Table 2's error by that of the tuned, under every push."""
     sentences = []
     for push, by_name in studies.items():
@@ -80,7 +80,7 @@ def _describe_all_pushes(case: TuningCase, studies: Studies) -> str:
     return " ".join(sentences)
 
 
-def _describe_first_push(case: TuningCase, studies: Studies) -> str:
+def _describe_first_push(case: Tuning, studies: Studies) -> str:
     """Describe the loss under the push of Figs 5 to 7, at the noise at which it is least there."""
     push = next(iter(studies))
     level = least_lost(case, studies)
@@ -91,14 +91,14 @@ def _describe_first_push(case: TuningCase, studies: Studies) -> str:
     )
 
 
-def _describe_single_line(case: TuningCase, studies: Studies) -> str:
+def _describe_single_line(case: Tuning, studies: Studies) -> str:
     level = least_lost(case, studies)
     return _describe_first_push(case, studies) + (
         " What is the best for this line alone is not the best for the other two." if is_best(level) else ""
     )
 
 
-def least_lost(case: TuningCase, studies: Studies) -> NoiseLevelResult:
+def least_lost(case: Tuning, studies: Studies) -> NoiseLevelResult:
     """Return the level at which Table 2's line loses least under the first push, that of Figs 5 to 7."""
     return min(next(iter(studies.values()))[case.observer].levels, key=lambda level: level.ratio.mean)
 

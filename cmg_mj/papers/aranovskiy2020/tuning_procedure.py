@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from cmg_mj.papers.aranovskiy2020.joint import JointExperiment, experiments, list_experiments
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.retuned import CASES, DEFAULT_NOISE, PUSHES, SEED, STRONG, Studies, compare_in_loop
+from cmg_mj.papers.aranovskiy2020.retuned import CASES, DEFAULT_NOISE, PUSHES, SEED, STRONG, Studies, loop_ratios
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval
@@ -36,20 +36,16 @@ class Trial(NamedTuple):
         return [OBSERVERS[name] for name, ratio in self.loop.items() if not ratio.high >= 1.0]
 
 
-def run_trials(studies: Studies, joint_experiment: JointExperiment, on_share: OnShare) -> list[Trial]:
+def run_trials(studies: Studies, joint: JointExperiment, on_share: OnShare) -> list[Trial]:
     """Close the loop on the tuned and on Table 2's: at the default noise and push, and in the joint experiment."""
     default = next(
-        experiment
-        for experiment in experiments(studies)
-        if experiment.push == STRONG.words and experiment.noise_ug_rthz == DEFAULT_NOISE
+        trial for trial in experiments(studies) if trial.push == STRONG.words and trial.noise_ug_rthz == DEFAULT_NOISE
     )
-    trials, selection = [], [default] + [joint_experiment] * (joint_experiment.words != default.words)
-    for i, experiment in enumerate(selection):
-        push = next(push for push in PUSHES if push.words == experiment.push)
-        loops = compare_in_loop(
-            [(case, experiment.levels[case.observer], push) for case in CASES], LOOP_WORLDS, SEED + 1
-        )
-        trials.append(Trial(experiment, dict(zip((case.observer for case in CASES), loops, strict=True))))
+    trials, selection = [], [default] + [joint] * (joint.words != default.words)
+    for i, trial in enumerate(selection):
+        push = next(push for push in PUSHES if push.words == trial.push)
+        loops = loop_ratios([(case, trial.levels[case.observer], push) for case in CASES], LOOP_WORLDS, SEED + 1)
+        trials.append(Trial(trial, dict(zip((case.observer for case in CASES), loops, strict=True))))
         on_share((i + 1) / len(selection))
     return trials
 

@@ -183,11 +183,9 @@ class Coupling(NamedTuple):
 
 def coupling(push_n_m: float) -> Coupling:
     """Push both, then either."""
-    joint_motion = run((push_n_m, push_n_m))
+    motion = run((push_n_m, push_n_m))
     pitch, roll = run((push_n_m, 0.0)).tilts, run((0.0, push_n_m)).tilts
-    return Coupling(
-        joint_motion.tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(joint_motion.vertical).max())
-    )
+    return Coupling(motion.tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(motion.vertical).max()))
 
 
 def axes_claim(couplings: dict[float, Coupling]) -> Claim:

@@ -111,9 +111,9 @@ def vicinity(rng: np.random.Generator) -> Vicinity:
 def vicinity_claim(seed: int = SEED) -> Claim:
     """Judge convergence to a vicinity of the origin, and how large it is."""
     rng = np.random.default_rng(seed)
-    errors_left, errors_at_2000_hz = ({alpha: remaining_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
+    errors, fine_errors = ({alpha: remaining_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
     # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
-    converges = all(errors_left[a] < VANISHED or errors_at_2000_hz[a] < errors_left[a] / 10.0 for a in ALPHAS)
+    converges = all(errors[a] < VANISHED or fine_errors[a] < errors[a] / 10.0 for a in ALPHAS)
     measures = vicinity(rng)
     relative_difference, difference, slopes = measures.relative_difference, measures.difference, measures.exponents
     gains = rng.normal(0.0, 100.0, (500, 2))
@@ -123,8 +123,8 @@ def vicinity_claim(seed: int = SEED) -> Claim:
         statement="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
         result=(
             "k1, k2 of Table 2, at rest. Without bias and noise a first error of 1 rad/s has fallen after 2.5 s, by "
-            f"alpha, to {_list_by_alpha(errors_left, '.0e')} rad/s at 200 Hz. At 2000 Hz it is "
-            f"{_list_by_alpha(errors_at_2000_hz, '.0e')}: near 1/2 what is left is chatter between samples. With a "
+            f"alpha, to {_list_by_alpha(errors, '.0e')} rad/s at 200 Hz. At 2000 Hz it is "
+            f"{_list_by_alpha(fine_errors, '.0e')}: near 1/2 what is left is chatter between samples. With a "
             "bias e the rate rests off by k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), for e from "
             f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg: to {relative_difference:.0e} of it where that is above "
             f"{SEEN_RAD_S:g} rad/s, else to {difference:.0e} rad/s. At 0.5 deg it is "
@@ -145,10 +145,10 @@ def vicinity_claim(seed: int = SEED) -> Claim:
         ),
         otherwise="The error does not converge, or not to the vicinity foreseen.",
         figures={
-            "error_left_share": _by_name(errors_left),
+            "error_left_share": _by_name(errors),
             "bias_deg": list(BIASES_DEG),
             "rate_error_by_bias_rad_s": _by_name(measures.by_bias),
-            "error_left_share_2000_hz": _by_name(errors_at_2000_hz),
+            "error_left_share_2000_hz": _by_name(fine_errors),
             "closed_form_relative_difference": relative_difference,
             "closed_form_difference_where_small_rad_s": difference,
             "noise_rad": list(NOISES_RAD),

@@ -43,8 +43,8 @@ def order_claim(rows: Sequence[Row]) -> Claim:
         It holds if the paper's order is that of some cell.
     """
     cells = by_cell(rows)
-    ordered_cells = [cell for cell, of_cell in cells.items() if in_order(of_cell)]
-    cells_text = ", ".join(f"{noise:g} ug/rtHz and {bias:g} deg" for noise, bias in ordered_cells)
+    ordered = [cell for cell, of_cell in cells.items() if in_order(of_cell)]
+    cells_text = ", ".join(f"{noise:g} ug/rtHz and {bias:g} deg" for noise, bias in ordered)
     best_kinds = [of_cell[0]["observer"] for of_cell in cells.values()]
     winners = ", ".join(f"`{kind}` {best_kinds.count(kind)}" for kind in dict.fromkeys(best_kinds))
     return Claim(
@@ -58,10 +58,8 @@ def order_claim(rows: Sequence[Row]) -> Claim:
             "push."
         ),
         table=league_table(rows),
-        holds=bool(ordered_cells),
-        conditions=""
-        if len(ordered_cells) == len(cells)
-        else "The order turns round where noise is low or the bias large.",
+        holds=bool(ordered),
+        conditions="" if len(ordered) == len(cells) else "The order turns round where noise is low or the bias large.",
         otherwise="Another order is found at every noise and bias tried.",
         figures={"rows": rows},
         pictures=[_trade_off(rows)],

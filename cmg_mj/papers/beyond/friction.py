@@ -34,24 +34,19 @@ def friction(worlds: int, seed: int, on_share: OnShare, settings: Sequence[str] 
         the gain on the rig that rubs is not had on the one that does not.
     """
     results = {}
-    for models_friction in (False, True):
-        observer = f"observer.friction_n_m={FRICTION_N_M if models_friction else 0.0}"
+    for model in (False, True):
+        observer = f"observer.friction_n_m={FRICTION_N_M if model else 0.0}"
         experiment = push_recovery("homogeneous", seed, [observer, *settings])
         rigs = on_rigs(experiment, worlds, "tilt_friction_n_m", (0.0, FRICTION_N_M))
-        results[False, models_friction], results[True, models_friction] = rigs
-        on_share(0.5 + 0.5 * models_friction)
+        results[False, model], results[True, model] = rigs
+        on_share(0.5 + 0.5 * model)
     means = {
-        f"{WITH[has_friction]}_friction_in_the_plant_{WITH[models_friction]}_in_the_observer_rad_s": results[
-            has_friction, models_friction
-        ].mean(ERROR)
-        for has_friction in (False, True)
-        for models_friction in (False, True)
+        f"{WITH[rig]}_friction_in_the_plant_{WITH[model]}_in_the_observer_rad_s": results[rig, model].mean(ERROR)
+        for rig in (False, True)
+        for model in (False, True)
     }
     values = {key: result.values(ERROR) for key, result in results.items()}
-    gains = {
-        f"gain_{WITH[has_friction]}_friction_rad_s": gain(values[has_friction, False], values[has_friction, True])
-        for has_friction in WITH
-    }
+    gains = {f"gain_{WITH[rig]}_friction_rad_s": gain(values[rig, False], values[rig, True]) for rig in WITH}
     due = (values[True, False] - values[True, True]) - (values[False, False] - values[False, True])
     return means | gains | {"gain_due_to_friction_rad_s": known_interval(due), "worlds": worlds, "seed": seed}
 
@@ -65,9 +60,7 @@ def friction_claim(figures: dict[str, Any]) -> Claim:
     Returns:
         It holds if knowing the friction brings something beyond the damping.
     """
-    gain_without_friction, gain_with_friction, due = (
-        figures[f"gain_{condition}_friction_rad_s"] for condition in (*WITH.values(), "due_to")
-    )
+    smooth, rough, due = (figures[f"gain_{condition}_friction_rad_s"] for condition in (*WITH.values(), "due_to"))
     errors = (figures[f"with_friction_in_the_plant_{condition}_in_the_observer_rad_s"] for condition in WITH.values())
     error_without, error_with = (format_figure(ERROR, error) for error in errors)
     return Claim(
@@ -75,8 +68,8 @@ def friction_claim(figures: dict[str, Any]) -> Claim:
         statement="a friction model in the velocity estimator would reduce its modelling errors",
         result=(
             f"On a rig with {FRICTION_N_M:g} N m of dry friction on the tilt axis the same friction in (11) takes "
-            f"{_milli(gain_with_friction)} off the velocity RMS error ({error_without} to {error_with} rad/s). But on "
-            f"a rig without it, it takes {_milli(gain_without_friction)} off as well: it also damps the estimate of a "
+            f"{_milli(rough)} off the velocity RMS error ({error_without} to {error_with} rad/s). But on "
+            f"a rig without it, it takes {_milli(smooth)} off as well: it also damps the estimate of a "
             f"rate whose true value is small. What is due to knowing the friction is the difference, {_milli(due)}."
         ),
         holds=due is not None and due.low > 0.0,

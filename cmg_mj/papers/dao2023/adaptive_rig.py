@@ -95,13 +95,11 @@ def velocity_errors(
     Returns:
         Observer -> errors, (n_biases, worlds) [rad/s].
     """
-    biases_by_world = np.repeat(biases_deg, worlds).tolist()
+    biases = np.repeat(biases_deg, worlds).tolist()
     runs = []
     for name in observers:
         experiment = prepare(without_push(seed, f"observer.kind={name}"))
-        runs.append(
-            BatchJob(experiment.with_varied({"equilibrium_bias_deg": biases_by_world}), range(len(biases_by_world)))
-        )
+        runs.append(BatchJob(experiment.with_varied({"equilibrium_bias_deg": biases}), range(len(biases))))
     return {
         name: errors(result, "velocity_rms_error_rad_s").reshape(len(biases_deg), worlds)
         for name, result in zip(observers, run_side_by_side(runs, keep_trajectory=False), strict=True)
@@ -134,18 +132,16 @@ def learnt_gait(
         `disturbance_n_m` and `bias_deg` of what the first finds.
     """
     pushes = gait(amplitude_n_m, frequency_hz)
-    with_frequency, without_frequency = (
+    informed, blind = (
         record(without_push(seed, "observer.kind=adaptive", f"observer.sinusoid_hz={hertz}", pushes=pushes), biases_deg)
         for hertz in (frequency_hz, 0.0)
     )
-    torque = amplitude_n_m * np.sin(2.0 * math.pi * frequency_hz * with_frequency["time_s"][:, None])
+    torque = amplitude_n_m * np.sin(2.0 * math.pi * frequency_hz * informed["time_s"][:, None])
     return {
-        "knowing_rad_s": rms_in_time(with_frequency["estimate/adaptive/x2_rad_s"] - with_frequency["x2_rad_s"]),
-        "disturbance_n_m": rms_in_time(with_frequency["estimate/adaptive/disturbance_n_m"] - torque),
-        "bias_deg": np.degrees(rms_in_time(with_frequency["estimate/adaptive/bias_rad"] - np.radians(biases_deg))),
-        "not_knowing_rad_s": rms_in_time(
-            without_frequency["estimate/adaptive/x2_rad_s"] - without_frequency["x2_rad_s"]
-        ),
+        "knowing_rad_s": rms_in_time(informed["estimate/adaptive/x2_rad_s"] - informed["x2_rad_s"]),
+        "disturbance_n_m": rms_in_time(informed["estimate/adaptive/disturbance_n_m"] - torque),
+        "bias_deg": np.degrees(rms_in_time(informed["estimate/adaptive/bias_rad"] - np.radians(biases_deg))),
+        "not_knowing_rad_s": rms_in_time(blind["estimate/adaptive/x2_rad_s"] - blind["x2_rad_s"]),
     }
 
 

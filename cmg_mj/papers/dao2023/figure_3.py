@@ -36,7 +36,7 @@ def settling_order(study: Study) -> Claim:
     """Judge (a), (b), (c)."""
     times = exogenous_settle_times(study.proposed)[:3]
     ten, thousand, tenth = times
-    motions_in_order = (thousand < ten) & (ten <= tenth) & np.isfinite(thousand)
+    in_order = (thousand < ten) & (ten <= tenth) & np.isfinite(thousand)
     early = exogenous_settle_times(study.proposed, 1.0)[:3]
     faster_early = int(np.sum(early[1] < early[0]))
     n = len(ten)
@@ -50,20 +50,16 @@ def settling_order(study: Study) -> Claim:
     return Claim(
         place="Fig. 3(a), (b), (c)",
         statement="Against Sigma = 10, parameters and disturbance are found sooner with 1000 and later with 0.1.",
-        result=f"In {int(motions_in_order.sum())} of {n} motions the settling order is 1000 < 10 <= 0.1. Medians: "
+        result=f"In {int(in_order.sum())} of {n} motions the settling order is 1000 < 10 <= 0.1. Medians: "
         f"{words_of_time(medians[1])} at 1000, {words_of_time(medians[0])} at 10, {words_of_time(medians[2])} at 0.1.",
-        holds=motions_in_order.sum() >= 0.9 * n,
+        holds=in_order.sum() >= 0.9 * n,
         conditions=meaning,
         otherwise=meaning,
         figures={
             f"settles_below_0_1_sigma_{sigma:g}_s": finite_times(row)
             for sigma, row in zip(paper.SIGMAS, times, strict=True)
         }
-        | {
-            "motions_ordered": int(motions_in_order.sum()),
-            "motions_faster_into_band_1_at_1000": faster_early,
-            "motions": n,
-        },
+        | {"motions_ordered": int(in_order.sum()), "motions_faster_into_band_1_at_1000": faster_early, "motions": n},
         pictures=[_picture(study)],
     )
 

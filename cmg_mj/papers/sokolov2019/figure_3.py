@@ -114,7 +114,7 @@ def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
     worlds = tuning.rates["luenberger"].shape[1]
     errors_text = ", ".join(f"{equation} {plus_minus(relative[name], 2)}" for name, equation in OBSERVERS.items())
     rates_text = ", ".join(f"{equation} {ends[name].mean:+.2f}" for name, equation in OBSERVERS.items())
-    other_failures = " and ".join(OBSERVERS[name] for name, error in other_errors.items() if error.low > 1.0)
+    failures = " and ".join(OBSERVERS[name] for name, error in other_errors.items() if error.low > 1.0)
     return Claim(
         place="Fig. 3",
         statement="At the push, (9) fails completely to estimate x2.",
@@ -126,9 +126,8 @@ def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
         ),
         holds=relative["luenberger"].low > max(1.0, *(error.high for error in other_errors.values())),
         conditions=(
-            f"{other_failures} fails there too, if less: so does every estimator that takes the command's effect for "
-            "motion."
-            if other_failures
+            f"{failures} fails there too, if less: so does every estimator that takes the command's effect for motion."
+            if failures
             else ""
         ),
         otherwise="Its error is no larger than that of an estimate of zero, or than the others'.",
@@ -175,18 +174,16 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
 
 
 def _picture(tuning: Tuning) -> Picture:
-    example = tuning.trajectory.world(0).between(0.0, 3.0)
-    t, shaded, push = example["time_s"], push_intervals(example), tuning.push
+    run = tuning.trajectory.world(0).between(0.0, 3.0)
+    t, shaded, push = run["time_s"], push_intervals(run), tuning.push
     panels = [
-        Panel(
-            "tilt y1 [deg]", [Line(t, np.degrees(example["y1_rad"]), "y1", color=7, width=0.8)], "(a)", shaded=shaded
-        ),
-        Panel("command u [rad/s]", [Line(t, example["u_rad_s"], "u", color=3, width=0.8)], shaded=shaded),
+        Panel("tilt y1 [deg]", [Line(t, np.degrees(run["y1_rad"]), "y1", color=7, width=0.8)], "(a)", shaded=shaded),
+        Panel("command u [rad/s]", [Line(t, run["u_rad_s"], "u", color=3, width=0.8)], shaded=shaded),
     ]
     for i, (name, equation) in enumerate(OBSERVERS.items()):
         lines = [
             Line(t, tuning.rates[name][: len(t), 0], f"{equation} {name}", color=name, width=0.8),
-            Line(t, example["fog_rad_s"], "gyro", "k-", width=1.0),
+            Line(t, run["fog_rad_s"], "gyro", "k-", width=1.0),
         ]
         panels.append(Panel("tilt rate [rad/s]", lines, "(b)" if i == 0 else "", shaded=shaded, y_range=(-1.0, 0.6)))
     title = (

@@ -143,11 +143,11 @@ def in_ms(seconds: float | None, otherwise: str = "none") -> str:
 
 def claim(results: Lags) -> Claim:
     """Judge section V: the differentiator's lag."""
-    own_lag, lag_thresholds, latencies = results.own_lag_s, results.thresholds, results.latencies
+    own_lag, lags, latencies = results.own_lag_s, results.thresholds, results.latencies
     linear = results.predictions["linear"]
-    linear_threshold, other_lags = (
-        lag_thresholds["linear"],
-        min(lag_thresholds[name].low for name in ("luenberger", "homogeneous")),
+    threshold, least = (
+        lags["linear"],
+        min(lags[name].low for name in ("luenberger", "homogeneous")),
     )
     return Claim(
         place="Section V, the lag",
@@ -161,17 +161,17 @@ def claim(results: Lags) -> Claim:
             "flywheel then turns the gimbal back, which damps the tilt."
         ),
         table=_table(results),
-        holds=linear_threshold.high is not None and linear_threshold.high < other_lags,
+        holds=threshold.high is not None and threshold.high < least,
         conditions=(
-            f"It does with a servo lag from {in_ms(linear_threshold.middle)} or a latency of y1 from "
+            f"It does with a servo lag from {in_ms(threshold.middle)} or a latency of y1 from "
             f"{in_ms(latencies['linear'].high)}; at the model's servo lag of {in_ms(own_lag)} the oscillation decays."
-            if linear_threshold.middle is not None and linear_threshold.middle > own_lag
+            if threshold.middle is not None and threshold.middle > own_lag
             else ""
         ),
         otherwise="The loop of (8) is not the first to oscillate.",
         figures={
             "servo_lag_of_the_model_s": own_lag,
-            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in lag_thresholds.items()},
+            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in lags.items()},
             "latency_threshold_s": {name: list(threshold) for name, threshold in latencies.items()},
             "predicted": {
                 name: {
@@ -189,13 +189,13 @@ def claim(results: Lags) -> Claim:
     )
 
 
-def _table(results: Lags) -> str:
+def _table(lags: Lags) -> str:
     rows = []
     for name, equation in (OBSERVERS | {"truth": "true rate in the law"}).items():
         lag, latency, prediction = (
-            results.thresholds.get(name),
-            results.latencies.get(name),
-            results.predictions.get(name),
+            lags.thresholds.get(name),
+            lags.latencies.get(name),
+            lags.predictions.get(name),
         )
         rows.append(
             (

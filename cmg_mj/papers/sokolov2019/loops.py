@@ -56,10 +56,8 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
     quiet: dict[str, Result] = {}
     cases = len(BIASES_DEG) + 1
     gaps = np.repeat([*[0.0] * len(BIASES_DEG), GAP_ARCMIN], worlds)
-    variations = {"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds), "gimbal_backlash_arcmin": gaps}
-    runs = [
-        BatchJob(experiment(settings, name).with_varied(variations), [*range(worlds)] * cases) for name in OBSERVERS
-    ]
+    values = {"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds), "gimbal_backlash_arcmin": gaps}
+    runs = [BatchJob(experiment(settings, name).with_varied(values), [*range(worlds)] * cases) for name in OBSERVERS]
     for name, result in zip(OBSERVERS, run_side_by_side(runs), strict=True):
         *no_gap, gap[name] = result.split(cases)
         for e, bias_result in zip(BIASES_DEG, no_gap, strict=True):

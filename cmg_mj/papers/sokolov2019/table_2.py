@@ -79,43 +79,35 @@ def none_better(levels: Sequence[NoiseLevelResult]) -> bool:
 def claim(results: Levels) -> Claim:
     """Judge the printed values beside the best ones."""
     settings = [
-        (push, i, level.noise_ug_rthz)
-        for push, by_observer in results.items()
-        for i, level in enumerate(by_observer["linear"])
+        (push, i, level.noise_ug_rthz) for push, studies in results.items() for i, level in enumerate(studies["linear"])
     ]
-    best_settings = [
+    best = [
         f"{push} at {noise:g} ug/rtHz"
         for push, i, noise in settings
         if none_better([levels[i] for levels in results[push].values()])
     ]
-    settings_by_observer = {
+    by_name = {
         name: [f"{noise:g} ({push})" for push, i, noise in settings if none_better([results[push][name][i]])]
         for name in OBSERVERS
     }
-    worse_than_zero = [
+    losers = [
         OBSERVERS[name]
         for name in OBSERVERS
-        if all(level.rms.mean() > level.zero_rms for by_observer in results.values() for level in by_observer[name])
+        if all(level.rms.mean() > level.zero_rms for studies in results.values() for level in studies[name])
     ]
-    settings_text = "; ".join(
-        f"{OBSERVERS[name]} at {', '.join(places) or 'none'}" for name, places in settings_by_observer.items()
-    )
+    text = "; ".join(f"{OBSERVERS[name]} at {', '.join(places) or 'none'}" for name, places in by_name.items())
     return Claim(
         place="Table II, tuning",
         statement="tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
         result=(
             f"Fitted on {WORLDS} seeds and scored on as many others, from the push's start to a second after it. The "
-            f"printed values are not beaten, by noise in ug/rtHz: {settings_text}."
+            f"printed values are not beaten, by noise in ug/rtHz: {text}."
         ),
         table=_table(results),
-        holds=bool(best_settings),
+        holds=bool(best),
         conditions=(
-            f"For a push of {'; '.join(best_settings)}. The paper gives neither push nor noise."
-            + (
-                f" The best {' and '.join(worse_than_zero)} are farther from the gyro than zero is."
-                if worse_than_zero
-                else ""
-            )
+            f"For a push of {'; '.join(best)}. The paper gives neither push nor noise."
+            + (f" The best {' and '.join(losers)} are farther from the gyro than zero is." if losers else "")
         ),
         otherwise=(
             "In none of these settings are all three printed lines the best: they were not found on such a recording."
@@ -130,9 +122,9 @@ def claim(results: Levels) -> Claim:
                     "zero_estimate_error_rad_s": [level.zero_rms for level in levels],
                     "tuned_is": [level.verdict for level in levels],
                 }
-                for name, levels in by_observer.items()
+                for name, levels in studies.items()
             }
-            for push, by_observer in results.items()
+            for push, studies in results.items()
         },
     )
 
