@@ -162,22 +162,20 @@ class Proof:
 
     Attributes:
         steps: Step in words -> whether it was found so.
-        paper_decisions: The decisions on the paper's m1, with symbols and with the numbers of its table.
-        counter_checks: The decisions on inertias that are PLvCC, constant m1 first.
+        decisions: The decisions on the paper's m1, with symbols and with the numbers of its table.
+        checks: The decisions on inertias that are PLvCC, constant m1 first.
     """
 
     steps: Mapping[str, bool]
-    paper_decisions: tuple[Decision, Decision]
-    counter_checks: tuple[Decision, ...]
+    decisions: tuple[Decision, Decision]
+    checks: tuple[Decision, ...]
 
     @property
     def failures(self) -> list[str]:
         """The failures: a step, a Psi for the paper's m1, no Psi for an m1 that has one."""
         failures = [name for name, right in self.steps.items() if not right]
-        failures += [f"m1 = {decision.m1}: a Psi was found" for decision in self.paper_decisions if decision.plvcc]
-        return failures + [
-            f"m1 = {decision.m1}: no Psi was found" for decision in self.counter_checks if not decision.plvcc
-        ]
+        failures += [f"m1 = {decision.m1}: a Psi was found" for decision in self.decisions if decision.plvcc]
+        return failures + [f"m1 = {decision.m1}: no Psi was found" for decision in self.checks if not decision.plvcc]
 
 
 def proof(paper: Paper) -> Proof:
@@ -197,11 +195,9 @@ def proof(paper: Paper) -> Proof:
         sp.diff(condition(f**2), q2) - 2 * f**2 * sp.diff(sp.diff(f, q2, 2) / f, q2)
     )
     steps["it is 8 A D k^2 for f = A exp(k q2) + D exp(-k q2)"] = vanishes(condition(family) - 8 * A * D * k**2)
-    paper_decisions = (decide(papers_m1(paper)), decide(papers_m1(paper, numbers=True)))
-    counter_checks = tuple(
-        decide(m1) for m1 in (sp.Symbol("J1", positive=True), sp.exp(2 * k * q2), sp.cosh(k * q2) ** 2)
-    )
-    return Proof(steps, paper_decisions, counter_checks)
+    decisions = (decide(papers_m1(paper)), decide(papers_m1(paper, numbers=True)))
+    checks = tuple(decide(m1) for m1 in (sp.Symbol("J1", positive=True), sp.exp(2 * k * q2), sp.cosh(k * q2) ** 2))
+    return Proof(steps, decisions, checks)
 
 
 # --- the claim ----------------------------------------------------------------------------------------------
@@ -210,8 +206,8 @@ def proof(paper: Paper) -> Proof:
 def claim(paper: Paper) -> Claim:
     """Judge the appendix of aranovskiy2020, or Proposition 1 of sokolov2019, whose proof is not printed there."""
     result = proof(paper)
-    symbolic, numeric = result.paper_decisions
-    constant, *other_decisions = result.counter_checks
+    symbolic, numeric = result.decisions
+    constant, *other_decisions = result.checks
     condition_values = ", ".join(f"{value} at q2 = {angle}" for angle, value in symbolic.values.items())
     gap, factor, printed_factor = not zero_d_is_singular(), inertia_factor(paper), PRINTED[paper].factor
     remarks = {
@@ -241,7 +237,7 @@ def claim(paper: Paper) -> Claim:
             "steps": dict(result.steps),
             "papers_m1": _plain(symbolic),
             "table_numbers": _plain(numeric),
-            "counter_checks": [_plain(decision) | {"Psi": _text(decision.Psi)} for decision in result.counter_checks],
+            "counter_checks": [_plain(decision) | {"Psi": _text(decision.Psi)} for decision in result.checks],
             "d_zero_alone_is_singular": not gap,
             "factor_of_m1_by_the_equations": int(factor),
             "factor_of_m1_printed": printed_factor,

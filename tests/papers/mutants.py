@@ -210,8 +210,8 @@ MUTANTS = [
     Mutant("Table II: one observer that is not beaten will do", S + "table_2.py",
            'return all(level.verdict != "better"', 'return any(level.verdict != "better"',
            "sokolov2019_table_2.py::test_the_printed_values_must_be_best_on_one_recording"),
-    Mutant("the lag: (8) need not be the first", S + "lag.py", "threshold.high < least",
-           "threshold.high > 0.0",
+    Mutant("the lag: (8) need not be the first", S + "lag.py", "begin.high < least",
+           "begin.high > 0.0",
            "sokolov2019_lag.py::test_claim_of_the_lag"),
     # --- dao2023 ---
     Mutant("the conclusion without its second half", D + "figure_3.py",

@@ -46,7 +46,7 @@ SEEDS, FIRST = 6, 500
 
 
 @pytest.fixture(scope="module")
-def results() -> Study:
+def runs() -> Study:
     return study(SEEDS, FIRST)
 
 
@@ -153,14 +153,8 @@ def test_noise_has_the_papers_standard_deviation() -> None:
 def test_claims_on_the_bounds() -> None:
     parts = ("invariance", "coordinates", "increments", "order_of_bounds", "noise_level")
     claims = [of_json(getattr(bioreactor_bounds, part)()) for part in parts]
-    conditional = "reproduced within stated conditions"
-    assert [claim.verdict for claim in claims] == [
-        "reproduced",
-        "reproduced",
-        conditional,
-        conditional,
-        "not reproduced",
-    ]
+    partly = "reproduced within stated conditions"
+    assert [claim.verdict for claim in claims] == ["reproduced", "reproduced", partly, partly, "not reproduced"]
 
 
 def test_the_set_is_not_invariant_for_inputs_beyond_its_own() -> None:
@@ -190,8 +184,8 @@ def test_the_largest_slope_is_at_a_corner_of_the_domain() -> None:
 # --- the figures --------------------------------------------------------------------------------------------
 
 
-def test_rates_are_in_order_in_every_window(results: Study) -> None:
-    means, in_order = figure_1.ordered_rates(results)
+def test_rates_are_in_order_in_every_window(runs: Study) -> None:
+    means, in_order = figure_1.ordered_rates(runs)
     assert in_order.tolist() == [True] * 4
     # An independent implementation's figures. In the first window the start has not quite faded.
     assert means[1, 1:] == pytest.approx([1.25, 2.93, 1.35], rel=0.03)
@@ -199,90 +193,85 @@ def test_rates_are_in_order_in_every_window(results: Study) -> None:
     assert means[3, 1:] == pytest.approx([-1.22, -0.63, -1.11], abs=0.03)
 
 
-def test_errors_are_in_order_in_every_seed(results: Study) -> None:
-    for replays in (results.nominal, results.loud):
-        rms = rms_by_kind(results.run, replays)
+def test_errors_are_in_order_in_every_seed(runs: Study) -> None:
+    for replays in (runs.nominal, runs.loud):
+        rms = rms_by_kind(runs.run, replays)
         assert figure_2.share_in_order(rms) >= 0.95
-    assert rms_by_kind(results.run, results.nominal).mean(axis=1) == pytest.approx([0.255, 0.071, 0.056], rel=0.08)
+    assert rms_by_kind(runs.run, runs.nominal).mean(axis=1) == pytest.approx([0.255, 0.071, 0.056], rel=0.08)
 
 
-def test_claims_on_the_figures(results: Study) -> None:
-    conditional = "reproduced within stated conditions"
+def test_claims_on_the_figures(runs: Study) -> None:
+    partly = "reproduced within stated conditions"
     claims = {
         figure_1.figure_1: ("reproduced",),
-        figure_2.figure_2: (conditional,),
+        figure_2.figure_2: (partly,),
         figure_2.bias: ("reproduced",),
         figure_2.bias_of_constant_gain: ("not reproduced",),
-        figure_2.bias_of_updated_gains: ("reproduced", conditional),
-        figure_2.spread: ("reproduced", conditional),
+        figure_2.bias_of_updated_gains: ("reproduced", partly),
+        figure_2.spread: ("reproduced", partly),
         simple_copy: ("reproduced",),
     }
     for make, verdicts in claims.items():
-        assert of_json(make(results)).verdict in verdicts
+        assert of_json(make(runs)).verdict in verdicts
 
 
-def test_claims_can_fail(results: Study) -> None:
+def test_claims_can_fail(runs: Study) -> None:
     """The observers' names exchanged."""
-    swapped = {
-        CONSTANT: results.nominal[UPDATED],
-        UPDATED: results.nominal[CONSTANT],
-        HOMOGENEOUS: results.nominal[HOMOGENEOUS],
-    }
-    exchanged = results._replace(nominal=swapped)
+    swapped = {CONSTANT: runs.nominal[UPDATED], UPDATED: runs.nominal[CONSTANT], HOMOGENEOUS: runs.nominal[HOMOGENEOUS]}
+    exchanged = runs._replace(nominal=swapped)
     for make in (figure_1.figure_1, figure_2.figure_2, figure_2.bias):
         claim = make(exchanged)
         assert claim.verdict == "not reproduced"
         assert claim.reason
 
 
-def test_cause_of_a_bias_is_judged_by_what_is_left_without_it(results: Study) -> None:
+def test_cause_of_a_bias_is_judged_by_what_is_left_without_it(runs: Study) -> None:
     """Observers that know hbar beside those that do not; the constant gain's bias stays, the others' mostly goes."""
-    shares = figure_2.bias_left(results)
+    shares = figure_2.bias_left(runs)
     assert shares[0].min() > 0.7
-    claim = figure_2.bias_of_constant_gain(results)
+    claim = figure_2.bias_of_constant_gain(runs)
     assert claim.figures["share_left_with_exact_hbar"] == shares[0].tolist()
     assert shares[1:, [0, 2]].max() < 0.4
-    error = results.nominal[CONSTANT].eta2_error
-    gone = results.exact | {CONSTANT: dataclasses.replace(results.exact[CONSTANT], eta2_error=0.1 * error)}
-    assert figure_2.bias_of_constant_gain(results._replace(exact=gone)).verdict == "reproduced"
-    assert figure_2.bias_of_updated_gains(results._replace(exact=results.nominal)).verdict == "not reproduced"
+    error = runs.nominal[CONSTANT].eta2_error
+    gone = runs.exact | {CONSTANT: dataclasses.replace(runs.exact[CONSTANT], eta2_error=0.1 * error)}
+    assert figure_2.bias_of_constant_gain(runs._replace(exact=gone)).verdict == "reproduced"
+    assert figure_2.bias_of_updated_gains(runs._replace(exact=runs.nominal)).verdict == "not reproduced"
 
 
-def test_order_of_figure_2_is_needed_in_nearly_every_seed(results: Study) -> None:
+def test_order_of_figure_2_is_needed_in_nearly_every_seed(runs: Study) -> None:
     """With the second and third exchanged in one seed of six it is in order in five."""
-    second, third = (np.array(results.nominal[kind].eta2_error) for kind in (UPDATED, HOMOGENEOUS))
+    second, third = (np.array(runs.nominal[kind].eta2_error) for kind in (UPDATED, HOMOGENEOUS))
     second[:, 0], third[:, 0] = third[:, 0].copy(), second[:, 0].copy()
     swapped = {
-        UPDATED: dataclasses.replace(results.nominal[UPDATED], eta2_error=second),
-        HOMOGENEOUS: dataclasses.replace(results.nominal[HOMOGENEOUS], eta2_error=third),
+        UPDATED: dataclasses.replace(runs.nominal[UPDATED], eta2_error=second),
+        HOMOGENEOUS: dataclasses.replace(runs.nominal[HOMOGENEOUS], eta2_error=third),
     }
-    claim = figure_2.figure_2(results._replace(nominal=results.nominal | swapped))
+    claim = figure_2.figure_2(runs._replace(nominal=runs.nominal | swapped))
     assert claim.figures["share_of_seeds_in_order"] == pytest.approx(5.0 / 6.0)
     assert claim.verdict == "not reproduced"
 
 
-def test_spread_must_go_with_the_rate(results: Study) -> None:
+def test_spread_must_go_with_the_rate(runs: Study) -> None:
     """The errors of the noisiest given to the one with the least rate."""
-    noisy = dataclasses.replace(results.nominal[HOMOGENEOUS], eta2_error=10.0 * results.nominal[CONSTANT].eta2_error)
-    assert figure_2.spread(results._replace(nominal=results.nominal | {HOMOGENEOUS: noisy})).verdict == "not reproduced"
+    noisy = dataclasses.replace(runs.nominal[HOMOGENEOUS], eta2_error=10.0 * runs.nominal[CONSTANT].eta2_error)
+    assert figure_2.spread(runs._replace(nominal=runs.nominal | {HOMOGENEOUS: noisy})).verdict == "not reproduced"
 
 
-def test_gain_follows_its_rate(results: Study) -> None:
+def test_gain_follows_its_rate(runs: Study) -> None:
     """L is phi2 + (phi3/phi1) Omega = 1 + 100 Omega in the mean."""
     for kind in (UPDATED, HOMOGENEOUS):
         L, rate = (
-            window_means(results.run, values).mean(axis=1)
-            for values in (results.nominal[kind].L, results.nominal[kind].rate)
+            window_means(runs.run, values).mean(axis=1) for values in (runs.nominal[kind].L, runs.nominal[kind].rate)
         )
         assert L / (1.0 + 100.0 * rate) == pytest.approx(1.0, abs=0.03)
     constant = 1.0 + 100.0 * Bioreactor(0.8).df2_max
-    assert np.ptp(results.nominal[CONSTANT].L) == 0.0
-    assert results.nominal[CONSTANT].L[0, 0] / constant == pytest.approx(1.0)
-    assert min(replayed.L.min() for replayed in results.nominal.values()) >= 1.0
+    assert np.ptp(runs.nominal[CONSTANT].L) == 0.0
+    assert runs.nominal[CONSTANT].L[0, 0] / constant == pytest.approx(1.0)
+    assert min(replayed.L.min() for replayed in runs.nominal.values()) >= 1.0
 
 
-def test_the_homogeneous_terms_are_inert(results: Study) -> None:
-    claim = of_json(correction(results.run, results.nominal[HOMOGENEOUS]))
+def test_the_homogeneous_terms_are_inert(runs: Study) -> None:
+    claim = of_json(correction(runs.run, runs.nominal[HOMOGENEOUS]))
     assert claim.is_ours
     assert claim.verdict == "reproduced within stated conditions"
     assert claim.figures["largest_argument"] < 1e-3
@@ -290,13 +279,13 @@ def test_the_homogeneous_terms_are_inert(results: Study) -> None:
     assert claim.figures["rms_error_eta2_linear_correction"] == pytest.approx(claim.figures["rms_error_eta2"], rel=1e-3)
 
 
-def test_the_result_does_not_hang_on_the_step(results: Study) -> None:
+def test_the_result_does_not_hang_on_the_step(runs: Study) -> None:
     """The same noise, interpolated, at half the step; the first half of the time."""
     fine = first_half(run_plant([FIRST, FIRST + 1], dt=0.005))
-    coarse = first_half(results.run)
+    coarse = first_half(runs.run)
     for kind in (UPDATED, HOMOGENEOUS):
         fine_rms = rms_late(fine, replay(kind, fine, Bioreactor(0.8)).eta2_error)
-        coarse_rms = rms_late(coarse, results.nominal[kind].eta2_error[: len(coarse.t), :2])
+        coarse_rms = rms_late(coarse, runs.nominal[kind].eta2_error[: len(coarse.t), :2])
         assert fine_rms == pytest.approx(coarse_rms, rel=0.02)
 
 
@@ -314,14 +303,14 @@ def test_increments_of_system_1(p: float, holds: bool) -> None:
 
 
 def test_claims_of_the_theory() -> None:
-    conditional = "reproduced within stated conditions"
+    partly = "reproduced within stated conditions"
     verdicts = {
         increments.increments: "reproduced",
-        finite_escape.no_observer_beyond_1: conditional,
+        finite_escape.no_observer_beyond_1: partly,
         theory.scaling_conditions: "not reproduced",
         theory.gain_tracking: "reproduced",
-        chain_of_integrators.theorem_2: conditional,
-        theorem_1.theorem_1: conditional,
+        chain_of_integrators.theorem_2: partly,
+        theorem_1.theorem_1: partly,
     }
     for make, verdict in verdicts.items():
         assert of_json(make()).verdict == verdict
@@ -390,10 +379,10 @@ def test_differences_on_the_rig_are_beyond_chance() -> None:
     assert "(not different)" in claim.result.partition("linear ")[2].partition("linear ")[2]
 
 
-def test_pictures_have_names(results: Study) -> None:
+def test_pictures_have_names(runs: Study) -> None:
     pictures: list[Picture] = [
-        *figure_1.figure_1(results).pictures,
-        *figure_2.figure_2(results).pictures,
+        *figure_1.figure_1(runs).pictures,
+        *figure_2.figure_2(runs).pictures,
     ]
     assert [picture.name for picture in pictures] == ["andrieu2009-fig-1", "andrieu2009-fig-2"]
     for i, picture in enumerate(pictures, start=1):

@@ -153,9 +153,9 @@ def test_the_verdict_follows_from_what_was_found() -> None:
             otherwise="It is far off.",
         )
 
-    outright, conditional, failed = claim(True), claim(True, "It is so at 200 Hz."), claim(False, "It is so at 200 Hz.")
+    outright, partly, failed = claim(True), claim(True, "It is so at 200 Hz."), claim(False, "It is so at 200 Hz.")
     assert (outright.verdict, outright.reason) == ("reproduced", "")
-    assert (conditional.verdict, conditional.reason) == ("reproduced within stated conditions", "It is so at 200 Hz.")
+    assert (partly.verdict, partly.reason) == ("reproduced within stated conditions", "It is so at 200 Hz.")
     assert (failed.verdict, failed.reason) == ("not reproduced", "It is far off.")
     assert type(claim(np.float64(1.0) > 0.5).holds) is bool  # type: ignore[arg-type]
 

@@ -12,12 +12,8 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 def test_where_a_sentence_ends() -> None:
     text = "As in Fig. 2 it is 0.5 deg, e.g. at 200 Hz. Not at 50 Hz! (9) fails. Why?"
-    assert split_sentences(text) == [
-        "As in Fig. 2 it is 0.5 deg, e.g. at 200 Hz.",
-        "Not at 50 Hz!",
-        "(9) fails.",
-        "Why?",
-    ]
+    parts = ["As in Fig. 2 it is 0.5 deg, e.g. at 200 Hz.", "Not at 50 Hz!", "(9) fails.", "Why?"]
+    assert split_sentences(text) == parts
     assert count_words("x1 = 0.5 +- 0.1 rad/s; so.") == 5
     assert list(too_long(f"Short. {'word ' * LONGEST}end.")) == [f"{'word ' * LONGEST}end."]
     assert not list(too_long(f"{'word ' * (LONGEST - 1)}end."))

@@ -31,7 +31,7 @@ WITHIN = "reproduced within stated conditions"
 
 
 @pytest.fixture(scope="module")
-def results() -> Loops:
+def runs() -> Loops:
     return loops(lambda share: None, worlds=4, seed=SEED)
 
 
@@ -65,25 +65,25 @@ def cycles() -> Cycles:
     return Cycles({name: Cycle(True, size, 1.0) for name, size in ends.items()}, foreseen)
 
 
-def test_the_figures_on_other_seeds(results: Loops, lags: Lags, cycles: Cycles) -> None:
-    assert figure_4(results, lags, cycles).verdict == WITHIN
-    assert figure_5(results, lags, cycles).verdict == WITHIN
+def test_the_figures_on_other_seeds(runs: Loops, lags: Lags, cycles: Cycles) -> None:
+    assert figure_4(runs, lags, cycles).verdict == WITHIN
+    assert figure_5(runs, lags, cycles).verdict == WITHIN
     assert cause_of_figure_5(cycles).verdict == "not reproduced"
-    assert figure_6(results, cycles).verdict == "reproduced"
+    assert figure_6(runs, cycles).verdict == "reproduced"
     assert figure_6_at_rest(lags, cycles).verdict == "not reproduced"
-    assert comparison.best_claim(results).verdict == WITHIN
-    assert comparison.model_based(results).verdict == WITHIN
+    assert comparison.best_claim(runs).verdict == WITHIN
+    assert comparison.model_based(runs).verdict == WITHIN
 
 
-def test_every_figure_shows_its_own_observers_runs(results: Loops, lags: Lags, cycles: Cycles) -> None:
+def test_every_figure_shows_its_own_observers_runs(runs: Loops, lags: Lags, cycles: Cycles) -> None:
     """Not another's: the figures, and the curves of the pictures."""
     claims = {
-        "linear": figure_4(results, lags, cycles),
-        "luenberger": figure_5(results, lags, cycles),
-        "homogeneous": figure_6(results, cycles),
+        "linear": figure_4(runs, lags, cycles),
+        "luenberger": figure_5(runs, lags, cycles),
+        "homogeneous": figure_6(runs, cycles),
     }
     for name, claim in claims.items():
-        no_gap, gap = results.by_bias[0.25][name], results.gap[name]
+        no_gap, gap = runs.by_bias[0.25][name], runs.gap[name]
         assert claim.figures["without_backlash"] == numbers(no_gap)
         assert claim.figures["with_backlash"] == numbers(gap)
         assert claim.figures["cycle_amplitude_deg"] == cycles.ends[name].amplitude_deg
@@ -92,17 +92,17 @@ def test_every_figure_shows_its_own_observers_runs(results: Loops, lags: Lags, c
             rates, recorded = [line.y for line in panel.lines], trajectory_of(result)
             np.testing.assert_array_equal(rates[0], recorded[f"estimate/{name}/x2_rad_s"][:, 0])
             np.testing.assert_array_equal(rates[1], recorded["x2_rad_s"][:, 0])
-    assert claims["linear"].figures["gyro"] == numbers(results.gyro)
+    assert claims["linear"].figures["gyro"] == numbers(runs.gyro)
     four = claims["linear"].figures
     assert four["main_frequency_hz"] == pytest.approx(four["predicted_frequency_hz"], rel=0.15)
     assert four["without_backlash"]["late_tilt_deviation_deg"][1] > 1.5 * four["gyro"]["late_tilt_deviation_deg"][2]
     assert claims["luenberger"].figures["fell_fraction"] == {"0_deg": 0.0, "0.25_deg": 0.0, "0.5_deg": 1.0}
 
 
-def test_only_the_runs_behind_a_gap_have_one(results: Loops) -> None:
+def test_only_the_runs_behind_a_gap_have_one(runs: Loops) -> None:
     """There the gimbal stands half a gap, 10 arcmin, off where the servo would have it behind the commands."""
 
-    def deviation_arcmin(result: Result) -> float:
+    def arcmin(result: Result) -> float:
         """Median distance from the setpoint, world 0, while it stands [arcmin]."""
         run = trajectory_of(result).of_worlds(slice(0, 1))
         t, u, x3 = (
@@ -113,25 +113,25 @@ def test_only_the_runs_behind_a_gap_have_one(results: Loops) -> None:
         return float(np.degrees(np.median(np.abs(x3 - followed)))) * 60.0
 
     for name in OBSERVERS:
-        assert all(deviation_arcmin(by_name[name]) < 2.5 for by_name in results.by_bias.values())
-        assert 7.0 < deviation_arcmin(results.gap[name]) < 11.0
+        assert all(arcmin(by_name[name]) < 2.5 for by_name in runs.by_bias.values())
+        assert 7.0 < arcmin(runs.gap[name]) < 11.0
     # The same seeds: until the push the rigs differ by their bias alone.
-    unbiased, biased = (trajectory_of(results.by_bias[e]["homogeneous"]) for e in (0.0, 0.5))
+    unbiased, biased = (trajectory_of(runs.by_bias[e]["homogeneous"]) for e in (0.0, 0.5))
     noise = unbiased["y1_rad"] - unbiased["x1_rad"], biased["y1_rad"] - biased["x1_rad"]
     assert np.corrcoef(noise[0][:100, 0], noise[1][:100, 0])[0, 1] > 0.9
 
 
-def test_the_late_window_does_not_hold_the_pushs_tail(results: Loops) -> None:
+def test_the_late_window_does_not_hold_the_pushs_tail(runs: Loops) -> None:
     for name in OBSERVERS:
-        late = deviation(results.by_bias[0.25][name])
+        late = deviation(runs.by_bias[0.25][name])
         assert late is not None
-        assert tail(results.quiet[name]) < 0.1 * late.mean
+        assert tail(runs.quiet[name]) < 0.1 * late.mean
         # An end at 7 s would be mostly tail with (9): the window is judged by what it leaves out.
-        early = trajectory_of(results.quiet[name]).between(3.0, 7.0)["x1_rad"]
-        assert np.degrees(early).std() > 5.0 * tail(results.quiet[name])
+        early = trajectory_of(runs.quiet[name]).between(3.0, 7.0)["x1_rad"]
+        assert np.degrees(early).std() > 5.0 * tail(runs.quiet[name])
 
 
-def test_verdicts_follow_the_lags_and_the_cycles(results: Loops, lags: Lags, cycles: Cycles) -> None:
+def test_verdicts_follow_the_lags_and_the_cycles(runs: Loops, lags: Lags, cycles: Cycles) -> None:
     """The lags and cycles that the verdicts rest on are exchanged."""
 
     def replace_lags(name: str, sustained: bool) -> Lags:
@@ -142,12 +142,11 @@ def test_verdicts_follow_the_lags_and_the_cycles(results: Loops, lags: Lags, cyc
         return cycles._replace(ends=cycles.ends | ends)
 
     rest_cycle = Cycle(False, 0.0, 0.1)
-    assert figure_4(results, lags, replace_cycles(linear=rest_cycle)).verdict == "not reproduced"
-    assert figure_4(results, replace_lags("linear", True), replace_cycles(linear=rest_cycle)).verdict == "reproduced"
-    assert figure_5(results, lags, replace_cycles(luenberger=rest_cycle)).verdict == "not reproduced"
+    assert figure_4(runs, lags, replace_cycles(linear=rest_cycle)).verdict == "not reproduced"
+    assert figure_4(runs, replace_lags("linear", True), replace_cycles(linear=rest_cycle)).verdict == "reproduced"
+    assert figure_5(runs, lags, replace_cycles(luenberger=rest_cycle)).verdict == "not reproduced"
     assert (
-        figure_5(results, replace_lags("luenberger", True), replace_cycles(luenberger=rest_cycle)).verdict
-        == "reproduced"
+        figure_5(runs, replace_lags("luenberger", True), replace_cycles(luenberger=rest_cycle)).verdict == "reproduced"
     )
     assert figure_6_at_rest(lags, replace_cycles(homogeneous=rest_cycle)).verdict == "reproduced"
     quiet = replace_cycles(homogeneous=rest_cycle, linear=rest_cycle, luenberger=rest_cycle)
@@ -156,9 +155,9 @@ def test_verdicts_follow_the_lags_and_the_cycles(results: Loops, lags: Lags, cyc
     assert cause_of_figure_5(replace_cycles(**{WITH_Y2: Cycle(True, 0.12, 1.0)})).verdict == "not reproduced"
 
 
-def test_figure_6_with_a_fall(results: Loops, cycles: Cycles) -> None:
-    fallen = replace_outcomes(results.gap["homogeneous"], results.gap["homogeneous"].values(VELOCITY), fell=1)
-    claim = figure_6(results._replace(gap=results.gap | {"homogeneous": fallen}), cycles)
+def test_figure_6_with_a_fall(runs: Loops, cycles: Cycles) -> None:
+    fallen = replace_outcomes(runs.gap["homogeneous"], runs.gap["homogeneous"].values(VELOCITY), fell=1)
+    claim = figure_6(runs._replace(gap=runs.gap | {"homogeneous": fallen}), cycles)
     assert claim.verdict == "not reproduced"
     assert claim.figures["largest_fell_fraction"] == pytest.approx(0.25)
 
@@ -222,24 +221,22 @@ def test_section_6_needs_both_steps_and_no_fall() -> None:
     )
 
 
-def test_verdict_of_the_comparison_follows_the_errors(results: Loops) -> None:
+def test_verdict_of_the_comparison_follows_the_errors(runs: Loops) -> None:
     def spoil(by_name: Mapping[str, Result]) -> dict[str, Result]:
         errors = 2.0 * by_name["linear"].values(VELOCITY)
         return {**by_name, "homogeneous": replace_outcomes(by_name["homogeneous"], errors)}
 
-    one_setting = results.by_bias | {0.25: spoil(results.by_bias[0.25])}
-    assert comparison.best_claim(results._replace(by_bias=one_setting)).verdict == "not reproduced"
-    everywhere = {e: spoil(by_name) for e, by_name in results.by_bias.items()}
-    spoilt_results = results._replace(by_bias=everywhere, gap=spoil(results.gap))
+    one_setting = runs.by_bias | {0.25: spoil(runs.by_bias[0.25])}
+    assert comparison.best_claim(runs._replace(by_bias=one_setting)).verdict == "not reproduced"
+    everywhere = {e: spoil(by_name) for e, by_name in runs.by_bias.items()}
+    spoilt_results = runs._replace(by_bias=everywhere, gap=spoil(runs.gap))
     assert comparison.model_based(spoilt_results).verdict == "not reproduced"
 
 
-def test_the_three_pictures_share_their_scales(results: Loops, lags: Lags, cycles: Cycles) -> None:
+def test_the_three_pictures_share_their_scales(runs: Loops, lags: Lags, cycles: Cycles) -> None:
     from cmg_mj.papers.scales import on_common_scales
 
-    claims = on_common_scales(
-        [figure_4(results, lags, cycles), figure_5(results, lags, cycles), figure_6(results, cycles)]
-    )
+    claims = on_common_scales([figure_4(runs, lags, cycles), figure_5(runs, lags, cycles), figure_6(runs, cycles)])
     panels = [panel for claim in claims for panel in claim.pictures[0].panels]
     assert {panel.y_label for panel in panels} >= {"tilt [deg]", "tilt rate [rad/s]"}
     for label in {panel.y_label for panel in panels}:

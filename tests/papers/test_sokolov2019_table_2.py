@@ -52,10 +52,10 @@ def test_the_printed_values_must_be_best_on_one_recording() -> None:
     def verdict(*by_observer: Sequence[NoiseLevelResult]) -> str:
         return table_2.claim({"a push": dict(zip(OBSERVERS, by_observer, strict=True))}).verdict
 
-    conditional = "reproduced within stated conditions"
-    assert verdict([TIED], [TIED], [TIED]) == conditional
+    partly = "reproduced within stated conditions"
+    assert verdict([TIED], [TIED], [TIED]) == partly
     assert verdict([TIED], [BEATEN], [TIED]) == "not reproduced"
     assert verdict([TIED, BEATEN], [BEATEN, TIED], [TIED, TIED]) == "not reproduced"  # not at the same noise
-    assert verdict([TIED, BEATEN], [TIED, BEATEN], [TIED, BEATEN]) == conditional
+    assert verdict([TIED, BEATEN], [TIED, BEATEN], [TIED, BEATEN]) == partly
     assert table_2.none_better([TIED, TIED])
     assert not table_2.none_better([TIED, BEATEN])

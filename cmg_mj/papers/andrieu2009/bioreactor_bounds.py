@@ -123,12 +123,10 @@ def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> Incre
     c_inf = reactor.c_inf(p, points)
     local = np.abs((m2 + m3 * x2_hat) * x2 ** (1.0 - p) + m3 * x2 ** (2.0 - p))
     # The bounds do not depend on x2: one value of it will do.
-    point = x1[:, :1], x2_hat[:, :1], u[:, :1]
-    Omega1 = reactor.Omega1(point[2], point[0], point[1])
-    Omega2, Omega2_printed = (
-        reactor.Omega2(point[2], point[0], point[1], p, with_misprint=flag) for flag in (False, True)
-    )
-    slope = np.abs(reactor.f2_slope(point[0], point[1], point[2]))
+    point = u[:, :1], x1[:, :1], x2_hat[:, :1]
+    Omega1 = reactor.Omega1(*point)
+    Omega2, Omega2_printed = (reactor.Omega2(*point, p, with_misprint=flag) for flag in (False, True))
+    slope = np.abs(reactor.f2_slope(*point[1:], point[0]))
 
     def largest_quotient(Omega: np.ndarray, c: np.ndarray | float) -> float:
         return float((increment / np.where(distinct, Omega * d + c * d ** (1.0 + p), 1.0)).max())
@@ -153,9 +151,7 @@ def increments() -> Claim:
     """Judge the two inequalities, and the misprint."""
     quotients = increments_over_domain(HBAR_OF_OBSERVERS)
     bounds_hold = max(quotients.by_Omega1, quotients.by_Omega2, quotients.by_Omega2_local) <= 1.0 + ROUNDING
-    misprint = (
-        quotients.by_Omega2_local_printed > 1.0 + ROUNDING or quotients.slope_over_Omega2_printed > 1.0 + ROUNDING
-    )
+    misprint = max(quotients.by_Omega2_local_printed, quotients.slope_over_Omega2_printed) > 1.0 + ROUNDING
     correction = (
         "With m3, not m2, in the last term of Omega_2: only then is it the first of the two terms into which the "
         "secant's slope is parted."

@@ -123,9 +123,8 @@ def decay(W: Lyapunov, b: float, spread: float = 0.0, grid: States | None = None
         c1 and c2.
     """
     grid = states() if grid is None else grid
-    distinct = np.abs(grid.s1 - grid.s2) > 1e-9 * np.maximum(
-        np.abs(grid.s1), np.abs(grid.s2)
-    )  # else W is rounding errors
+    # Where s1 and s2 are nearer, W is rounding errors.
+    distinct = np.abs(grid.s1 - grid.s2) > 1e-9 * np.maximum(np.abs(grid.s1), np.abs(grid.s2))
     grid = States(grid.s1[distinct], grid.s2[distinct])
     (e1, e2), (by_e1, by_e2), value = W.E(grid), W.gradient(grid), W.W(grid)
     k1, k2 = W.K(e1)

@@ -157,7 +157,4 @@ def loop_ratios(trials: Sequence[tuple[Tuning, NoiseLevelResult, Push]], worlds:
         for settings in ([], tuned_settings):
             runs.append(run_of(push_recovery(case.observer, seed, [*push.settings, noise, *settings]), worlds))
     errors = [result.values("velocity_rms_error_rad_s") for result in run_side_by_side(runs, keep_trajectory=False)]
-    return [
-        ratio_interval(printed_errors, tuned_settings)
-        for printed_errors, tuned_settings in zip(errors[::2], errors[1::2], strict=True)
-    ]
+    return [ratio_interval(table, tuned) for table, tuned in zip(errors[::2], errors[1::2], strict=True)]

@@ -19,14 +19,7 @@ from scipy.linalg import expm
 
 from cmg_mj.errors import InputError
 from cmg_mj.observers.reduced_model import is_hurwitz
-from cmg_mj.papers.dao2023.matrices import (
-    require_positive_definite,
-    require_real,
-    require_real_matrix,
-    require_shape,
-    solve,
-    times,
-)
+from cmg_mj.papers.dao2023.matrices import require_positive_definite, require_shape, solve, times, to_matrix, to_real
 from cmg_mj.papers.require import require_positive
 
 
@@ -50,7 +43,7 @@ class System:
 
     def __post_init__(self) -> None:
         for name in ("A", "B0", "B2", "C2", "D20"):
-            object.__setattr__(self, name, require_real(name, getattr(self, name)))
+            object.__setattr__(self, name, to_real(name, getattr(self, name)))
 
 
 class State(NamedTuple):
@@ -108,7 +101,7 @@ class FriedlandTacker:
     def __post_init__(self) -> None:
         object.__setattr__(self, "dt", require_positive("dt", self.dt))
         for name in ("Am", "Cm", "L", "Gamma", "Sigma"):
-            object.__setattr__(self, name, require_real_matrix(name, getattr(self, name)))
+            object.__setattr__(self, name, to_matrix(name, getattr(self, name)))
         nm, p = self.Am.shape[-1], self.L.shape[-1]
         require_shape("Am", self.Am, (nm, nm), "square")
         if self.Am.ndim > 2 or self.Cm.ndim > 2:
@@ -132,7 +125,7 @@ class FriedlandTacker:
         Returns:
             The observer; its T is the papers' Upsilon.
         """
-        r = require_real_matrix("Gamma", Gamma).shape[-1]
+        r = to_matrix("Gamma", Gamma).shape[-1]
         return cls(dt, np.zeros((r, r)), np.eye(r), L, Gamma, Sigma)
 
     @property
@@ -178,10 +171,10 @@ class FriedlandTacker:
             ValueError: A vector or matrix does not fit.
         """
         n, p, _, nm = self.sizes.values()
-        y = require_real("y", y)
-        x = np.zeros(n) if x is None else require_real("x", x)
-        xm = np.zeros(nm) if xm is None else require_real("xm", xm)
-        T = np.zeros((n, nm)) if T is None else require_real("T", T)
+        y = to_real("y", y)
+        x = np.zeros(n) if x is None else to_real("x", x)
+        xm = np.zeros(nm) if xm is None else to_real("xm", xm)
+        T = np.zeros((n, nm)) if T is None else to_real("T", T)
         require_shape("y", y, (p,), "(p,), p the columns of L")
         require_shape("x", x, (n,), "(n,), n the rows of L")
         require_shape("xm", xm, (nm,), "(nm,), as Am")
@@ -216,10 +209,10 @@ class FriedlandTacker:
         Raises:
             ValueError: A matrix or vector does not fit.
         """
-        u, y = require_real("u", u), require_real("y", y)
-        L = self.L if L is None else require_real("L", L)
-        C2 = system.C2 if C2 is None else require_real("C2", C2)
-        D20 = system.D20 if D20 is None else require_real("D20", D20)
+        u, y = to_real("u", u), to_real("y", y)
+        L = self.L if L is None else to_real("L", L)
+        C2 = system.C2 if C2 is None else to_real("C2", C2)
+        D20 = system.D20 if D20 is None else to_real("D20", D20)
         self._check(system, u, y, L, C2, D20)
         h = self.dt
         F, F_back, Cm_middle = self._turn

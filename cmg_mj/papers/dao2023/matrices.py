@@ -18,7 +18,7 @@ def require_shape(name: str, value: np.ndarray, shape: tuple[int, ...], words: s
         raise InputError(f"{name}: must have the shape {shape}, {words}; it has {value.shape}")
 
 
-def require_real(name: str, value: Any) -> np.ndarray:
+def to_real(name: str, value: Any) -> np.ndarray:
     """Return an array of floats; refuse what is not real numbers."""
     try:
         array = np.asarray(value)
@@ -29,9 +29,9 @@ def require_real(name: str, value: Any) -> np.ndarray:
     return array.astype(float, copy=False)
 
 
-def require_real_matrix(name: str, value: Any) -> np.ndarray:
+def to_matrix(name: str, value: Any) -> np.ndarray:
     """Return an array of floats with at least two dimensions; refuse what is not finite."""
-    matrix = require_real(name, value)
+    matrix = to_real(name, value)
     if matrix.ndim < 2 or not np.isfinite(matrix).all():
         fault = f"not of shape {matrix.shape}" if matrix.ndim else f"not a scalar; for one number write [[{matrix:g}]]"
         raise InputError(f"{name}: must be a matrix of finite numbers, {fault}")

@@ -145,10 +145,7 @@ def claim(results: Lags) -> Claim:
     """Judge section V: the differentiator's lag."""
     own_lag, lags, latencies = results.own_lag_s, results.thresholds, results.latencies
     linear = results.predictions["linear"]
-    threshold, least = (
-        lags["linear"],
-        min(lags[name].low for name in ("luenberger", "homogeneous")),
-    )
+    begin, least = lags["linear"], min(lags[name].low for name in ("luenberger", "homogeneous"))
     return Claim(
         place="Section V, the lag",
         statement="Finite differences lag, and the lag brings the loop into sustained oscillations.",
@@ -161,18 +158,18 @@ def claim(results: Lags) -> Claim:
             "flywheel then turns the gimbal back, which damps the tilt."
         ),
         table=_table(results),
-        holds=threshold.high is not None and threshold.high < least,
+        holds=begin.high is not None and begin.high < least,
         conditions=(
-            f"It does with a servo lag from {in_ms(threshold.middle)} or a latency of y1 from "
+            f"It does with a servo lag from {in_ms(begin.middle)} or a latency of y1 from "
             f"{in_ms(latencies['linear'].high)}; at the model's servo lag of {in_ms(own_lag)} the oscillation decays."
-            if threshold.middle is not None and threshold.middle > own_lag
+            if begin.middle is not None and begin.middle > own_lag
             else ""
         ),
         otherwise="The loop of (8) is not the first to oscillate.",
         figures={
             "servo_lag_of_the_model_s": own_lag,
-            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in lags.items()},
-            "latency_threshold_s": {name: list(threshold) for name, threshold in latencies.items()},
+            "servo_lag_threshold_s": {name: list(begin) for name, begin in lags.items()},
+            "latency_threshold_s": {name: list(begin) for name, begin in latencies.items()},
             "predicted": {
                 name: {
                     "servo_lag_s": p.servo_lag_s,
@@ -189,21 +186,21 @@ def claim(results: Lags) -> Claim:
     )
 
 
-def _table(lags: Lags) -> str:
+def _table(results: Lags) -> str:
     rows = []
     for name, equation in (OBSERVERS | {"truth": "true rate in the law"}).items():
-        lag, latency, prediction = (
-            lags.thresholds.get(name),
-            lags.latencies.get(name),
-            lags.predictions.get(name),
+        lag, latency, forecast = (
+            results.thresholds.get(name),
+            results.latencies.get(name),
+            results.predictions.get(name),
         )
         rows.append(
             (
                 equation,
                 "-" if lag is None else in_ms(lag.middle, f"none up to {1e3 * LAGS_S[-1]:.0f} ms"),
-                "-" if prediction is None else in_ms(prediction.servo_lag_s),
+                "-" if forecast is None else in_ms(forecast.servo_lag_s),
                 "-" if latency is None else in_ms(latency.high, f"none up to {LARGEST_LATENCY_STEPS} ms"),
-                "-" if prediction is None or name == "truth" else in_ms(prediction.latency_s),
+                "-" if forecast is None or name == "truth" else in_ms(forecast.latency_s),
             )
         )
     headings = ("", "servo lag, MuJoCo", "by eigenvalues", "latency of y1, MuJoCo", "by eigenvalues")
