@@ -77,3 +77,12 @@ class Section:
     title: str
     seconds: float
     claims: Callable[[OnShare], list[Claim]]
+
+
+def obtain(parts: Sequence[Callable[[], Claim]], on_share: OnShare) -> list[Claim]:
+    """Obtain claims one by one, and report the share done before each."""
+    claims = []
+    for i, part in enumerate(parts):
+        on_share(i / len(parts))
+        claims.append(part())
+    return claims

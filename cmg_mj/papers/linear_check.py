@@ -33,6 +33,12 @@ def finite_difference_error(model: ReducedModel, h: float = 1e-5) -> float:
     return float(max(np.abs(A - model.A).max() / np.abs(A).max(), np.abs(B - model.B).max() / np.abs(B).max()))
 
 
+def model_difference(model: ReducedModel, printed: ReducedModel) -> float:
+    """Return the largest relative difference of a reduced model's constants from the printed ones."""
+    names = ("J1", "J2", "J_d", "omega_d", "gravity_torque")
+    return max(abs(getattr(model, name) / getattr(printed, name) - 1.0) for name in names)
+
+
 def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[np.ndarray, np.ndarray]:
     """Solve x' = A x + B u, u = -K x + k1 e for its rest. With y1 = x1 - e the bias enters with a plus.
 

@@ -9,19 +9,14 @@ import numpy as np
 
 from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor
 from cmg_mj.papers.andrieu2009.paper import HBAR, HBAR_OF_OBSERVERS, NOISE, U_MAX, P
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim, OnShare, obtain
 
 ROUNDING = 1e-9
 
 
 def claims(on_share: OnShare) -> list[Claim]:
     """Judge (14), (15), Omega_1, Omega_2 and their order, the noise."""
-    parts = [invariance, coordinates, increments, order_of_bounds, noise_level]
-    results = []
-    for i, part in enumerate(parts):
-        on_share(i / len(parts))
-        results.append(part())
-    return results
+    return obtain([invariance, coordinates, increments, order_of_bounds, noise_level], on_share)
 
 
 def least_inflow(reactor: Bioreactor, u_min: float, u_max: float, points: int = 401) -> float:

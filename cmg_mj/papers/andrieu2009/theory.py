@@ -15,25 +15,15 @@ from cmg_mj.papers.andrieu2009.finite_escape import no_observer_beyond_1
 from cmg_mj.papers.andrieu2009.increments import exponent_of_6, increments, linear_increments
 from cmg_mj.papers.andrieu2009.paper import B, P
 from cmg_mj.papers.andrieu2009.theorem_1 import theorem_1
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim, OnShare, obtain
 from cmg_mj.results import markdown
 
 
 def claims(on_share: OnShare) -> list[Claim]:
     """Judge sections 1, 2 and 4."""
-    parts = [
-        lambda: [linear_increments(), increments(), exponent_of_6()],
-        lambda: [no_observer_beyond_1(), scaling_conditions(), gain_tracking()],
-        lambda: [theorem_2()],
-        lambda: [equations_19_20.claim()],
-        lambda: [theorem_1()],
-        equations_11_12.claims,
-    ]
-    results: list[Claim] = []
-    for i, part in enumerate(parts):
-        on_share(i / len(parts))
-        results += part()
-    return results
+    parts = [linear_increments, increments, exponent_of_6, no_observer_beyond_1, scaling_conditions, gain_tracking]
+    parts += [theorem_2, equations_19_20.claim, theorem_1]
+    return [*obtain(parts, on_share), *equations_11_12.claims()]
 
 
 def scaling_conditions() -> Claim:

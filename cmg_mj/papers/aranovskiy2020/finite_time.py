@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.elementwise import signed_power
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
 from cmg_mj.papers.claim import Claim, OnShare
@@ -69,12 +70,9 @@ def decay(alpha: float) -> Decay:
     """
     k1, k2, _ = TABLE_2["homogeneous"].values()
 
-    def power(x: float, exponent: float) -> float:
-        return math.copysign(abs(x) ** exponent, x)
-
     def slope(z1: float, z2: float, log_r: float) -> tuple[float, float, float, float]:
-        f1, f2 = z2 - k1 * power(z1, alpha), -k2 * power(z1, 2.0 * alpha - 1.0)
-        fall = z1 * f1 + power(z2, 2.0 / alpha - 1.0) * f2 / alpha
+        f1, f2 = z2 - k1 * signed_power(z1, alpha), -k2 * signed_power(z1, 2.0 * alpha - 1.0)
+        fall = z1 * f1 + signed_power(z2, 2.0 / alpha - 1.0) * f2 / alpha
         fall /= z1 * z1 + abs(z2) ** (2.0 / alpha)  # 1, but for this it would stray from it
         return f1 - fall * z1, f2 - alpha * fall * z2, fall, math.exp((1.0 - alpha) * log_r)
 
@@ -95,16 +93,19 @@ def decay(alpha: float) -> Decay:
     return Decay(-lowest / math.log(10.0), time, np.exp(alpha * log_r) * z2)
 
 
+def rates_at_rest(alpha: float, dt: float, span_s: float, **start: float) -> np.ndarray:
+    """Run the bench's (11) at rest from a wrong state, without noise: sizes of its rate, (n_samples,) [rad/s]."""
+    observer, rest = make_observer("homogeneous", dt, printed_model(), alpha=alpha), Measurement(0.0, 0.0)
+    state, rates = observer.init(rest)._replace(**start), []
+    for _ in range(round(span_s / dt)):
+        state, estimate = observer.step(state, rest, 0.0)
+        rates.append(abs(estimate.x2))
+    return np.array(rates)
+
+
 def observer_decay_time(alpha: float) -> float:
     """Return the time from which the bench's observer, sampled often, has an error below `SEEN` [s]."""
-    observer = make_observer("homogeneous", FINE_DT, printed_model(), alpha=alpha)
-    rest_measurement = Measurement(0.0, 0.0)
-    state = observer.init(rest_measurement)._replace(x2=1.0)
-    errors = []
-    for _ in range(round(1.5 / FINE_DT)):
-        state, estimate = observer.step(state, rest_measurement, 0.0)
-        errors.append(abs(estimate.x2))
-    return float((np.flatnonzero(np.array(errors) > SEEN)[-1] + 2) * FINE_DT)
+    return float((np.flatnonzero(rates_at_rest(alpha, FINE_DT, 1.5, x2=1.0) > SEEN)[-1] + 2) * FINE_DT)
 
 
 def finite_time_claim() -> Claim:

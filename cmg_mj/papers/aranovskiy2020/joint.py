@@ -8,7 +8,7 @@ from typing import NamedTuple
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, beats_zero, level_at
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.words import join_with_and
+from cmg_mj.papers.words import join_with_and, with_ends
 from cmg_mj.studies.tuning import NoiseLevelResult
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
@@ -77,10 +77,7 @@ def joint_claim(studies: Studies) -> Claim:
     nearest, candidates = nearest_joint(studies), list(experiments(studies))
     tunable = [experiment for experiment in candidates if experiment.beats_zero]
     least = min(candidates, key=lambda experiment: experiment.largest_ratio)
-    ratios = "; ".join(
-        f"{OBSERVERS[name]} {level.ratio.mean:.3f} ({level.ratio.low:.3f} to {level.ratio.high:.3f})"
-        for name, level in nearest.levels.items()
-    )
+    ratios = "; ".join(f"{OBSERVERS[name]} {with_ends(level.ratio)}" for name, level in nearest.levels.items())
     misfits = [OBSERVERS[name] for name in nearest.levels if name not in nearest.best_observers]
     return Claim(
         place="Table 2, the three together",

@@ -8,10 +8,8 @@ import numpy as np
 
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT
+from cmg_mj.papers.aranovskiy2020.rig import DT, replay_at_rest
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.replay import replay
-from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 76_000
@@ -33,11 +31,7 @@ def trade(tau: float, seed: int = SEED) -> Trade:
     acceleration = 0.3
     noise = np.random.default_rng(seed).normal(0.0, 1.0, (len(time), 8))
     y1 = np.column_stack([acceleration * time**2 / 2.0, noise])
-    zeros = np.zeros_like(y1)
-    x2 = replay(
-        make_observer("linear", DT, printed_model(), tau=tau),
-        Trajectory({"time_s": time, "y1_rad": y1, "y2_rad": zeros, "u_rad_s": zeros}),
-    ).x2
+    x2 = replay_at_rest(make_observer("linear", DT, printed_model(), tau=tau), y1).x2
     late = time[-1] - x2[-1, 0] / acceleration
     return Trade(float(late), float(np.sqrt(np.mean(x2[settling_ticks:, 1:] ** 2))))
 

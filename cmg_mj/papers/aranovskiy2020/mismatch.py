@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from cmg_mj.papers.aranovskiy2020.rig import push_recovery
+from cmg_mj.papers.aranovskiy2020.rig import push_recovery, run_on_rigs
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.result import Result
 
@@ -102,7 +102,6 @@ def run_all(
     rigs = [load_plant(experiment.scenario.plant) for _ in range(1 + len(cases))]
     for rig, (mismatch, size) in zip(rigs[1:], cases, strict=True):
         mismatch.change(rig, size)
-    plants = [rig for rig in rigs for _ in range(worlds)]
-    symmetric, *broken = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).split(len(rigs))
+    symmetric, *broken = run_on_rigs(experiment, rigs, worlds)
     kinds = [(mismatch.kind, size) for mismatch, size in cases]
     return MismatchRuns(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))

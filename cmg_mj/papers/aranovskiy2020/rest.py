@@ -10,11 +10,10 @@ import numpy as np
 
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import K_E, gimbal_rest, integrator_rest, printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT, push_recovery
+from cmg_mj.papers.aranovskiy2020.rig import DT, push_recovery, replay_at_rest
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
-from cmg_mj.replay import replay
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
@@ -107,8 +106,7 @@ def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple
     ticks, settling, copies = 1200, 400, 64
     noise = np.random.default_rng(seed).normal(0.0, sigma, (ticks, copies))
     noise = np.hstack([noise, -noise])  # whose mean is zero
-    columns = {"y1_rad": noise - math.radians(e_deg), "y2_rad": np.zeros_like(noise), "u_rad_s": np.zeros_like(noise)}
-    estimate = replay(make_observer(observer, DT, printed_model()), Trajectory(columns))
+    estimate = replay_at_rest(make_observer(observer, DT, printed_model()), noise - math.radians(e_deg))
     return float(estimate.x1[settling:].mean()), float(estimate.x2[settling:].mean())
 
 

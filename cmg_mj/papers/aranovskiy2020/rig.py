@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 
+import numpy as np
+
+from cmg_mj.observers import Estimate, Observer
 from cmg_mj.papers.recorded import trajectory_of
+from cmg_mj.plant.plant import Plant
+from cmg_mj.replay import replay
+from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
@@ -38,3 +44,15 @@ def push_recovery(observer: str, seed: int, settings: Sequence[str] = (), durati
 def run_of_10(seed: int) -> Trajectory:
     """Six seconds of one world with (10) in the loop, which its forms are replayed on."""
     return trajectory_of(push_recovery("ltv", seed, duration_s=6.0).run())
+
+
+def run_on_rigs(experiment: Experiment, rigs: Sequence[Plant], worlds: int) -> list[Result]:
+    """Run the same worlds on every rig, all in one batch; a result a rig."""
+    plants = [rig for rig in rigs for _ in range(worlds)]
+    return experiment.run_many([*range(worlds)] * len(rigs), plants=plants).split(len(rigs))
+
+
+def replay_at_rest(observer: Observer, y1: np.ndarray) -> Estimate:
+    """Replay an observer on measured tilts, (n_ticks, n_worlds) [rad], with the gimbals at rest: y2 = u = 0."""
+    zeros = np.zeros_like(y1)
+    return replay(observer, Trajectory({"y1_rad": y1, "y2_rad": zeros, "u_rad_s": zeros}))

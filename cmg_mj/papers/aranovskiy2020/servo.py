@@ -8,7 +8,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery, run_on_rigs
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.plant.plant import Plant, load_plant
@@ -77,8 +77,7 @@ def run(worlds: int, seed: int, duration_s: float = DURATION_S) -> Servos:
     rigs = [load_plant(experiment.scenario.plant) for _ in cases]
     for rig, case in zip(rigs, cases, strict=True):
         in_velocity_mode(rig, *case)
-    plants = [rig for rig in rigs for _ in range(worlds)]
-    *groups, soft = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).split(len(rigs))
+    *groups, soft = run_on_rigs(experiment, rigs, worlds)
     return Servos(experiment.run_many(worlds), dict(zip(DEADBANDS, groups, strict=True)), soft)
 
 

@@ -15,6 +15,7 @@ from cmg_mj.papers.aranovskiy2020.retuned import (
 )
 from cmg_mj.papers.aranovskiy2020.tuning_procedure import LOOP_SHARE, procedure_claim, run_trials
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.words import with_ends
 from cmg_mj.studies.tuning import NoiseLevelResult
 
 
@@ -38,8 +39,8 @@ def table_2_claim(case: Tuning, studies: Studies, experiment: JointExperiment) -
             f"Fitted on {len(level.rms)} seeds, scored on as many others, from the push to a second after it. At "
             f"{experiment.words}, where the three lines come nearest to being the best together, the best is "
             f"{_sizes(level)}. Table 2's error is {level.given_rms.mean():.4f} rad/s, that of the tuned "
-            f"{level.rms.mean():.4f}, the ratio {_ratio(level)}. That of an estimate of zero is {level.zero_rms:.4f}. "
-            f"{_describe_all_pushes(case, studies)}"
+            f"{level.rms.mean():.4f}, the ratio {with_ends(level.ratio)}. That of an estimate of zero is "
+            f"{level.zero_rms:.4f}. {_describe_all_pushes(case, studies)}"
         ),
         holds=is_best(level) and is_tunable,
         conditions=(
@@ -105,10 +106,6 @@ def least_lost(case: Tuning, studies: Studies) -> NoiseLevelResult:
 
 def _sizes(level: NoiseLevelResult) -> str:
     return ", ".join(f"{name} = {size:.4g}" for name, size in level.sizes.items())
-
-
-def _ratio(level: NoiseLevelResult) -> str:
-    return f"{level.ratio.mean:.3f} ({level.ratio.low:.3f} to {level.ratio.high:.3f})"
 
 
 def claims(on_share: OnShare) -> list[Claim]:

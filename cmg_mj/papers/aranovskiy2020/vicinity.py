@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.observers import make_observer
+from cmg_mj.papers.aranovskiy2020.finite_time import rates_at_rest
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT
+from cmg_mj.papers.aranovskiy2020.rig import DT, replay_at_rest
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import rms
-from cmg_mj.replay import replay
-from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 77_000
@@ -32,14 +31,8 @@ SEEN_RAD_S = 0.01
 
 def remaining_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, span_s: float = 3.0) -> float:
     """Return what is left of a wrong rate without bias, noise or motion, by its first size: the last 0.5 s' largest."""
-    observer = make_observer("homogeneous", dt, printed_model(), alpha=alpha)
-    rest_measurement = Measurement(0.0, 0.0)
-    state = observer.init(rest_measurement)._replace(x1=0.05, x2=first_rad_s)
-    errors = []
-    for _ in range(round(span_s / dt)):
-        state, estimate = observer.step(state, rest_measurement, 0.0)
-        errors.append(abs(estimate.x2 / first_rad_s))
-    return float(max(errors[-round(0.5 / dt) :]))
+    rates = rates_at_rest(alpha, dt, span_s, x1=0.05, x2=first_rad_s)
+    return float(rates[-round(0.5 / dt) :].max() / abs(first_rad_s))
 
 
 def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
@@ -49,9 +42,8 @@ def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
         alpha: The exponent.
         y1: What is measured, (n_ticks, n_worlds) [rad].
     """
-    columns = {"y1_rad": y1, "y2_rad": np.zeros_like(y1), "u_rad_s": np.zeros_like(y1)}
     observer = make_observer("homogeneous", DT, printed_model(), alpha=alpha)
-    return rms(replay(observer, Trajectory(columns)).x2[len(y1) // 2 :])
+    return rms(replay_at_rest(observer, y1).x2[len(y1) // 2 :])
 
 
 def bias_bound(alpha: float, e_rad: float) -> float:

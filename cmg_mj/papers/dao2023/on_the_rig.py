@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim, OnShare, obtain
 from cmg_mj.papers.dao2023 import adaptive_rig as rig
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import mean_interval
@@ -18,12 +18,7 @@ WITHIN_DEG = 0.15
 
 def claims(on_share: OnShare) -> list[Claim]:
     """Judge the bias, the velocity, torques."""
-    results = [bias()]
-    on_share(0.25)
-    results.append(velocity())
-    on_share(0.8)
-    results.append(torques())
-    return results
+    return obtain([bias, velocity, torques], on_share)
 
 
 def share_within(errors: np.ndarray, bound: float) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.elementwise import signed_power
 from cmg_mj.observers.reduced_model import ReducedModel
 
 TABLE_I = {
@@ -87,6 +88,5 @@ def rest_of_9(model: ReducedModel, e: float) -> np.ndarray:
 def rest_of_10(model: ReducedModel, e: float) -> float:
     """Return the rate of (10) at x = u = 0, y1 = -e: k1 [e_b]^alpha, k2 [e_b]^(2 alpha - 1) = f2(y) [rad/s]."""
     k1, k2, alpha = TABLE_II["homogeneous"].values()
-    drift = float(model.terms(-e, 0.0)[0])
-    e_b = math.copysign((abs(drift) / k2) ** (1.0 / (2.0 * alpha - 1.0)), drift)
-    return k1 * math.copysign(abs(e_b) ** alpha, e_b)
+    e_b = signed_power(float(model.terms(-e, 0.0)[0]) / k2, 1.0 / (2.0 * alpha - 1.0))
+    return k1 * signed_power(e_b, alpha)
