@@ -41,16 +41,7 @@ class Study(NamedTuple):
 
 
 def study(seeds: int, seed: int = 0, dt: float = 0.01) -> Study:
-    """Simulate. All noise levels are columns of the same arrays, which costs no time.
-
-    Args:
-        seeds: How many.
-        seed: The first of them.
-        dt: Sample period.
-
-    Returns:
-        The simulations.
-    """
+    """Simulate. All noise levels are columns of the same arrays, which costs no time."""
     numbers = [*range(seed, seed + seeds)] * 2 + [seed]
     noise = [NOISE] * seeds + [LOUD] * seeds + [0.0]
     whole_run = run_plant(numbers, noise, dt)

@@ -72,14 +72,7 @@ class Measure(NamedTuple):
 
 
 def read_measures(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measure]:
-    """Read the measures off the runs.
-
-    Args:
-        results: Which angles the law is fed with -> observer -> runs.
-
-    Returns:
-        One a measure.
-    """
+    """Read the measures off the runs: angle source -> observer -> runs."""
     return [
         Measure(
             key,
@@ -93,14 +86,7 @@ def read_measures(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[M
 
 
 def order(measures: list[Measure]) -> Claim:
-    """Judge section V's ranking.
-
-    Args:
-        measures: The measures, that of `JUDGED` among them.
-
-    Returns:
-        The claim.
-    """
+    """Judge Section V's ranking by the measures, that of `JUDGED` among them."""
     verdict_measure = next(measure for measure in measures if measure.key == JUDGED)
     worlds = len(next(iter(verdict_measure.numbers.values()))["linear"])
     return Claim(

@@ -78,15 +78,7 @@ class Residuals(NamedTuple):
 
 
 def residuals(states: int, seed: int) -> Residuals:
-    """Compare (3) with MuJoCo at random symmetric states, under random symmetric torques.
-
-    Args:
-        states: How many.
-        seed: Of the random numbers.
-
-    Returns:
-        The residuals.
-    """
+    """Compare (3) with MuJoCo at random symmetric states, under random symmetric torques."""
     plant = balanced_rig()
     model = copy(plant.model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)

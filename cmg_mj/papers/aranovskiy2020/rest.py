@@ -147,14 +147,7 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
 
 
 def observers_claim(rests: Mapping[str, Rest]) -> Claim:
-    """Judge the rest with an observer in the law, which the bias biases.
-
-    Args:
-        rests: By case, the true rate among them.
-
-    Returns:
-        The claim.
-    """
+    """Judge the rests by case, with an observer in the law, which the bias biases."""
     observer_rests = {case: rest for case, rest in rests.items() if case != TRUE_RATE}
     example = rests[TRUE_RATE].example
     sigma = float(np.std(example["y1_rad"] - example["x1_rad"]))

@@ -92,19 +92,7 @@ def tune_case(
     recorded: Callable[..., Recorded] | None = None,
     on_share: OnShare | None = None,
 ) -> TuningResult:
-    """Tune one observer.
-
-    Args:
-        case: Which, and what of it.
-        push: The experiment, and at which noises.
-        seed: Of the noise.
-        worlds: How many are fitted, and as many held out.
-        recorded: Hands out the recordings.
-        on_share: Called with the share done.
-
-    Returns:
-        The study.
-    """
+    """Tune one observer on the recordings of one push, as many worlds fitted as held out."""
     return tune(
         _scenario(case, push, seed),
         worlds=worlds,

@@ -45,12 +45,6 @@ def cause(errors: Errors) -> Claim:
 
     Partly is more than nothing and less than all: by one method for both, the distance between (10) and (11) must be
     larger by Euler's than by an exact one, and must not vanish by the exact one.
-
-    Args:
-        errors: Of all `CASES`, the same worlds.
-
-    Returns:
-        The claim.
     """
     exact = known_interval(errors[TEN] - errors[ELEVEN])
     by_euler = known_interval(errors[TEN_BY_EULER] - errors[ELEVEN_BY_EULER])

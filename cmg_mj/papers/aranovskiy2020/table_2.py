@@ -20,16 +20,7 @@ from cmg_mj.studies.tuning import NoiseLevelResult
 
 
 def table_2_claim(case: Tuning, studies: Studies, experiment: JointExperiment) -> Claim:
-    """Judge Table 2's line of one observer in the experiment that all three lines come nearest to.
-
-    Args:
-        case: What was tuned.
-        studies: Of all three, under every push.
-        experiment: That experiment.
-
-    Returns:
-        The claim.
-    """
+    """Judge Table 2's line of one observer in the experiment that all three lines come nearest to."""
     level = experiment.levels[case.observer]
     is_tunable = beats_zero(level)
     return Claim(

@@ -145,14 +145,7 @@ class Factorial(NamedTuple):
 
 
 def remark(experiment: Factorial) -> Claim:
-    """Judge the remark, over gain, model and bias.
-
-    Args:
-        experiment: The fates.
-
-    Returns:
-        The claim.
-    """
+    """Judge the remark, over gain, model and bias."""
     safe_gains = [gain for gain in GAINS if all(experiment.stands_everywhere((gain, model)) for model in MODELS)]
     return Claim(
         place="Section V, the time-invariant observer",

@@ -51,15 +51,7 @@ def run_trials(studies: Studies, joint: JointExperiment, on_share: OnShare) -> l
 
 
 def procedure_claim(studies: Studies, loops: list[Trial]) -> Claim:
-    """Judge the procedure.
-
-    Args:
-        studies: Of all three, under every push.
-        loops: The experiments that are judged, the default one first.
-
-    Returns:
-        The claim.
-    """
+    """Judge the procedure by its trials, the default experiment first."""
     ratios = [
         float(level.rms.mean()) / level.fit_rms
         for by_name in studies.values()

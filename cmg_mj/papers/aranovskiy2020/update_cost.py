@@ -18,15 +18,9 @@ from cmg_mj.studies.benchmark import time_of_update
 
 
 def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, float]:
-    """Return the median time of an update [us], the observers taking turns.
+    """Measure the median time of an update [us], the observers taking turns.
 
-    Args:
-        worlds: So many at once, on arrays; None for one, on floats, and then the plain forms of (10) too.
-        turns: How many.
-        updates: Updates in a row.
-
-    Returns:
-        Time by observer.
+    With worlds, arrays of so many; without (None) floats, and then the plain forms of (10) too.
     """
     cases: dict[str, Any] = {name: make_observer(name, DT, printed_model()) for name in OBSERVERS}
     if worlds is None:

@@ -36,12 +36,7 @@ def remaining_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, spa
 
 
 def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
-    """Return the RMS of the rate estimated at rest, whose true value is zero, (n_worlds,) [rad/s].
-
-    Args:
-        alpha: The exponent.
-        y1: What is measured, (n_ticks, n_worlds) [rad].
-    """
+    """Return the RMS of the rate estimated at rest, (n_worlds,) [rad/s], from y1, (n_ticks, n_worlds) [rad]."""
     observer = make_observer("homogeneous", DT, printed_model(), alpha=alpha)
     return rms(replay_at_rest(observer, y1).x2[len(y1) // 2 :])
 

@@ -34,14 +34,7 @@ def claims(on_share: OnShare) -> list[Claim]:
 
 
 def order_claim(rows: Sequence[Row]) -> Claim:
-    """Judge the papers' order.
-
-    Args:
-        rows: What `league` found.
-
-    Returns:
-        It holds if the paper's order is that of some cell.
-    """
+    """Judge the papers' order by the rows of `league`: it holds if it is that of some cell."""
     cells = by_cell(rows)
     ordered = [cell for cell, of_cell in cells.items() if in_order(of_cell)]
     cells_text = ", ".join(f"{noise:g} ug/rtHz and {bias:g} deg" for noise, bias in ordered)

@@ -64,15 +64,7 @@ class Character(NamedTuple):
 
 
 def character(kind: str, motion: Motion) -> Character:
-    """Replay an observer on the same motion with and without noise.
-
-    Args:
-        kind: The observer.
-        motion: What `record_motion` recorded.
-
-    Returns:
-        Its lag and noise gain.
-    """
+    """Replay an observer on the same motion with and without noise for its lag and noise gain."""
     experiment = motion.experiment
     observer = make_observer(kind, *experiment.design.constructor_arguments)
     clean = replay(observer, motion.clean).x2
@@ -134,15 +126,7 @@ def _first_passing(time_s: np.ndarray, values: np.ndarray, level: float) -> floa
 
 
 def update_us(kind: str, motion: Motion) -> float:
-    """Measure the microseconds of one update on floats, along half a second of the motion.
-
-    Args:
-        kind: The observer.
-        motion: What it is given.
-
-    Returns:
-        The time [us].
-    """
+    """Measure the microseconds of one update on floats, along half a second of the motion."""
     experiment = motion.experiment
     observer = make_observer(kind, *experiment.design.constructor_arguments)
     excerpt = motion.noisy.between(2.0, 2.5)

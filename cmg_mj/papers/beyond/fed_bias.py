@@ -54,14 +54,7 @@ def fed_bias(
 
 
 def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
-    """Judge the gain by the bias fed in.
-
-    Args:
-        rows: What `fed_bias` found.
-
-    Returns:
-        It holds if being told the bias helps at some bias: a smaller error beyond chance, or fewer falls.
-    """
+    """Judge the rows of `fed_bias`: it helps if at some bias the error is smaller beyond chance, or falls are fewer."""
     helped_biases = [
         row["bias_deg"]
         for row in rows

@@ -52,14 +52,7 @@ def friction(worlds: int, seed: int, on_share: OnShare, settings: Sequence[str] 
 
 
 def friction_claim(figures: dict[str, Any]) -> Claim:
-    """Judge the gain by a friction model.
-
-    Args:
-        figures: What `friction` found.
-
-    Returns:
-        It holds if knowing the friction brings something beyond the damping.
-    """
+    """Judge the figures of `friction`: knowing the friction helps if it brings more than damping."""
     smooth, rough, due = (figures[f"gain_{condition}_friction_rad_s"] for condition in (*WITH.values(), "due_to"))
     errors = (figures[f"with_friction_in_the_plant_{condition}_in_the_observer_rad_s"] for condition in WITH.values())
     error_without, error_with = (format_figure(ERROR, error) for error in errors)

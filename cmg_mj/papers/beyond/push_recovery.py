@@ -16,16 +16,7 @@ ERROR = "velocity_rms_error_rad_s"
 
 
 def push_recovery(kind: str, seed: int, settings: Sequence[str] = ()) -> Experiment:
-    """Prepare the scenario with an observer.
-
-    Args:
-        kind: The observer.
-        seed: Of the sensors' noise.
-        settings: What else is changed in the scenario.
-
-    Returns:
-        The experiment.
-    """
+    """Prepare the scenario with an observer, and with other settings."""
     return prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], kind))
 
 

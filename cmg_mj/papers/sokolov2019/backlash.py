@@ -39,16 +39,7 @@ class Cycle(NamedTuple):
 
 
 def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Experiment:
-    """Prepare the rig let go with a gap.
-
-    Args:
-        observer: In the loop.
-        arcmin: The gap [arcmin].
-        **parameters: The observer's, where they are not Table II's.
-
-    Returns:
-        The experiment.
-    """
+    """Prepare the rig let go with a gap, with an observer whose parameters may differ from Table II's."""
     observer_settings = [f"observer.{name}={value}" for name, value in parameters.items()]
     gap = f"plant.gimbal_backlash_arcmin={arcmin}"
     return experiment([*RELEASE, f"duration_s={RELEASE_S}", gap, *observer_settings], observer)

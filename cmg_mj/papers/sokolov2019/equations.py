@@ -54,14 +54,7 @@ def table_i() -> Claim:
 
 
 def equation_residual(plant: Plant, model: ReducedModel, states: int, seed: int) -> float:
-    """Return the largest difference between (1) and MuJoCo's inverse dynamics at random states [N m].
-
-    Args:
-        plant: The rig on a locked bearing.
-        model: The constants to put into (1).
-        states: How many.
-        seed: Of the states.
-    """
+    """Return the largest difference between (1), with a model's constants, and MuJoCo's inverse dynamics [N m]."""
     I_cd = read_servo(plant).inertia
     rng, data, largest = np.random.default_rng(seed), mujoco.MjData(plant.model), 0.0
     for _ in range(states):

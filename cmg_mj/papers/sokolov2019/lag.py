@@ -64,15 +64,7 @@ def _rig() -> Experiment:
 
 
 def linearise(observer: str | None, **parameters: float) -> tuple[Loop, Servo, float]:
-    """Linearise the sampled loop with an observer, or with the true rate (None).
-
-    Args:
-        observer: Its name.
-        **parameters: Those that are not Table II's.
-
-    Returns:
-        The loop, the model's servo and the control period [s].
-    """
+    """Linearise the sampled loop with an observer, or with the true rate (None); parameters differ from Table II's."""
     prepared = _rig()
     plant, law = prepared.plant, prepared.law
     assert isinstance(law, StateFeedback)
