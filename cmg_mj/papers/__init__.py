@@ -39,7 +39,7 @@ class Reproduction:
         paper: Its short name.
         claims: One a figure, table, remark, proof or statement.
         complete: Whether all sections were done (not interrupted).
-        seconds: How long it took [s].
+        seconds: Time that it took [s].
     """
 
     paper: str

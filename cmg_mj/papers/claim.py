@@ -19,13 +19,13 @@ class Claim:
     """One figure, table, remark, proof or statement. Its verdict follows from what was found.
 
     Attributes:
-        place: Where in the paper: `Fig. 2`, `Remark 1`, `Section V`.
-        statement: What the paper says there, in our words.
-        result: What was obtained, with its figures, in words.
+        place: Place in the paper: `Fig. 2`, `Remark 1`, `Section V`.
+        statement: Statement of the paper there, in our words.
+        result: Result obtained, with its figures, in words.
         table: More figures than a sentence bears, as a Markdown table below the words.
         holds: Whether what was obtained bears the paper out, computed from the figures.
         conditions: Under which conditions it holds, a whole sentence; empty if it holds outright.
-        otherwise: What to make of it where it does not hold, a whole sentence.
+        otherwise: Explanation where it does not hold, a whole sentence.
         figures: The numbers behind `result`, by names that end in their unit, as JSON can hold them.
         pictures: Plots.
         is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
@@ -69,7 +69,7 @@ class Section:
     """A part of a paper whose claims are obtained in one go.
 
     Attributes:
-        title: What the progress bar shows.
+        title: Title that the progress bar shows.
         seconds: About how long it takes, for the progress bar.
         claims: Obtains them.
     """

@@ -30,7 +30,7 @@ class PrintedInertia(NamedTuple):
     """A paper's inertia as printed.
 
     Attributes:
-        place: Where it says that the system is not PLvCC.
+        place: Place at which it says that the system is not PLvCC.
         gimbals: Number of gimbals.
         factor: The factor before (J1 + J2 cos^2 q2)/(I_c + I_d) in m1.
         arm: Distance from the tilt axis of the mass m, which J1 holds as m arm^2/gimbals [m].

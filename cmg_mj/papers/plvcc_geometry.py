@@ -47,7 +47,7 @@ def B(i: int, Psi: Any, M: Any, point: Mapping[Any, Any] | None = None) -> Any:
         i: Number of the column of Psi, from 0.
         Psi: The change of velocities, (2, 2).
         M: The inertia matrix, (2, 2).
-        point: Where to evaluate it, coordinate -> value. Putting that in early keeps the expressions small.
+        point: Point to evaluate it at, coordinate -> value. Putting that in early keeps the expressions small.
     """
     import sympy as sp
 

@@ -154,8 +154,8 @@ def save_report(folder: RunFolder | Path, entries: Sequence[Reproduction]) -> Pa
     """Write report.md, figures.json and the plots, all at once.
 
     Args:
-        folder: Where. What is there and was not written by cmg_mj stays.
-        entries: What was obtained.
+        folder: Folder to write into. What is there and was not written by cmg_mj stays.
+        entries: The reproductions.
 
     Returns:
         Where they are: the folder, or one in it (see `RunFolder.write`).

@@ -37,7 +37,7 @@ class SentenceLog:
 
         Args:
             text: Whole sentences.
-            place: Whose they are.
+            place: Place of their claim.
 
         Returns:
             The rest, after `As at Fig. 2.` where something is left out.

@@ -83,7 +83,7 @@ def chain_errors(
         sizes: Lengths of E at the start.
         count: Random directions for each.
         span: Time tau to run.
-        seed: Of the directions.
+        seed: Seed of the directions.
 
     Returns:
         The worst length at the end, over the length at the start; infinite if a solution could not be followed.

@@ -120,7 +120,7 @@ def gain_bound(from_errors: np.ndarray, from_gains: np.ndarray, of_solutions: np
         from_errors: L from each of `ERRORS`, (n_times, 4).
         from_gains: Its largest late value from each of `GAINS`, (3,).
         of_solutions: The same along each of `SOLUTIONS`, (3,).
-        late: Which times are late, (n_times,).
+        late: True for late times, (n_times,).
     """
     peaks, ends = from_errors.max(axis=0), from_errors[late].max(axis=0)
     relative_spread = max(np.ptp(ends) / ends[0], np.ptp(from_gains) / from_gains[0])

@@ -75,7 +75,7 @@ def escape(p: float, x2: float, x2_hat: float = 0.0, tolerance: float = 1e-6) ->
         p: Power.
         x2: x2(0).
         x2_hat: Its estimate at the start; x1 is known.
-        tolerance: Of the integrator.
+        tolerance: Tolerance of the integrator.
 
     Returns:
         The errors.

@@ -117,7 +117,7 @@ def decay(W: Lyapunov, b: float, spread: float = 0.0, grid: States | None = None
         W: The function.
         b: Exponent of the scaling: B = diag(b, 1 + b) in (20).
         spread: A1 and A2 are anywhere in [1 - spread, 1 + spread]; both sides of (19) are linear in them.
-        grid: Where; by default on all scales.
+        grid: States tried; by default on all scales.
 
     Returns:
         c1 and c2.

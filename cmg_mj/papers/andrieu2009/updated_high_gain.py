@@ -177,7 +177,7 @@ class UpdatedHighGain:
         """Return the state at the first sample.
 
         Args:
-            y: What is measured: the output, and after it whatever other measured signals f, a and Omega take.
+            y: Measurement: the output, and after it whatever other measured signals f, a and Omega take.
             x: Estimate to start from, x_1..x_n; (y, 0, ..., 0) if left out.
 
         Returns:
@@ -200,7 +200,7 @@ class UpdatedHighGain:
 
         Args:
             state: The state at sample k-1.
-            y: What is measured at sample k; it ran straight since sample k-1.
+            y: Measurement at sample k; it ran straight since sample k-1.
             u: Known inputs, held since sample k-1.
 
         Returns:

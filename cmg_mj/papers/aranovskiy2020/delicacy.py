@@ -37,7 +37,7 @@ def transient(method: str, rate_hz: float, span_s: float = 0.2, single_precision
     Args:
         method: One of `METHODS`.
         rate_hz: Steps a second.
-        span_s: How long [s], but at least 50 steps.
+        span_s: Simulated time [s], but at least 50 steps.
         single_precision: Whether in single precision, which is what the paper's STM32F746 computes in hardware.
 
     Returns:

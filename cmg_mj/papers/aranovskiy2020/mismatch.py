@@ -53,9 +53,9 @@ class Mismatch:
 
     Attributes:
         kind: Its name.
-        change: What it does to a rig.
-        sizes: How large it is.
-        unit: Of the sizes.
+        change: Function that breaks a rig so.
+        sizes: Sizes of the mismatch that are tried.
+        unit: Unit of the sizes.
         display_factor: Number by which a size is multiplied to be shown in that unit.
         is_predictable: Whether `predict_yaw_rate` has it.
     """

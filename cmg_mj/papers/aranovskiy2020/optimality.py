@@ -105,7 +105,7 @@ def nearest_diagonal(
         K: The gain as printed, (n,).
         rounding: Half a unit of the digit that each entry of it is printed with, (n,).
         start: A diagonal near the one sought, (n,); entries below 0.01 count as 0.01.
-        searches: How often the search starts again from where it ended: a simplex may collapse.
+        searches: Number of starts of the search, each from where it ended: a simplex may collapse.
 
     Returns:
         The best that was found.

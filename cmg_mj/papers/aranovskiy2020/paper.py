@@ -106,7 +106,7 @@ def riccati_slope(H: np.ndarray, A: np.ndarray, first: np.ndarray | None = None)
     Args:
         H: The gain matrix, (3, 3).
         A: A', (3, 3).
-        first: What stands transposed in the first term instead: A of (6) is printed there. (3, 3).
+        first: Matrix that stands transposed in the first term instead: A of (6) is printed there. (3, 3).
 
     Returns:
         The slope.

@@ -98,7 +98,7 @@ def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple
         observer: Its name.
         e_deg: The bias [deg].
         sigma: Standard deviation of y1's noise [rad].
-        seed: Of the noise.
+        seed: Seed of the noise.
 
     Returns:
         The means of its x1 [rad] and x2 [rad/s].

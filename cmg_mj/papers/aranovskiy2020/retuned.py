@@ -26,10 +26,10 @@ class Push:
     """One push on one rig, recorded at several sensor noises.
 
     Attributes:
-        words: How it is called.
+        words: Its name in the report.
         settings: Settings `section.field=value` of the tuning experiment that differ.
         noise_ug_rthz: Noise densities [ug/sqrt(Hz)], the same for every observer.
-        share: Of the time that all take.
+        share: Share of the time that all take.
     """
 
     words: str
@@ -59,9 +59,9 @@ class Tuning:
     Attributes:
         observer: Its name.
         equation: Its number in the paper.
-        parameters: What is tuned of it.
+        parameters: Parameters that are tuned.
         table_line: Table 2's line.
-        share: Of the time that the three take.
+        share: Share of the time that the three take.
     """
 
     observer: str

@@ -29,7 +29,7 @@ def push_recovery(observer: str, seed: int, settings: Sequence[str] = (), durati
 
     Args:
         observer: Its name.
-        seed: Of the noise.
+        seed: Seed of the noise.
         settings: Settings `section.field=value` that differ.
         duration_s: Simulated time [s].
 

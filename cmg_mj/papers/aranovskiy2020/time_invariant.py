@@ -82,8 +82,8 @@ def find_fates(
     Args:
         observers: Names and settings.
         biases_deg: The biases e [deg].
-        worlds: How many a bias, the same ones at each and for every observer.
-        seed: Of the noise.
+        worlds: Worlds a bias, the same ones at each and for every observer.
+        seed: Seed of the noise.
         duration_s: Simulated time [s].
 
     Returns:

@@ -125,7 +125,7 @@ def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Moti
 
     Args:
         pushes_n_m: On pitch and roll [N m].
-        duration_s: How long [s].
+        duration_s: Simulated time [s].
 
     Returns:
         What the body did.

@@ -65,8 +65,8 @@ def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajector
     rig to first order. With h = J_d omega_d cos q_b the flywheels carry h (cos x3_1 - cos x3_2).
 
     Args:
-        kind: What differs, of `MISMATCHES`.
-        size: By how much.
+        kind: Kind of mismatch, of `MISMATCHES`.
+        size: Size of the mismatch.
         plant: The symmetric rig.
         trajectory: Its run.
 

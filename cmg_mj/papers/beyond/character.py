@@ -32,8 +32,8 @@ def record_motion(noise_ug: float, worlds: int, seed: int) -> Motion:
 
     Args:
         noise_ug: Noise density of the accelerometers [ug/rtHz].
-        worlds: How many.
-        seed: Of their noise.
+        worlds: Number of worlds.
+        seed: Seed of their noise.
 
     Returns:
         The motion; the noiseless measurement is the true tilt, and the true rate's slope.

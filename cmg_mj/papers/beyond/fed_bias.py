@@ -29,11 +29,11 @@ def fed_bias(
     """Run (11) alone, `adaptive` alone, and (11) told the bias by `adaptive`, at several biases.
 
     Args:
-        worlds: How many a bias, the same ones each time.
-        seed: Of the sensors' noise.
+        worlds: Worlds a bias, the same ones each time.
+        seed: Seed of the sensors' noise.
         on_share: Called with the share done.
         biases_deg: The equilibrium biases e [deg].
-        settings: What else is changed in `push_recovery`.
+        settings: Settings `section.field=value` that differ in `push_recovery`.
 
     Returns:
         A row a bias: each observer's velocity RMS error and share of falls, and what (11) gains by being told.

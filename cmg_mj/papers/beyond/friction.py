@@ -24,10 +24,10 @@ def friction(worlds: int, seed: int, on_share: OnShare, settings: Sequence[str] 
     """Run dry friction in the plant and in the observer, each with and without the other.
 
     Args:
-        worlds: How many, the same ones each time.
-        seed: Of the sensors' noise.
+        worlds: Number of worlds, the same ones each time.
+        seed: Seed of the sensors' noise.
         on_share: Called with the share done.
-        settings: What else is changed in `push_recovery`.
+        settings: Settings `section.field=value` that differ in `push_recovery`.
 
     Returns:
         Mean errors by plant and observer; the gain of the observer's friction model on both plants, and how much of

@@ -36,13 +36,13 @@ def league(
     World i has the same noise for all observers and biases of one noise level.
 
     Args:
-        worlds: How many a cell.
-        seed: Of the sensors' noise.
+        worlds: Worlds a cell.
+        seed: Seed of the sensors' noise.
         on_share: Called with the share done.
         kinds: The observers.
         noises_ug: Noise densities of the accelerometers [ug/rtHz].
         biases_deg: Equilibrium biases e [deg].
-        settings: What else is changed in `push_recovery`.
+        settings: Settings `section.field=value` that differ in `push_recovery`.
 
     Returns:
         A row an observer, noise and bias. Means are over the worlds that stood to the end; intervals are of 95 %.

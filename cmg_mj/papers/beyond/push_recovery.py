@@ -25,7 +25,7 @@ def on_rigs(experiment: Experiment, worlds: int, field: str, values: Sequence[fl
 
     Args:
         experiment: The experiment; its own value of the setting does not count.
-        worlds: How many a rig; world i has the same noise on all.
+        worlds: Worlds a rig; world i has the same noise on all.
         field: The setting, a field of [plant].
         values: Its value on each rig.
 

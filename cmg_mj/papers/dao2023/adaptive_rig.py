@@ -64,7 +64,7 @@ def learnt_bias(
     """Let `adaptive`, in the loop, find the bias.
 
     Args:
-        seed: Of the sensors' noise.
+        seed: Seed of the sensors' noise.
         biases_deg: e in each world, (n_worlds,) [deg].
         accelerometer_bias_mg: Zero offsets of the inner and outer accelerometer's tangential axes [mg].
         keep_trajectory: Whether to keep every tick.
@@ -87,7 +87,7 @@ def velocity_errors(
     """Return the velocity RMS error over ten seconds with each observer in the loop, no push.
 
     Args:
-        seed: Of the sensors' noise; world i of every observer has the same.
+        seed: Seed of the sensors' noise; world i of every observer has the same.
         worlds: Worlds a bias.
         observers: Names.
         biases_deg: The biases [deg].
@@ -122,10 +122,10 @@ def learnt_gait(
     """Run `adaptive` that knows a gait's frequency, and one that does not, each in the loop under that gait.
 
     Args:
-        seed: Of the sensors' noise.
+        seed: Seed of the sensors' noise.
         biases_deg: e in each world, (n_worlds,) [deg].
-        amplitude_n_m: Of the torque [N m].
-        frequency_hz: Of the torque [Hz].
+        amplitude_n_m: Amplitude of the torque [N m].
+        frequency_hz: Frequency of the torque [Hz].
 
     Returns:
         RMS errors over seconds 5 to 10, (n_worlds,): `knowing_rad_s` and `not_knowing_rad_s` of the velocity,

@@ -44,8 +44,8 @@ def explicit_escape(sigma: float, dt: float, duration: float, seed: int = 0) -> 
     Args:
         sigma: The weight Sigma.
         dt: Sample period [s].
-        duration: How long to try [s].
-        seed: Of the initial values.
+        duration: Time to try [s].
+        seed: Seed of the initial values.
 
     Returns:
         The time at which an estimate passes 1e9.

@@ -98,7 +98,7 @@ def state_settle_times(errors: Errors) -> tuple[np.ndarray, np.ndarray]:
     """Find when the state's error, as a vector, stays below `SETTLED`, with the first of the weights.
 
     Args:
-        errors: What the observers made of the motions.
+        errors: Errors of the observers along the motions.
 
     Returns:
         The times (n,) [s], infinite if they do not settle; and the same of an observer from the same start with the

@@ -29,10 +29,10 @@ class System:
 
     Attributes:
         A: State matrix, (..., n, n).
-        B0: Where r acts, (..., n, r).
-        B2: Where u acts, (..., n, m).
-        C2: What of x is measured, (..., p, n).
-        D20: What of r is measured, (..., p, r).
+        B0: Input matrix of r, (..., n, r).
+        B2: Input matrix of u, (..., n, m).
+        C2: Output matrix of x, (..., p, n).
+        D20: Output matrix of r, (..., p, r).
     """
 
     A: np.ndarray

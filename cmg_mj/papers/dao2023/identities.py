@@ -50,7 +50,7 @@ def continuous_run(
         start: q and its rate, (2,).
         state: The observer's x and xm, (6,); T starts at zero.
         t: Times, (n_times,) [s].
-        tolerance: Of the integrator, relative and absolute.
+        tolerance: Tolerance of the integrator, relative and absolute.
 
     Returns:
         The arm's x (n_times, 2), the observer's x (n_times, 2), xm (n_times, 4) and T (n_times, 2, 4).
@@ -73,9 +73,9 @@ def continuous_deviation(sigma: float, duration: float, seed: int = 0, tolerance
 
     Args:
         sigma: The weight Sigma.
-        duration: How long [s].
-        seed: Of the initial values.
-        tolerance: Of the integrator.
+        duration: Simulated time [s].
+        seed: Seed of the initial values.
+        tolerance: Tolerance of the integrator.
 
     Returns:
         The largest deviation, and the largest |z| for comparison.
@@ -94,8 +94,8 @@ def sampled_deviation(sigma: float, dt: float, duration: float, seed: int = 0) -
     Args:
         sigma: The weight Sigma.
         dt: Sample period [s].
-        duration: How long [s].
-        seed: Of the initial values.
+        duration: Simulated time [s].
+        seed: Seed of the initial values.
 
     Returns:
         The largest deviation, and the largest |z| for comparison.
@@ -154,8 +154,8 @@ def upsilon_gaps(sigma: float, dt: float, duration: float, seed: int = 0) -> tup
     Args:
         sigma: The weight Sigma.
         dt: Sample period [s].
-        duration: How long [s].
-        seed: Of the initial values.
+        duration: Simulated time [s].
+        seed: Seed of the initial values.
 
     Returns:
         The largest |Upsilon - T exp(Am t)| and the largest difference of the estimates of x.

@@ -42,7 +42,7 @@ def acceleration(q: np.ndarray | float, t: float, coefficient: float = 1.0) -> n
     Args:
         q: Angle of the arm, (...,) [rad].
         t: Time [s].
-        coefficient: What d is multiplied by.
+        coefficient: Factor of d.
 
     Returns:
         The acceleration, (...,) [rad/s^2].

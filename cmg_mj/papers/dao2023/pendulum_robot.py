@@ -42,7 +42,7 @@ def motion(start: np.ndarray, t: np.ndarray, coefficient: float = 1.0) -> np.nda
     Args:
         start: q and its rate at t[0], (n, 2) [rad, rad/s].
         t: Times, (n_times,) [s].
-        coefficient: What d is multiplied by in q'': 1 as in (14); (10) would have theta2.
+        coefficient: Factor of d in q'': 1 as in (14); (10) would have theta2.
 
     Returns:
         q and its rate, (n_times, n, 2).

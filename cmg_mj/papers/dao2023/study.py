@@ -48,9 +48,9 @@ def study(
     """Let both observers follow the arm.
 
     Args:
-        seed: Of the initial values.
-        motions: How many.
-        duration_s: How long [s].
+        seed: Seed of the initial values.
+        motions: Number of motions.
+        duration_s: Simulated time [s].
         rates_hz: Sample rates of the proposed and of the conventional observer, the former a multiple of the latter
             [Hz].
         on_share: Called with the share done.

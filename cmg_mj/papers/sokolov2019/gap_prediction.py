@@ -36,7 +36,7 @@ def predict_cycle(observer: str, points: int = 60) -> PredictedCycle | None:
 
     Args:
         observer: A linear one, in the loop.
-        points: Of the grid on which it is sought.
+        points: Number of points of the grid.
 
     Returns:
         The cycle; None if there is none.

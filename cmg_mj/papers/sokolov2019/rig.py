@@ -34,8 +34,8 @@ def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feed
 
     Args:
         settings: Settings `section.field=value` that differ.
-        observer: In the loop.
-        feedback: Which rate the law uses: `observer`, `fog` or `truth`.
+        observer: Observer in the loop.
+        feedback: Rate that the law uses: `observer`, `fog` or `truth`.
 
     Returns:
         The experiment, ready to run.

@@ -88,8 +88,8 @@ def period_map(
         observer: A linear observer; None for the true rate in the law.
         law: The law; its rate limit does not count.
         timestep: Physics step [s].
-        age_steps: How old y1 is at a tick [physics steps]: the latency of the accelerometers.
-        share: What the gimbal's setpoint makes of the commanded rate: 1, or the describing function of a gap.
+        age_steps: Age of y1 at a tick [physics steps]: the latency of the accelerometers.
+        share: Share of the commanded rate that reaches the gimbal's setpoint: 1, or the describing function of a gap.
 
     Returns:
         A square matrix. Its state is that of the rig, the tilts not yet seen, the observer's, x_e and the last u.
