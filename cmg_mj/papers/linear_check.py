@@ -33,10 +33,10 @@ def finite_difference_error(model: ReducedModel, h: float = 1e-5) -> float:
     return float(max(np.abs(A - model.A).max() / np.abs(A).max(), np.abs(B - model.B).max() / np.abs(B).max()))
 
 
-def model_difference(model: ReducedModel, printed: ReducedModel) -> float:
+def model_difference(model: ReducedModel, reference: ReducedModel) -> float:
     """Return the largest relative difference of a reduced model's constants from the printed ones."""
     names = ("J1", "J2", "J_d", "omega_d", "gravity_torque")
-    return max(abs(getattr(model, name) / getattr(printed, name) - 1.0) for name in names)
+    return max(abs(getattr(model, name) / getattr(reference, name) - 1.0) for name in names)
 
 
 def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[np.ndarray, np.ndarray]:

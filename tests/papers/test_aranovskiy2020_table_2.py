@@ -154,7 +154,7 @@ def test_the_loops_are_those_of_the_default_and_of_the_joint_experiment(monkeypa
     monkeypatch.setattr("cmg_mj.papers.aranovskiy2020.tuning_procedure.loop_ratios", compare)
     studies = {STRONG.words: make_studies((200.0, GOOD, 0.1), (400.0, BAD, 0.1))["a push"]}
     first = next(joint.experiments(studies))
-    default, other = run_trials(studies, first, lambda share: None)
+    default, joint_trial = run_trials(studies, first, lambda share: None)
     assert default.experiment.words == "1 N m, e = 0.5 deg, 400 ug/rtHz"
-    assert other.experiment.words == first.words
+    assert joint_trial.experiment.words == first.words
     assert requests == [(name, noise, STRONG.words) for noise in (400.0, 200.0) for name in OBSERVERS]

@@ -89,11 +89,11 @@ def test_parameters_at_the_end() -> None:
 
 def test_what_the_observer_finds_decides_what_is_meant(monkeypatch: pytest.MonkeyPatch) -> None:
     """(10) or (14): both are seen, a third is not."""
-    for amplitude, verdict, scaled in ((2.0, WITHIN, True), (1.0, WITHIN, False), (1.5, "not reproduced", True)):
+    for amplitude, verdict, scales_d in ((2.0, WITHIN, True), (1.0, WITHIN, False), (1.5, "not reproduced", True)):
         monkeypatch.setattr(as_printed, "amplitude_under_10", lambda a=amplitude: np.array([a, a]))
         claim = as_printed.misprint_claim()
         assert claim.verdict == verdict
-        assert ("(14), not (10), scales d." in claim.conditions) is scaled
+        assert ("(14), not (10), scales d." in claim.conditions) is scales_d
 
 
 def test_an_explicit_step_that_stays_bounded_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:

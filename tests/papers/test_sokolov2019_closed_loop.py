@@ -177,8 +177,8 @@ def make_result(errors: list[float], *, fell: int = 0, tilts: list[float] | None
 
 def replace_outcomes(result: Result, errors: np.ndarray, *, fell: int = 0) -> Result:
     """The same recordings with other outcomes."""
-    other = make_result(errors.tolist(), fell=fell)
-    return Result(other.outcomes, other.summaries, result.trajectory, result.seconds)
+    made_up = make_result(errors.tolist(), fell=fell)
+    return Result(made_up.outcomes, made_up.summaries, result.trajectory, result.seconds)
 
 
 def test_smaller_is_beyond_chance_and_world_by_world() -> None:

@@ -206,8 +206,8 @@ def test_arguments_are_limited_where_the_paper_limits_them() -> None:
     assert arguments["f3"] == ("u", (0.5,), (2.0, -3.0))
     assert arguments["Omega"] == ("u", (0.5,), (2.0, -3.0))
     slope = observer.slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
-    without = example(3, 0.01, f=observer.f, a=()).slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
-    assert slope == without
+    unlimited_slope = example(3, 0.01, f=observer.f, a=()).slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
+    assert slope == unlimited_slope
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
@@ -276,10 +276,10 @@ def test_a_plain_observer_runs_away_where_the_homogeneous_one_does_not() -> None
         return abs(z[1]) - 1e7
 
     setattr(escaped, "terminal", True)  # noqa: B010 - how solve_ivp wants it
-    far = solve_ivp(slope, (0.0, 1.0), [0.0, 1e3], "DOP853", rtol=1e-8, events=[escaped]).y
-    near = solve_ivp(slope, (0.0, 3.0), [0.0, 1e2], "DOP853", rtol=1e-8, atol=1e-8).y
-    assert abs(far[1, -1]) > 1e6
-    assert abs(near[1, -1]) < 1e-3
+    large_error = solve_ivp(slope, (0.0, 1.0), [0.0, 1e3], "DOP853", rtol=1e-8, events=[escaped]).y
+    small_error = solve_ivp(slope, (0.0, 3.0), [0.0, 1e2], "DOP853", rtol=1e-8, atol=1e-8).y
+    assert abs(large_error[1, -1]) > 1e6
+    assert abs(small_error[1, -1]) < 1e-3
 
 
 def test_starts_where_it_is_told() -> None:

@@ -95,10 +95,10 @@ def decay(alpha: float) -> Decay:
 
 def rates_at_rest(alpha: float, dt: float, span_s: float, **start: float) -> np.ndarray:
     """Run the bench's (11) at rest from a wrong state, without noise: sizes of its rate, (n_samples,) [rad/s]."""
-    observer, rest = make_observer("homogeneous", dt, printed_model(), alpha=alpha), Measurement(0.0, 0.0)
-    state, rates = observer.init(rest)._replace(**start), []
+    observer, measurement = make_observer("homogeneous", dt, printed_model(), alpha=alpha), Measurement(0.0, 0.0)
+    state, rates = observer.init(measurement)._replace(**start), []
     for _ in range(round(span_s / dt)):
-        state, estimate = observer.step(state, rest, 0.0)
+        state, estimate = observer.step(state, measurement, 0.0)
         rates.append(abs(estimate.x2))
     return np.array(rates)
 

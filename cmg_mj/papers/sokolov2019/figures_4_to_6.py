@@ -32,7 +32,7 @@ def _setting(loops: Loops) -> str:
     )
 
 
-def _standing(loops: Loops, name: str) -> str:
+def _describe_tilt(loops: Loops, name: str) -> str:
     """Describe the tilt's late deviation in both rigs, and the push's tail in it."""
     no_gap, gap = loops.by_bias[SHOWN_DEG][name], loops.gap[name]
     return (
@@ -65,8 +65,8 @@ def figure_4(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
         statement="With (8) in the loop the system enters sustained oscillations.",
         result=(
             f"Let go without noise it {'oscillates by itself' if oscillates_by_itself else 'comes to rest'} without "
-            f"backlash; with {GAP_ARCMIN:g} arcmin it {cycle.words}. {_standing(loops, 'linear')} Without backlash "
-            f"most of it is at {main_frequency(no_gap):.1f} Hz, where the loop has a badly damped pole "
+            f"backlash; with {GAP_ARCMIN:g} arcmin it {cycle.words}. {_describe_tilt(loops, 'linear')} Without "
+            f"backlash most of it is at {main_frequency(no_gap):.1f} Hz, where the loop has a badly damped pole "
             f"({prediction.frequency_hz:.1f} Hz). With the gyro in the law it is "
             f"{format_interval(deviation(loops.gyro))} deg."
         ),
@@ -96,7 +96,7 @@ def figure_5(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
         result=(
             f"Let go without noise it {'oscillates by itself' if oscillates_by_itself else 'comes to rest'} without "
             f"backlash; with {GAP_ARCMIN:g} arcmin it {cycle.words}, (8) {cycles.ends['linear'].words}. "
-            f"{_standing(loops, 'luenberger')} Without backlash it falls in {falls_text}."
+            f"{_describe_tilt(loops, 'luenberger')} Without backlash it falls in {falls_text}."
         ),
         holds=oscillates_by_itself or cycle.sustained,
         conditions=(
@@ -151,8 +151,8 @@ def figure_6(loops: Loops, cycles: Cycles) -> Claim:
         statement="With (10) in the loop the system is stabilised.",
         result=(
             f"With noise and the push it falls in at most {max(falls.values()):.0%} of {loops.worlds} seeds at "
-            f"{', '.join(falls)}. {_standing(loops, 'homogeneous')} The velocity RMS error is {format_interval(error)} "
-            "rad/s."
+            f"{', '.join(falls)}. {_describe_tilt(loops, 'homogeneous')} The velocity RMS error is "
+            f"{format_interval(error)} rad/s."
         ),
         holds=max(falls.values()) == 0.0,
         otherwise="It falls.",
