@@ -38,8 +38,8 @@ from cmg_mj.papers.andrieu2009.simulation import (
 )
 from cmg_mj.papers.andrieu2009.study import Study, rms_by_kind, study
 from cmg_mj.papers.claim import Claim
-from cmg_mj.results.result import Outcome, Result
 from cmg_mj.visualization.plots.figure_spec import Picture
+from tests.papers.worlds import make_result
 
 SEEDS, FIRST = 6, 500
 """Other seeds than the report's."""
@@ -354,16 +354,9 @@ def test_on_the_rig() -> None:
     assert 1e-4 < claim.figures["largest_Omega_1_s"] < 0.015
 
 
-def ended(errors: list[float], *, fell: int = 0) -> Result:
-    """Worlds with these errors, of which the last ones fell."""
-    kinds = ["done"] * (len(errors) - fell) + ["fell"] * fell
-    summaries = [{"velocity_rms_error_rad_s": error, "tilt_rms_deg": error} for error in errors]
-    return Result([Outcome(kind, 5.0) for kind in kinds], summaries)  # type: ignore[arg-type]
-
-
 def test_a_fall_on_the_rig_is_not_hidden() -> None:
-    runs = dict.fromkeys(on_the_rig.KINDS, ended([0.07, 0.071, 0.072, 0.073]))
-    claim = of_json(on_the_rig.comparison_claim(runs | {"high_gain": ended([0.06, 0.061, 0.059, 0.08], fell=1)}))
+    runs = dict.fromkeys(on_the_rig.KINDS, make_result([0.07, 0.071, 0.072, 0.073]))
+    claim = of_json(on_the_rig.comparison_claim(runs | {"high_gain": make_result([0.06, 0.061, 0.059, 0.08], fell=1)}))
     assert claim.verdict == "not reproduced"
     assert "3 of 4" in claim.result
     assert "high_gain 0.0600" in claim.result
@@ -372,8 +365,8 @@ def test_a_fall_on_the_rig_is_not_hidden() -> None:
 def test_differences_on_the_rig_are_beyond_chance() -> None:
     """High gain less theirs, world by world: the word follows the interval's ends."""
     low, high, mixed = [0.07, 0.08, 0.09], [0.08, 0.09, 0.1], [0.06, 0.09, 0.091]
-    runs = dict.fromkeys(on_the_rig.KINDS, ended(high)) | {"high_gain": ended(low)}
-    claim = on_the_rig.comparison_claim(runs | {"linear": ended(mixed), "ltv": ended([0.06, 0.07, 0.08])})
+    runs = dict.fromkeys(on_the_rig.KINDS, make_result(high)) | {"high_gain": make_result(low)}
+    claim = on_the_rig.comparison_claim(runs | {"linear": make_result(mixed), "ltv": make_result([0.06, 0.07, 0.08])})
     assert "homogeneous -0.0100 +- 0.0000 (smaller)" in claim.result
     assert "ltv +0.0100 +- 0.0000 (larger)" in claim.result
     assert "(not different)" in claim.result.partition("linear ")[2].partition("linear ")[2]

@@ -131,12 +131,10 @@ def test_with_the_exact_gain_h_is_the_benchs() -> None:
     """A step of H at rest, from H_0 and half settled."""
     y, form = Measurement(0.0, 0.0), by_euler.TenByEuler(0.005, printed_model(), exact_gain=True)
     state, exact = form.init(y), forms_of_10.make_exact(0.005)
-    exact_state = exact.init(y)
+    entries = exact.init(y)
     for _ in range(20):
-        state, exact_state = form.step(state, y, 0.0)[0], exact.step(exact_state, y, 0.0)[0]
-        assert state[3:] == pytest.approx(
-            (exact_state.h11, exact_state.h12, exact_state.h22, exact_state.h33), rel=1e-9
-        )
+        state, entries = form.step(state, y, 0.0)[0], exact.step(entries, y, 0.0)[0]
+        assert state[3:] == pytest.approx((entries.h11, entries.h12, entries.h22, entries.h33), rel=1e-9)
 
 
 def test_eleven_by_euler_approaches_the_benchs() -> None:

@@ -44,13 +44,9 @@ def test_figure_4_other_seeds() -> None:
 def test_figure_4_is_judged_by_the_push(monkeypatch: pytest.MonkeyPatch, last: float, verdict: str) -> None:
     """Errors within a factor of 1.5 after the push hold, whatever the whole run says."""
     runs = figure_4.run_open_loop(2, SEED)
-    push_errors = {
-        name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.12, last, 0.11), strict=True)
-    }
-    whole_errors = {
-        name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.5, 0.9, 0.01), strict=True)
-    }
-    monkeypatch.setattr(figure_4, "run_open_loop", lambda *_: runs._replace(whole=whole_errors, after_push=push_errors))
+    push = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.12, last, 0.11), strict=True)}
+    whole = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.5, 0.9, 0.01), strict=True)}
+    monkeypatch.setattr(figure_4, "run_open_loop", lambda *_: runs._replace(whole=whole, after_push=push))
     claim = figure_4.figure_4(2, SEED)
     assert claim.verdict == verdict
     assert "zero is closer than (10) and (11)." in claim.reason

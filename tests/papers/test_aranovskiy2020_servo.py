@@ -96,9 +96,8 @@ def test_a_command_tilts_its_own_axis_as_the_reduced_model_says() -> None:
         for sign, gimbal in zip(places.signs, places.gimbals, strict=True):
             data.qvel[gimbal] = sign
         mujoco.mj_forward(model, data)
-        assert data.qacc[places.tilt] == pytest.approx(
-            expected, rel=0.02
-        )  # the other pair's gimbals are free for a moment
+        # The other pair's gimbals are free for a moment.
+        assert data.qacc[places.tilt] == pytest.approx(expected, rel=0.02)
         other_tilt = two_axes.addresses(model, 1 - axis).tilt
         assert abs(data.qacc[other_tilt]) < 1e-6 * expected
 

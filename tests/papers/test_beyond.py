@@ -153,17 +153,13 @@ def test_the_papers_order_holds_where_noise_is_high(rows: list[dict[str, Any]]) 
 def test_most_of_what_a_friction_model_brings_is_damping() -> None:
     """It helps on the rig that rubs; it helps on the one that does not, too; and a little of it is due to knowing."""
     figures = friction(6, SEED + 2, lambda share: None, ["duration_s=6"])
-    with_friction, without_friction, due = (
-        figures[f"gain_{condition}_friction_rad_s"] for condition in ("with", "without", "due_to")
-    )
-    assert with_friction.low > 0.0
-    assert without_friction.low > 0.0
-    assert due.mean == pytest.approx(with_friction.mean - without_friction.mean, rel=1e-9)
-    assert 0.0 < due.mean < without_friction.mean
-    error_without, error_with = (
-        figures[f"with_friction_in_the_plant_{w}_in_the_observer_rad_s"] for w in ("without", "with")
-    )
-    assert with_friction.mean == pytest.approx(error_without - error_with, rel=1e-9)
+    rough, smooth, due = (figures[f"gain_{case}_friction_rad_s"] for case in ("with", "without", "due_to"))
+    assert rough.low > 0.0
+    assert smooth.low > 0.0
+    assert due.mean == pytest.approx(rough.mean - smooth.mean, rel=1e-9)
+    assert 0.0 < due.mean < smooth.mean
+    plain, aware = (figures[f"with_friction_in_the_plant_{w}_in_the_observer_rad_s"] for w in ("without", "with"))
+    assert rough.mean == pytest.approx(plain - aware, rel=1e-9)
     assert friction_claim(figures).verdict == "reproduced within stated conditions"
     for none in (Interval(due.mean, -1e-4, 2.0 * due.mean), None):
         assert friction_claim(figures | {"gain_due_to_friction_rad_s": none}).verdict == "not reproduced"

@@ -25,27 +25,25 @@ HEAVY_PAIR = dataclasses.replace(HEAVY, gimbals=2)
 GAINS: dict[str, Any] = {"L": (-9.0, -60.0), "Gamma": (2.0, 3.0, 5.0), "Sigma": 40.0}
 
 
-def general(rig_form: Adaptive) -> tuple[FriedlandTacker, Callable[[float, float, float], System]]:
+def general(rig: Adaptive) -> tuple[FriedlandTacker, Callable[[float, float, float], System]]:
     """The same observer in the general form, and the matrices at measured angles and a gimbal rate."""
-    m, known_bias = rig_form.model, math.radians(rig_form.known_bias_deg)
-    w = 2.0 * math.pi * rig_form.sinusoid_hz
-    constants = int(rig_form.bias or rig_form.torque)
+    m, known_bias = rig.model, math.radians(rig.known_bias_deg)
+    w = 2.0 * math.pi * rig.sinusoid_hz
+    constants = int(rig.bias or rig.torque)
     nm = constants + 2 * bool(w)
     Am, Cm = np.zeros((nm, nm)), np.zeros((constants + bool(w), nm))
     Cm[:constants, :constants] = np.eye(constants)
-    weights = [rig_form.Gamma[0] if rig_form.bias else rig_form.Gamma[1]] * constants
+    weights = [rig.Gamma[0] if rig.bias else rig.Gamma[1]] * constants
     if w:
         Am[-2, -1], Am[-1, -2], Cm[-1, -1] = -w, w, 1.0
-        weights += [rig_form.Gamma[2]] * 2
-    general_form = FriedlandTacker(
-        rig_form.dt, Am, Cm, np.array(rig_form.L)[:, None], np.diag(weights), np.array([[rig_form.Sigma]])
-    )
+        weights += [rig.Gamma[2]] * 2
+    form = FriedlandTacker(rig.dt, Am, Cm, np.array(rig.L)[:, None], np.diag(weights), np.array([[rig.Sigma]]))
 
     def matrices(y1: float, y2: float, u: float) -> System:
         D = m.J1 + m.J2 * math.sin(y2) ** 2
         A = np.array([[0.0, 1.0], [0.0, -u * m.J2 * math.sin(2.0 * y2) / D]])
         per_bias, per_torque = m.gravity_torque * math.cos(y1) / D, 1.0 / (m.gimbals * D)
-        lower = [per_bias if rig_form.bias else per_torque] * constants + [per_torque] * bool(w)
+        lower = [per_bias if rig.bias else per_torque] * constants + [per_torque] * bool(w)
         known_input = (u * m.J_d * m.omega_d * math.cos(y2) + m.gravity_torque * math.sin(y1 + known_bias)) / D
         return System(
             A,
@@ -55,23 +53,23 @@ def general(rig_form: Adaptive) -> tuple[FriedlandTacker, Callable[[float, float
             np.zeros((1, len(lower))),
         )
 
-    return general_form, matrices
+    return form, matrices
 
 
 @pytest.mark.parametrize("model", [PAIR, HEAVY_PAIR, HEAVY], ids=["pair", "heavy pair", "heavy"])
 @pytest.mark.parametrize("mode", MODES)
 def test_adaptive_equals_friedland_tacker(mode: str, model: ReducedModel) -> None:
-    rig_form = adaptive(model, **MODES[mode], **GAINS)
-    general_form, matrices = general(rig_form)
+    rig = adaptive(model, **MODES[mode], **GAINS)
+    form, matrices = general(rig)
     y1, y2, u = rough_signals(400, seed=1)
-    state = rig_form.init(Measurement(float(y1[0]), float(y2[0])))
-    reference = general_form.init(y1[:1], x=np.array([y1[0], 0.0]))
+    state = rig.init(Measurement(float(y1[0]), float(y2[0])))
+    reference = form.init(y1[:1], x=np.array([y1[0], 0.0]))
     largest_error, largest = 0.0, 0.0
     for k in range(1, 400):
-        state, estimate = rig_form.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        state, estimate = rig.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
         system = matrices(0.5 * (y1[k - 1] + y1[k]), 0.5 * (y2[k - 1] + y2[k]), u[k - 1])
-        reference = general_form.step(reference, system, np.ones(1), y1[k : k + 1])
-        expected = [*reference.x, y2[k], *(general_form.Cm @ reference.xm)]
+        reference = form.step(reference, system, np.ones(1), y1[k : k + 1])
+        expected = [*reference.x, y2[k], *(form.Cm @ reference.xm)]
         largest_error = max(largest_error, np.abs(np.array(estimate) - expected).max())
         largest = max(largest, abs(estimate[3]))
     print(f"{mode}: rig's form less general form {largest_error:.1e}; extra signal up to {largest:.2g}")
@@ -80,15 +78,15 @@ def test_adaptive_equals_friedland_tacker(mode: str, model: ReducedModel) -> Non
 
 
 def test_adaptive_equals_friedland_tacker_with_the_default_gains() -> None:
-    rig_form = adaptive()
-    general_form, matrices = general(rig_form)
+    rig = adaptive()
+    form, matrices = general(rig)
     y1, y2, u = rough_signals(400, seed=2)
-    state = rig_form.init(Measurement(float(y1[0]), float(y2[0])))
-    reference = general_form.init(y1[:1], x=np.array([y1[0], 0.0]))
+    state = rig.init(Measurement(float(y1[0]), float(y2[0])))
+    reference = form.init(y1[:1], x=np.array([y1[0], 0.0]))
     for k in range(1, 400):
-        state, estimate = rig_form.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
+        state, estimate = rig.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
         system = matrices(0.5 * (y1[k - 1] + y1[k]), 0.5 * (y2[k - 1] + y2[k]), u[k - 1])
-        reference = general_form.step(reference, system, np.ones(1), y1[k : k + 1])
+        reference = form.step(reference, system, np.ones(1), y1[k : k + 1])
         np.testing.assert_allclose(estimate, [*reference.x, y2[k], *reference.xm], rtol=0.0, atol=1e-12)
 
 
@@ -123,7 +121,7 @@ def test_high_gain_equals_updated_high_gain(parameters: dict, model: ReducedMode
 
 
 def test_the_defaults_of_high_gain_are_inside_the_theorem() -> None:
-    rig_form = high_gain()
-    assert list_violations(2, rig_form.d_inf, rig_form.b) == []
-    assert BiLimitCorrection((rig_form.l1, rig_form.l2), rig_form.d_inf) == BiLimitCorrection((29.5, 12.4), 0.6)
-    assert np.roots([1.0, rig_form.l1, rig_form.l1 * rig_form.l2]).real.max() < -10.0
+    rig = high_gain()
+    assert list_violations(2, rig.d_inf, rig.b) == []
+    assert BiLimitCorrection((rig.l1, rig.l2), rig.d_inf) == BiLimitCorrection((29.5, 12.4), 0.6)
+    assert np.roots([1.0, rig.l1, rig.l1 * rig.l2]).real.max() < -10.0

@@ -24,7 +24,8 @@ from cmg_mj.papers.sokolov2019.lag import Lags, predict
 from cmg_mj.papers.sokolov2019.loops import Loops, deviation, is_better, is_smaller, loops, numbers, tail
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.release import LAGS_S, Sweep, Threshold
-from cmg_mj.results.result import Outcome, Result
+from cmg_mj.results.result import Result
+from tests.papers.worlds import make_result
 
 SEED = 5_000
 WITHIN = "reproduced within stated conditions"
@@ -141,15 +142,13 @@ def test_verdicts_follow_the_lags_and_the_cycles(runs: Loops, lags: Lags, cycles
     def replace_cycles(**ends: Cycle) -> Cycles:
         return cycles._replace(ends=cycles.ends | ends)
 
-    rest_cycle = Cycle(False, 0.0, 0.1)
-    assert figure_4(runs, lags, replace_cycles(linear=rest_cycle)).verdict == "not reproduced"
-    assert figure_4(runs, replace_lags("linear", True), replace_cycles(linear=rest_cycle)).verdict == "reproduced"
-    assert figure_5(runs, lags, replace_cycles(luenberger=rest_cycle)).verdict == "not reproduced"
-    assert (
-        figure_5(runs, replace_lags("luenberger", True), replace_cycles(luenberger=rest_cycle)).verdict == "reproduced"
-    )
-    assert figure_6_at_rest(lags, replace_cycles(homogeneous=rest_cycle)).verdict == "reproduced"
-    quiet = replace_cycles(homogeneous=rest_cycle, linear=rest_cycle, luenberger=rest_cycle)
+    calm = Cycle(False, 0.0, 0.1)
+    assert figure_4(runs, lags, replace_cycles(linear=calm)).verdict == "not reproduced"
+    assert figure_4(runs, replace_lags("linear", True), replace_cycles(linear=calm)).verdict == "reproduced"
+    assert figure_5(runs, lags, replace_cycles(luenberger=calm)).verdict == "not reproduced"
+    assert figure_5(runs, replace_lags("luenberger", True), replace_cycles(luenberger=calm)).verdict == "reproduced"
+    assert figure_6_at_rest(lags, replace_cycles(homogeneous=calm)).verdict == "reproduced"
+    quiet = replace_cycles(homogeneous=calm, linear=calm, luenberger=calm)
     assert figure_6_at_rest(lags, quiet).verdict == "not reproduced"  # nothing for (10) to be without
     assert cause_of_figure_5(replace_cycles(**{WITH_Y2: Cycle(True, 0.1, 1.0)})).verdict == "reproduced"
     assert cause_of_figure_5(replace_cycles(**{WITH_Y2: Cycle(True, 0.12, 1.0)})).verdict == "not reproduced"
@@ -165,14 +164,6 @@ def test_figure_6_with_a_fall(runs: Loops, cycles: Cycles) -> None:
 # --- what is better -----------------------------------------------------------------------------------------
 
 VELOCITY = "velocity_rms_error_rad_s"
-
-
-def make_result(errors: list[float], *, fell: int = 0, tilts: list[float] | None = None) -> Result:
-    """Worlds with these velocity errors, of which the last ones fell."""
-    kinds = ["done"] * (len(errors) - fell) + ["fell"] * fell
-    rows = zip(errors, tilts or errors, strict=True)
-    summaries = [{VELOCITY: error, "tilt_rms_deg": tilt} for error, tilt in rows]
-    return Result([Outcome(kind, 5.0) for kind in kinds], summaries)  # type: ignore[arg-type]
 
 
 def replace_outcomes(result: Result, errors: np.ndarray, *, fell: int = 0) -> Result:

@@ -178,13 +178,13 @@ def claim(results: Lags) -> Claim:
     )
 
 
-def _table(results: Lags) -> str:
+def _table(lags: Lags) -> str:
     rows = []
     for name, equation in (OBSERVERS | {"truth": "true rate in the law"}).items():
         lag, latency, forecast = (
-            results.thresholds.get(name),
-            results.latencies.get(name),
-            results.predictions.get(name),
+            lags.thresholds.get(name),
+            lags.latencies.get(name),
+            lags.predictions.get(name),
         )
         rows.append(
             (
