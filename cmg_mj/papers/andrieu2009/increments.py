@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from cmg_mj.elementwise import signed_power
@@ -35,19 +37,27 @@ def linear_increments() -> Claim:
     )
 
 
-def largest_increment(p: float) -> float:
-    """Return the worst quotient of the two sides of (3) for g = 0, over both signs and sizes from 1e-4 to 1e4.
+def worst_quotient(p: float, size: float, bound: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> float:
+    """Return the worst quotient of an increment of x2^(1+p) and its bound, over both signs and sizes up to one.
 
-    g adds |g| |x2 - x2_hat| to both sides at most.
+    With g = 0: |g| |x2 - x2_hat| adds to both sides at most.
+
+    Args:
+        p: Power of (1).
+        size: Largest size of x2 and x2_hat.
+        bound: The right side, of x2_hat and |x2 - x2_hat|.
     """
-    positive = np.geomspace(1e-4, 1e4, 161)
-    x2 = np.concatenate([-positive, [0.0], positive])
-    x2, x2_hat = np.meshgrid(x2, x2)
+    positive = np.geomspace(1e-4, size, 161)
+    x2, x2_hat = np.meshgrid(*[np.concatenate([-positive, [0.0], positive])] * 2)
     d = np.abs(x2 - x2_hat)
     left_side = np.abs(signed_power(x2, 1.0 + p) - signed_power(x2_hat, 1.0 + p))
-    right_side = (1.0 + p) * np.abs(x2_hat) ** p * d + d ** (1.0 + p)
     distinct = d > 1e-6 * np.maximum(np.abs(x2), np.abs(x2_hat))  # nearer, the left side is rounding errors
-    return float((left_side[distinct] / right_side[distinct]).max())
+    return float((left_side[distinct] / bound(x2_hat, d)[distinct]).max())
+
+
+def largest_increment(p: float) -> float:
+    """Return the worst quotient of the two sides of (3), over sizes from 1e-4 to 1e4."""
+    return worst_quotient(p, 1e4, lambda x2_hat, d: (1.0 + p) * np.abs(x2_hat) ** p * d + d ** (1.0 + p))
 
 
 def increments() -> Claim:
@@ -77,17 +87,8 @@ def exponent_of_section_2_1(n: int, i: int, j: int, d_inf: float) -> float:
 
 
 def quotient_of_6(exponent: float, p: float, size: float) -> float:
-    """Return the worst quotient of the sides of (6) for (1), c_inf = 1, Gamma, v_2 of section 2.1, up to a size of x2.
-
-    With g = 0: |g| adds to both sides alike.
-    """
-    positive = np.geomspace(1e-4, size, 161)
-    x2, x2_hat = np.meshgrid(*[np.concatenate([-positive, [0.0], positive])] * 2)
-    d = np.abs(x2 - x2_hat)
-    left_side = np.abs(signed_power(x2, 1.0 + p) - signed_power(x2_hat, 1.0 + p))
-    right_side = paper.Omega(0.0, x2_hat, p) * d + d**exponent
-    distinct = d > 1e-6 * np.maximum(np.abs(x2), np.abs(x2_hat))
-    return float((left_side[distinct] / right_side[distinct]).max())
+    """Return the worst quotient of the sides of (6) for (1), c_inf = 1, Gamma, v_2 of section 2.1, up to a size."""
+    return worst_quotient(p, size, lambda x2_hat, d: paper.Omega(0.0, x2_hat, p) * d + d**exponent)
 
 
 def exponent_of_6() -> Claim:

@@ -11,7 +11,7 @@ from cmg_mj.papers.aranovskiy2020.comparison import AngleSource
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import push_intervals, trajectory_of
+from cmg_mj.papers.recorded import loop_panels, trajectory_of
 from cmg_mj.papers.scales import on_common_scales
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.results.intervals import known_interval
@@ -74,29 +74,18 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
 
 def _picture(name: str, examples: Mapping[AngleSource, Trajectory]) -> Picture:
     """Draw two columns: the law on measured angles, the law on estimated ones."""
-    rows: list[list[Panel]] = [[], [], [], []]
+    columns = []
     for angles, example in examples.items():
-        t, shaded = example["time_s"], push_intervals(example)
-        tilt = [
-            Line(t, np.degrees(example["y1_rad"]), "measured y1", color=7, width=0.6),
-            Line(t, np.degrees(example["x1_rad"]), "true x1", color=0),
-        ]
-        rates = [
-            Line(t, example[f"estimate/{name}/x2_rad_s"], f"estimate of {OBSERVERS[name]}", color=1, width=0.6),
-            Line(t, example["x2_rad_s"], "true x2", color=0),
-        ]
-        gimbal = [Line(t, np.degrees(example["x3_rad"]), "true x3", color=0)]
-        command = [Line(t, example["u_rad_s"], "u", color=3, width=0.6)]
-        rows[0].append(Panel("tilt [deg]", tilt, f"{angles} angles", shaded=shaded))
-        rows[1].append(Panel("tilt rate [rad/s]", rates, shaded=shaded))
-        rows[2].append(Panel("gimbal angle [deg]", gimbal, shaded=shaded))
-        rows[3].append(Panel("command u [rad/s]", command, shaded=shaded))
+        column = loop_panels(example, name, OBSERVERS[name], f"{angles} angles", 0.6)
+        gimbal = [Line(example["time_s"], np.degrees(example["x3_rad"]), "true x3", color=0)]
+        column.insert(2, Panel("gimbal angle [deg]", gimbal, shaded=column[0].shaded))
+        columns.append(column)
     number = FIGURES[name].removeprefix("Fig. ")
     return Picture(
         f"aranovskiy2020-fig-{number}",
         f"aranovskiy2020, Fig. {number}: the loop closed on {OBSERVERS[name]}, the law on measured and on estimated "
         "angles",
-        [panel for row in rows for panel in row],
+        [panel for row in zip(*columns, strict=True) for panel in row],
         columns=2,
     )
 
