@@ -136,7 +136,7 @@ def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: 
         result = experiment.run(**view.options())
         view.ended(report_run(experiment, result))
         save_run(RunFolder(Path("it"), []), report_run(experiment, result))
-    assert view.lost == ""
+    assert view.failure == ""
     until_it_is_still(Path("received.rrd"))
     assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
 
@@ -253,7 +253,7 @@ def test_a_run_ends_and_its_viewer_stays(monkeypatch: pytest.MonkeyPatch) -> Non
     said = cmg_mj(
         "run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--live", "--pace=max", "--out=it"
     )
-    started = viewer._started[-1]
+    started = viewer._viewers[-1]
     try:
         assert said.status == 0, said
         assert started.process.poll() is None
