@@ -21,12 +21,12 @@ FILE = Path(__file__).parent / "bounds.json"
 
 def bounds(groups: list[dict[str, float]]) -> dict[str, list[float]]:
     """Figure -> [low, high]."""
-    found = {}
+    result = {}
     for name in groups[0]:
         values = [group[name] for group in groups]
         mean, spread = statistics.fmean(values), 4.0 * statistics.stdev(values)
-        found[name] = [float(f"{max(mean - spread, 0.0):.4g}"), float(f"{mean + spread:.4g}")]
-    return found
+        result[name] = [float(f"{max(mean - spread, 0.0):.4g}"), float(f"{mean + spread:.4g}")]
+    return result
 
 
 def main() -> None:

@@ -79,11 +79,11 @@ def test_logs(first: int, monkeypatch: pytest.MonkeyPatch) -> None:
         rate = None if "time" in roles and rng.random() < 0.7 else float(rng.choice([1.0, 100.0, 1e5]))
         try:
             with no_hang():
-                replayed = replay_log(
+                result = replay_log(
                     read_log(path, ReadOptions(roles, rate_hz=rate)), ["linear", "finite_difference"], settle_s=0.1
                 )
             right += 1
-            assert replayed.summaries["zero"]["noise_gain_1_s"] == 0.0
+            assert result.summaries["zero"]["noise_gain_1_s"] == 0.0
         except InputError as error:
             complaints.append(str(error))
         except BaseException as error:

@@ -368,10 +368,10 @@ def test_a_law_that_remembers_in_itself_is_fresh_in_every_run() -> None:
     experiment = prepare(
         load_scenario("push_recovery", ["push=[]", "duration_s=0.1", f"controller.kind={__name__}:Remembers"])
     )
-    one, again = experiment.run().trajectory, experiment.run().trajectory
+    one, rerun = experiment.run().trajectory, experiment.run().trajectory
     assert one is not None
-    assert again is not None
-    np.testing.assert_array_equal(one["u_rad_s"], again["u_rad_s"])
+    assert rerun is not None
+    np.testing.assert_array_equal(one["u_rad_s"], rerun["u_rad_s"])
     assert one["u_rad_s"][-1] == pytest.approx(0.01 * len(one))
     with pytest.raises(InputError, match="differs"):
         prepare(load_scenario("push_recovery")).run_many(2, vary={"controller.kind": ["lqg", "state_feedback"]})

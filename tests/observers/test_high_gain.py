@@ -159,9 +159,9 @@ def test_a_larger_error_is_corrected_more_than_in_proportion() -> None:
     ],
 )
 def test_what_the_theorem_does_not_allow_is_refused(parameters: dict, message: str) -> None:
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(InputError, match=message) as info:
         high_gain(**parameters)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(info.value)
 
 
 def test_the_fastest_gains_that_are_taken_are_stable() -> None:

@@ -86,6 +86,6 @@ def test_a_users_class_in_a_scenario() -> None:
 )
 def test_what_is_wrong_with_a_class_is_named_in_one_line(kind: str, parameters: dict, message: str) -> None:
     """What is wrong with a name, or with a parameter of the bench's own: tests/inputs/."""
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(InputError, match=message) as info:
         observer(kind, **parameters)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(info.value)

@@ -99,9 +99,9 @@ def test_varied_rigs_are_those_of_their_own_scenarios() -> None:
     alone = prepare(load_scenario("push_recovery", ["duration_s=1.0", "push=[]", "plant.equilibrium_bias_deg=1.0"]))
     varied = experiment().run_many([5, 6], vary={"equilibrium_bias_deg": np.array([0.0, 1.0])})
     assert varied.trajectory is not None
-    again = alone.run(world=6).trajectory
-    assert again is not None
-    np.testing.assert_array_equal(varied.trajectory["x2_rad_s"][:, 1], again["x2_rad_s"])
+    rerun = alone.run(world=6).trajectory
+    assert rerun is not None
+    np.testing.assert_array_equal(varied.trajectory["x2_rad_s"][:, 1], rerun["x2_rad_s"])
 
 
 def test_equal_settings_share_one_rig() -> None:

@@ -217,9 +217,9 @@ def fails(path: Path) -> None:
 
 def test_what_cannot_be_written_whole_replaces_nothing(either_way: str) -> None:
     fill("it", "old", "a", "b")
-    with RunFolder(Path("it")) as folder, pytest.raises(InputError) as caught:
+    with RunFolder(Path("it")) as folder, pytest.raises(InputError) as info:
         folder.write({"b": fails, **writers("new", "a")})
-    assert str(caught.value) == "it/incomplete/b: cannot be written: No space left on device"
+    assert str(info.value) == "it/incomplete/b: cannot be written: No space left on device"
     assert holds("it") == {"a": "old", "b": "old", "incomplete/a": "new"}
 
 

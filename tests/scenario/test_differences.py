@@ -102,8 +102,8 @@ def test_folder_title_and_summary_tell(command: list[Any]) -> None:
     summary = json.loads(Path(f"runs/{folder}/summary.json").read_text())
     for entry in summary if isinstance(summary, list) else [summary]:
         assert entry["differs"] == {"duration_s": 0.1, "plant.equilibrium_bias_deg": 1.0, "push": []}
-    again = cmg_mj("run", f"runs/{folder}/scenario.toml")
-    assert again.out.splitlines()[0].endswith("equilibrium_bias_deg=1, push=none")
+    rerun = cmg_mj("run", f"runs/{folder}/scenario.toml")
+    assert rerun.out.splitlines()[0].endswith("equilibrium_bias_deg=1, push=none")
 
 
 def test_an_observer_that_the_bundled_scenario_does_not_suit() -> None:

@@ -211,8 +211,8 @@ def test_resolving_twice_changes_nothing(fields: dict[str, Any]) -> None:
     if "plant" in fields:
         fields = {**fields, "sensors": sensors}
     once = prepare(parse_scenario(fields)).resolved()
-    again = prepare(load_scenario(write(tomli_w.dumps(once)))).resolved()
-    assert again == once
+    rerun = prepare(load_scenario(write(tomli_w.dumps(once)))).resolved()
+    assert rerun == once
     assert tomllib.loads(tomli_w.dumps(once)) == once
 
 

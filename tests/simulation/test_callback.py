@@ -320,10 +320,10 @@ def test_an_exception_comes_out_of_mj_step_and_takes_the_callback_out() -> None:
     plant, data = setup.plant, setup.plant.new_data()
     message = r"Counted raised KeyError: 'lost' at t = 0\.035 s"
     with somebody_elses():
-        with pytest.raises(RunStopped, match=message) as caught, control_callback(plant, controller):
+        with pytest.raises(RunStopped, match=message) as info, control_callback(plant, controller):
             mujoco.mj_step(plant.model, data, 400)
         assert mujoco.get_mjcb_control() is other_callback
-    assert isinstance(caught.value.__cause__, KeyError)
+    assert isinstance(info.value.__cause__, KeyError)
     assert calls["step"] == 7
 
 

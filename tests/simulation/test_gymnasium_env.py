@@ -169,16 +169,16 @@ picture = env.render()
 print(picture.shape, picture.dtype, picture.std() > 10.0)
 env.close()
 """
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-W", "error", "-c", program],
         env=environment(MUJOCO_GL=os.environ.get("MUJOCO_GL", "egl")),
         cwd=ROOT,
         capture_output=True,
         text=True,
     )
-    if done.returncode and "MUJOCO_GL" not in os.environ and ("OpenGL" in done.stderr or "EGL" in done.stderr):
+    if process.returncode and "MUJOCO_GL" not in os.environ and ("OpenGL" in process.stderr or "EGL" in process.stderr):
         pytest.skip("nothing draws here")
-    assert (done.returncode, done.stdout) == (0, "(480, 640, 3) uint8 True\n"), done.stderr
+    assert (process.returncode, process.stdout) == (0, "(480, 640, 3) uint8 True\n"), process.stderr
 
 
 @pytest.mark.parametrize(
@@ -219,5 +219,5 @@ def test_a_wrong_action(action: np.ndarray) -> None:
 @pytest.mark.slow
 def test_without_gymnasium_it_says_how_to_get_it() -> None:
     program = "import sys; sys.modules['gymnasium'] = None\nimport cmg_mj.simulation.gymnasium_env"
-    done = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True)
-    assert 'environment: gymnasium is not installed: python -m pip install "cmg_mj[gymnasium]"' in done.stderr
+    process = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True)
+    assert 'environment: gymnasium is not installed: python -m pip install "cmg_mj[gymnasium]"' in process.stderr

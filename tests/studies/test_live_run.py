@@ -63,7 +63,7 @@ def end(viewer: Viewer, how: signal.Signals) -> None:
 
 def content(path: Path) -> dict[tuple[str, str], dict[Any, Any]]:
     """(entity, component) -> time [ns], None where there is none, -> value: all that a recording holds."""
-    found: dict[tuple[str, str], dict[Any, Any]] = {}
+    result: dict[tuple[str, str], dict[Any, Any]] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a stream has no footer
         chunks = list(RrdReader(path).stream())
@@ -74,12 +74,12 @@ def content(path: Path) -> dict[tuple[str, str], dict[Any, Any]]:
         if not chunk.is_static:
             times = batch.column("sim_time").to_numpy(zero_copy_only=False).astype(np.int64).tolist()
         for name in names:
-            rows = found.setdefault((chunk.entity_path, name), {})
+            rows = result.setdefault((chunk.entity_path, name), {})
             for at, value in zip(times, batch.column(name).to_pylist(), strict=True):
                 if value is not None:
                     assert at is None or at not in rows or rows[at] == value  # a page may be written anew
                     rows[at] = value
-    return found
+    return result
 
 
 def assert_alike(streamed: Path, saved: Path) -> None:
@@ -250,12 +250,12 @@ def test_a_viewer_is_heard_on_this_machine_alone(receiver: Viewer) -> None:
 def test_a_run_ends_and_its_viewer_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     """The command that starts one: here with a viewer that needs no screen, of which rerun has several kinds."""
     monkeypatch.setattr(viewer, "start_viewer", lambda: start_viewer(["--serve-grpc"]))
-    said = cmg_mj(
+    outcome = cmg_mj(
         "run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--live", "--pace=max", "--out=it"
     )
     started = viewer._viewers[-1]
     try:
-        assert said.status == 0, said
+        assert outcome.status == 0, outcome
         assert started.process.poll() is None
     finally:
         end(started, signal.SIGKILL)
@@ -265,8 +265,8 @@ def test_a_run_ends_and_its_viewer_stays(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         monkeypatch.delenv(name, raising=False)
-    said = cmg_mj("run", "push_recovery", "--live", "--out=it")
-    assert said.complaint.startswith("--live: no viewer could be started: neither WAYLAND_DISPLAY nor ")
+    outcome = cmg_mj("run", "push_recovery", "--live", "--out=it")
+    assert outcome.complaint.startswith("--live: no viewer could be started: neither WAYLAND_DISPLAY nor ")
     assert not Path("it").exists()
 
 
@@ -293,8 +293,8 @@ def test_what_is_wrong_is_said_before_the_run(arguments: list[str], complaint: s
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         unused = probe.getsockname()[1]
-    said = cmg_mj("run", "push_recovery", "--out=it", *(argument.format(unused=unused) for argument in arguments))
-    assert said.complaint.startswith(complaint.format(unused=unused))
+    outcome = cmg_mj("run", "push_recovery", "--out=it", *(argument.format(unused=unused) for argument in arguments))
+    assert outcome.complaint.startswith(complaint.format(unused=unused))
     assert not Path("it").exists()
 
 

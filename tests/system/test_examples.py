@@ -48,7 +48,7 @@ def test_there_is_an_example_for_each() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_runs(path: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, path, *OPTIONS.get(path.stem, [])],
         cwd=tmp_path,
         env=environment(),
@@ -56,8 +56,8 @@ def test_runs(path: Path, tmp_path: Path) -> None:
         text=True,
         timeout=HANGS_AFTER_S,
     )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert SAYS[path.stem] in done.stdout
+    assert (process.returncode, process.stderr) == (0, "")
+    assert SAYS[path.stem] in process.stdout
     assert list(tmp_path.iterdir()) == []
 
 

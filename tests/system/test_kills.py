@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
     ids=["while folders change names", "while files are moved", "whole runs, at random moments"],
 )
 def test_kills(what: str, kills: int) -> None:
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-m", "tests.system.kill_writers", what],
         env=environment(),
         capture_output=True,
@@ -27,5 +27,5 @@ def test_kills(what: str, kills: int) -> None:
         timeout=HANGS_AFTER_S,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout.split()[0]) >= kills, done.stdout
+    assert process.returncode == 0, process.stderr
+    assert int(process.stdout.split()[0]) >= kills, process.stdout

@@ -61,7 +61,7 @@ def test_is_one_page() -> None:
 @pytest.mark.parametrize("number", range(len(SNIPPETS)))
 def test_a_snippet_runs(number: int, tmp_path: Path) -> None:
     code = SNIPPETS[number]
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code],
         cwd=tmp_path,
         env=environment(),
@@ -69,8 +69,8 @@ def test_a_snippet_runs(number: int, tmp_path: Path) -> None:
         text=True,
         timeout=HANGS_AFTER_S,
     )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert bool(done.stdout) == ("print(" in code)
+    assert (process.returncode, process.stderr) == (0, "")
+    assert bool(process.stdout) == ("print(" in code)
 
 
 @pytest.mark.slow
@@ -99,9 +99,9 @@ def test_a_command_runs(line: str) -> None:
         assert arguments[0] in (*PAPERS, "all", "beyond")
         return
     assert command in CHEAPER, f"{line}: say in CHEAPER how to try it"
-    said = cmg_mj(command, *arguments, *shlex.split(CHEAPER[command]))
-    assert said.status == 0, said
-    assert said.out
+    outcome = cmg_mj(command, *arguments, *shlex.split(CHEAPER[command]))
+    assert outcome.status == 0, outcome
+    assert outcome.out
 
 
 def test_the_first_command_writes_what_it_says() -> None:

@@ -61,9 +61,9 @@ def test_what_would_not_be_the_same_in_c_is_refused(name: str, words: str, tmp_p
 
 def refused(name: str, folder: Path) -> str:
     """The complaint; and nothing is left."""
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError) as info:
         export(controller(f"tests.codegen.export.own:{name}"), folder / "export")
-    complaint = str(caught.value)
+    complaint = str(info.value)
     assert "\n" not in complaint
     assert complaint.startswith(f"tests.codegen.export.own:{name} cannot be exported: ")
     assert not (folder / "export").exists()

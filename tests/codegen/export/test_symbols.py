@@ -70,9 +70,9 @@ def test_a_state_is_taken_apart_and_put_together() -> None:
     state = own.Elaborate(0.005, None).init(Measurement(0.1, 0.2, 0.3))
     result = list(numbers(state))
     assert [leaf.value for leaf in result] == [0, False, 0.1, 0.0, 0.0, 0.1, 0.2, 0.3, 0.0]
-    again = rebuild(state, iter(range(9)))
-    assert form(again) == form(state)
-    assert (again.last.acceleration, again.parts["π"].other, again.label) == (7, [3, 4], "a constant")
+    rerun = rebuild(state, iter(range(9)))
+    assert form(rerun) == form(state)
+    assert (rerun.last.acceleration, rerun.parts["π"].other, rerun.label) == (7, [3, 4], "a constant")
     assert form(state._replace(label="another")) != form(state)
 
 

@@ -189,8 +189,8 @@ def test_a_run_says_which_law_and_reruns(elsewhere: None) -> None:
     assert outcome.status == 0
     name = "runs/push_recovery-homogeneous-0-kind=lqg-torque_walk=0.1"
     assert name in outcome.err
-    again = cmg_mj("run", f"{name}/scenario.toml", "--out", "again")
-    assert again.status == 0
+    rerun = cmg_mj("run", f"{name}/scenario.toml", "--out", "again")
+    assert rerun.status == 0
     one, other = Trajectory.load(Path(name, "trajectory.parquet")), Trajectory.load(Path("again/trajectory.parquet"))
     for column in one.columns:
         np.testing.assert_array_equal(one[column], other[column])

@@ -41,9 +41,9 @@ RIGS = [
 def test_it_is_the_integral_of_the_best_command(model: ReducedModel, rate: float, travel: float) -> None:
     pole = math.sqrt(model.gravity_torque / model.J1)
     S = quad(lambda t: math.exp(-pole * t) * rate * math.cos(rate * t), 0.0, travel / rate)[0] / pole
-    found = ceiling(model, rate, travel)
-    assert found.tilt == pytest.approx(model.J_d * model.omega_d / model.J1 * S, rel=1e-9)
-    assert found.pole == pytest.approx(pole)
+    result = ceiling(model, rate, travel)
+    assert result.tilt == pytest.approx(model.J_d * model.omega_d / model.J1 * S, rel=1e-9)
+    assert result.pole == pytest.approx(pole)
 
 
 @pytest.mark.parametrize("model", RIGS)

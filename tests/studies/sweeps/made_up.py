@@ -26,7 +26,7 @@ def made_up(varied: dict[str, str], observers: tuple[str, ...], worlds: int, err
     for number, point in enumerate(study.points):
         for observer in observers:
             for world in range(worlds):
-                found = error(point, observer, world)
+                result = error(point, observer, world)
                 row = {"point": number, **point, "observer": observer, "world": world, "seed": 0}
-                rows.append(row | {"outcome": "fell" if found is None else "done", VELOCITY: found})
+                rows.append(row | {"outcome": "fell" if result is None else "done", VELOCITY: result})
     return Trials(study, [table_of(study, rows)])

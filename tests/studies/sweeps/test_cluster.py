@@ -68,9 +68,9 @@ def trials(folder: Path) -> list[dict]:
 def test_two_workers_find_what_one_process_finds(tmp_path: Path) -> None:
     observers = ("--observers", "linear,gyro_free,homogeneous", "--worlds", "3")
     assert sweep(tmp_path, "one", *observers).status == 0
-    said = sweep(tmp_path, "two", *observers, "--cluster", "local:2")
-    assert said.status == 0, said
-    assert said.err.startswith("Written to two."), said
+    outcome = sweep(tmp_path, "two", *observers, "--cluster", "local:2")
+    assert outcome.status == 0, outcome
+    assert outcome.err.startswith("Written to two."), outcome
     assert (tmp_path / "two" / "trials.parquet").read_bytes() == (tmp_path / "one" / "trials.parquet").read_bytes()
     for chunk in (tmp_path / "one" / "chunks").iterdir():
         assert (tmp_path / "two" / "chunks" / chunk.name).read_bytes() == chunk.read_bytes()
@@ -84,9 +84,9 @@ def test_a_killed_worker_costs_what_it_was_computing(tmp_path: Path) -> None:
     observers = ("--observers", "linear,mine:Once,gyro_free,homogeneous")
     assert sweep(tmp_path, "one", *observers).status == 0
     (tmp_path / "cluster").touch()
-    said = sweep(tmp_path, "two", *observers, "--cluster", "local:2")
-    assert said.status == 0, said
-    assert said.err.startswith("Written to two."), said
+    outcome = sweep(tmp_path, "two", *observers, "--cluster", "local:2")
+    assert outcome.status == 0, outcome
+    assert outcome.err.startswith("Written to two."), outcome
     assert not (tmp_path / "cluster").exists()  # a worker was killed
     assert (tmp_path / "two" / "trials.parquet").read_bytes() == (tmp_path / "one" / "trials.parquet").read_bytes()
 
@@ -99,8 +99,8 @@ def test_a_chunk_that_kills_three_workers_is_rows_with_a_reason_and_its_neighbou
     observers = ("--observers", "linear,mine:Always,gyro_free,homogeneous", "--worlds", "2")
     assert sweep(tmp_path, "one", *observers).status == 0
     (tmp_path / "cluster").touch()
-    said = sweep(tmp_path, "two", *observers, "--cluster", "local:2")
-    assert said.status == 0, said
+    outcome = sweep(tmp_path, "two", *observers, "--cluster", "local:2")
+    assert outcome.status == 0, outcome
     for alone, on_cluster in zip(trials(tmp_path / "one"), trials(tmp_path / "two"), strict=True):
         if alone["observer"] == "mine:Always":
             assert (on_cluster["outcome"], on_cluster["reason"]) == ("stopped", "its chunk has killed 3 workers")
@@ -134,9 +134,9 @@ def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> 
     kept = [path.name for path in chunks.iterdir()]
     assert kept
     assert all(name.endswith(".parquet") for name in kept)
-    until = time.monotonic() + 20.0
+    deadline = time.monotonic() + 20.0
     while alive := living(process.pid):
-        assert time.monotonic() < until, alive
+        assert time.monotonic() < deadline, alive
         time.sleep(0.1)
 
 
@@ -174,9 +174,9 @@ def test_an_observer_that_a_worker_cannot_import_is_one_line(tmp_path: Path) -> 
     (here / "mine.py").write_text(KILLER.format(name="Mine", what="pass"))
     with cluster(tmp_path, there) as (address, scheduler):
         assert sweep(here, "fine", "--cluster", address).status == 0
-        said = sweep(here, "out", "--observers", "mine:Mine", "--cluster", address)
-        assert f"--cluster {address}: worker tcp://127.0.0.1:" in said.complaint
-        assert "observer.kind = 'mine:Mine': cannot be imported: ModuleNotFoundError" in said.complaint
+        outcome = sweep(here, "out", "--observers", "mine:Mine", "--cluster", address)
+        assert f"--cluster {address}: worker tcp://127.0.0.1:" in outcome.complaint
+        assert "observer.kind = 'mine:Mine': cannot be imported: ModuleNotFoundError" in outcome.complaint
         scheduler.kill()
         scheduler.wait()
         assert "cannot be reached" in sweep(here, "gone", "--cluster", address).complaint
@@ -185,8 +185,8 @@ def test_an_observer_that_a_worker_cannot_import_is_one_line(tmp_path: Path) -> 
 @distributed
 @pytest.mark.parametrize("address", ["nowhere", "local:0", "local:x"])
 def test_a_word_that_is_no_cluster_is_refused(tmp_path: Path, address: str) -> None:
-    said = cmg_mj(*SWEEP, "--out", tmp_path / "out", "--cluster", address)
-    assert said.complaint.startswith(f"--cluster {address}: write ")
+    outcome = cmg_mj(*SWEEP, "--out", tmp_path / "out", "--cluster", address)
+    assert outcome.complaint.startswith(f"--cluster {address}: write ")
     assert not (tmp_path / "out").exists()
 
 
@@ -203,8 +203,8 @@ def test_a_word_that_is_no_cluster_is_refused(tmp_path: Path, address: str) -> N
     ],
 )
 def test_what_is_no_cluster_is_one_line(tmp_path: Path, address: str, complaint: str) -> None:
-    said = sweep(tmp_path, "out", "--cluster", address)
-    assert f"--cluster {address}: {complaint}" in said.complaint
+    outcome = sweep(tmp_path, "out", "--cluster", address)
+    assert f"--cluster {address}: {complaint}" in outcome.complaint
     assert not (tmp_path / "out").exists()
 
 
@@ -218,6 +218,6 @@ def test_a_worker_of_another_version_is_refused() -> None:
 
 def test_without_distributed_it_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.studies.sweeps.dask_cluster.find_spec", lambda name: None)
-    said = cmg_mj(*SWEEP, "--out", str(tmp_path / "out"), "--cluster", NOBODY)
-    assert said.complaint == '--cluster: distributed is not installed: python -m pip install "cmg_mj[cluster]"'
+    outcome = cmg_mj(*SWEEP, "--out", str(tmp_path / "out"), "--cluster", NOBODY)
+    assert outcome.complaint == '--cluster: distributed is not installed: python -m pip install "cmg_mj[cluster]"'
     assert not (tmp_path / "out").exists()

@@ -41,14 +41,14 @@ def times(folder: Path) -> dict[str, int]:
 def test_a_disk_that_is_full_in_the_middle(tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count()
     monkeypatch.setattr(files.os, "fsync", lambda number: next(calls) == 2 and full())  # the study, a chunk, a chunk
-    said = cmg_mj(*SWEEP, tmp_path)
-    assert said.complaint == f"{tmp_path / 'chunks' / '000001.parquet'}: {GOES_ON}"
+    outcome = cmg_mj(*SWEEP, tmp_path)
+    assert outcome.complaint == f"{tmp_path / 'chunks' / '000001.parquet'}: {GOES_ON}"
     kept = times(tmp_path / "chunks")
     assert list(kept) == ["000000.parquet"]  # nothing half written either
     monkeypatch.undo()
-    again = cmg_mj(*SWEEP, tmp_path)
-    assert again.status == 0
-    assert "4 of 12 trials are there from before" in again.err
+    rerun = cmg_mj(*SWEEP, tmp_path)
+    assert rerun.status == 0
+    assert "4 of 12 trials are there from before" in rerun.err
     assert kept.items() <= times(tmp_path / "chunks").items()
     assert (tmp_path / "trials.parquet").read_bytes() == whole
 

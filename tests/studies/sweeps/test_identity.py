@@ -43,8 +43,8 @@ def test_chunks_whose_study_is_lost_serve_no_other(out: Path) -> None:
     other = [word.replace("=0,1", "=0,2") for word in SWEEP]
     assert cmg_mj(*other, out).complaint == f"{out / 'chunks' / '000000.parquet'}: holds no trials of this study{CURE}"
     assert contents(out) == before
-    again = cmg_mj(*SWEEP, out)
-    assert "8 of 8 trials are there from before" in again.err
+    rerun = cmg_mj(*SWEEP, out)
+    assert "8 of 8 trials are there from before" in rerun.err
     assert contents(out) | {"study.toml": b""} == before | {"study.toml": b""}
 
 

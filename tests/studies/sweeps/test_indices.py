@@ -22,15 +22,15 @@ def test_the_indices_of_a_known_function() -> None:
     """Ishigami's: 0.314, 0.442, 0 and 0.558, 0.442, 0.244 in closed form."""
     first, total = np.array([0.3139, 0.4424, 0.0]), np.array([0.5576, 0.4424, 0.2437])
     n = 1024
-    found = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
-    np.testing.assert_allclose(found.first, first, atol=0.03)
-    np.testing.assert_allclose(found.total, total, atol=0.03)
-    for low, of, high in ((found.first_low, first, found.first_high), (found.total_low, total, found.total_high)):
+    result = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
+    np.testing.assert_allclose(result.first, first, atol=0.03)
+    np.testing.assert_allclose(result.total, total, atol=0.03)
+    for low, of, high in ((result.first_low, first, result.first_high), (result.total_low, total, result.total_high)):
         assert (low <= of).all()
         assert (of <= high).all()
         assert (high - low < 0.4).all()
-    again = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
-    assert all(np.array_equal(a, b) for a, b in zip(found, again, strict=True))
+    rerun = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
+    assert all(np.array_equal(a, b) for a, b in zip(result, rerun, strict=True))
 
 
 def test_the_indices_of_a_list() -> None:

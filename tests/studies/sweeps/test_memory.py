@@ -35,11 +35,11 @@ def study(points: int, worlds: int = 1) -> SweepStudy:
 @contextmanager
 def peak() -> Iterator[list[float]]:
     """What Python takes meanwhile, at most [MB]."""
-    found: list[float] = []
+    result: list[float] = []
     tracemalloc.start()
     try:
-        yield found
-        found.append(tracemalloc.get_traced_memory()[1] / MB)
+        yield result
+        result.append(tracemalloc.get_traced_memory()[1] / MB)
     finally:
         tracemalloc.stop()
 
@@ -74,9 +74,9 @@ def test_a_sweep_keeps_what_it_needs_and_no_more(tmp_path: Path, monkeypatch: py
     of = study(TRIALS)
     store = Store(tmp_path, of)
     store.open()
-    with peak() as running:
+    with peak() as process:
         run(store)
-    assert running[0] < 3.0
+    assert process[0] < 3.0
     arrow = pa.total_allocated_bytes()
     with peak() as writing:
         trials = Trials(of, store.tables(COLUMNS))

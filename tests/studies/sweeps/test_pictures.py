@@ -36,9 +36,9 @@ def on_a_grid() -> Trials:
 
 
 def the_map(picture: Picture) -> Map:
-    found = picture.panels[0].map
-    assert found is not None
-    return found
+    result = picture.panels[0].map
+    assert result is not None
+    return result
 
 
 def test_a_map_has_the_best_of_every_cell() -> None:

@@ -22,8 +22,8 @@ def test_ctrl_c_before_the_first_tick(monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plan, "compute", interrupted)
-    said = cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run")
-    assert (said.status, said.out, said.err) == (130, "", "cmg-mj: interrupted\n")
+    outcome = cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run")
+    assert (outcome.status, outcome.out, outcome.err) == (130, "", "cmg-mj: interrupted\n")
 
 
 def test_ctrl_c_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -46,7 +46,7 @@ def test_how_long_in_words(minutes: float, words: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "options", "points"),
+    ("message", "options", "points"),
     [
         ("-1:1", {"design": "sample", "n": 20_000_000}, 20_000_000),
         ("-1:1", {"design": "sobol", "n": 2**22}, 2**24),
@@ -54,7 +54,7 @@ def test_how_long_in_words(minutes: float, words: str) -> None:
     ],
 )
 def test_the_points_of_a_very_large_study_are_not_drawn(
-    said: str, options: dict[str, Any], points: int, monkeypatch: pytest.MonkeyPatch
+    message: str, options: dict[str, Any], points: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[int] = []
     sampled = study.sampled
@@ -65,7 +65,7 @@ def test_the_points_of_a_very_large_study_are_not_drawn(
 
     monkeypatch.setattr(study, "sampled", noted)
     monkeypatch.setattr(plan, "compute", lambda study, piece, tick: [study.points[at] for at, _ in piece.trials])
-    axes = tuple(parse_axis(field, said, field) for field in (BIAS, TORQUE))
+    axes = tuple(parse_axis(field, message, field) for field in (BIAS, TORQUE))
     takes = plan.estimate_cost(SweepStudy(load_scenario("push_recovery"), axes, ("linear",), 2, **options))
     assert drawn == [plan.POINTS]
     assert (takes["points"], takes["trials"]) == (points, 2 * points)

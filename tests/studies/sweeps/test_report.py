@@ -34,10 +34,10 @@ def test_of_a_design_an_observer_has_a_row() -> None:
     trials = sampled()
     trials.outcome[:, 2] = "refused"
     trials.stood = trials.outcome == "done"
-    found = tables_of(trials)
+    result = tables_of(trials)
     bias = np.array([point[BIAS] for point in trials.study.points])
     fell = bias > 0.5
-    for text in (report(found, []), summary(found)):
+    for text in (report(result, []), summary(result)):
         for name, means in (("linear", bias + 0.05), ("ltv", bias + 0.05 * ~fell)):
             figures = [means.mean(), *np.quantile(means, (0.1, 0.5, 0.9))]
             assert row_of(text, name)[1:6] == ["24 of 24", *(f"{figure:.4f}" for figure in figures)]

@@ -65,15 +65,15 @@ def test_a_design_for_indices_is_saltellis() -> None:
     x = np.array([list(point.values()) for point in of.points])
     y = 4.0 * x[:, 0] + 2.0 * x[:, 1] * x[:, 2]
     f_A, f_B, f_AB = y[None, :n], y[None, n : 2 * n], y[2 * n :].reshape(d, 1, n)
-    found = sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": f_AB}, n=n)
+    result = sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": f_AB}, n=n)
     generator: Any = {"random_state": np.random.default_rng(1)}  # as all versions of scipy call it
 
     def function(z: np.ndarray) -> np.ndarray:
         return 4.0 * z[0] + 2.0 * z[1] * z[2]
 
     known = sobol_indices(func=function, n=8192, dists=[uniform()] * d, **generator)
-    np.testing.assert_allclose(found.first_order, known.first_order, atol=0.1)
-    np.testing.assert_allclose(found.total_order, known.total_order, atol=0.1)
+    np.testing.assert_allclose(result.first_order, known.first_order, atol=0.1)
+    np.testing.assert_allclose(result.total_order, known.total_order, atol=0.1)
 
 
 def test_the_same_study_has_the_same_points() -> None:
@@ -91,8 +91,8 @@ def test_a_design_takes_each_value_of_a_list_equally_often(design: Any) -> None:
     of = study(f"{BIAS}=-1:1", f"{rates}=50,100,200,400", f"{NOISE}=log:100:800:4", design=design, n=64)
     assert {type(point[rates]) for point in of.points} == {int}
     for field, values in ((rates, [50, 100, 200, 400]), (NOISE, [100.0, 200.0, 400.0, 800.0])):
-        found, times = np.unique(np.array([point[field] for point in list(of.points)[:64]]), return_counts=True)
-        assert (found.tolist(), times.tolist()) == (values, [16] * 4)
+        result, times = np.unique(np.array([point[field] for point in list(of.points)[:64]]), return_counts=True)
+        assert (result.tolist(), times.tolist()) == (values, [16] * 4)
     points: list[dict[str, Any]] = list(of.points)
     pairs = {(point[rates], point[NOISE]) for point in points}
     assert len(pairs) == 16  # and every combination is there

@@ -84,11 +84,11 @@ def test_killed_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         run(store, stop)
     there = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}
     assert 1 <= len(there) < len(small().chunks)
-    again = Store(tmp_path, small())
-    assert again.open() == 5 * len(there)
-    run(again)
+    rerun = Store(tmp_path, small())
+    assert rerun.open() == 5 * len(there)
+    run(rerun)
     assert there.items() <= {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}.items()
-    merged(again, tmp_path / "trials.parquet")
+    merged(rerun, tmp_path / "trials.parquet")
     assert pq.read_table(tmp_path / "trials.parquet").equals(trials())
 
 

@@ -23,11 +23,11 @@ def quick(elsewhere: None) -> str:
 
 
 def test_command_prints_a_table_and_writes_what_reruns(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--out", "tuned")
-    assert said.status == 0
-    assert "Quick: linear, seed 0" in said.out
-    assert "given 0.02" in said.out
-    assert said.err == "Written to tuned. Run with the tuned observer: cmg-mj run tuned/scenario.toml\n"
+    outcome = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--out", "tuned")
+    assert outcome.status == 0
+    assert "Quick: linear, seed 0" in outcome.out
+    assert "given 0.02" in outcome.out
+    assert outcome.err == "Written to tuned. Run with the tuned observer: cmg-mj run tuned/scenario.toml\n"
     figures = json.loads(Path("tuned/tuned.json").read_text())
     (level,) = figures["levels"]
     tuned = load_scenario("tuned/scenario.toml")
@@ -37,8 +37,8 @@ def test_command_prints_a_table_and_writes_what_reruns(quick: str) -> None:
 
 
 def test_json_has_every_figure(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--noise-levels", "200,400", "--json")
-    figures = json.loads(said.out)
+    outcome = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--noise-levels", "200,400", "--json")
+    figures = json.loads(outcome.out)
     assert figures["tuned"] == ["tau"]
     assert figures["worlds_fitted"] == 3
     assert figures["window_s"] == pytest.approx([0.2, 0.6])
@@ -55,10 +55,10 @@ def test_json_has_every_figure(quick: str) -> None:
 
 
 def test_several_noises_make_a_scenario_each(quick: str) -> None:
-    said = cmg_mj(
+    outcome = cmg_mj(
         "tune", quick, "--observer", "linear", "--worlds", 2, "--noise-levels", "200,400", "--out", "t", "--json"
     )
-    assert said.err == ""
+    assert outcome.err == ""
     for noise in (200.0, 400.0):
         scenario = load_scenario(f"t/scenario-{noise:g}.toml")
         assert scenario.sensors.accelerometer.noise_density_ug_rthz == noise
@@ -81,13 +81,13 @@ def test_an_interruption_keeps_the_noises_that_are_done(quick: str) -> None:
 
 
 def test_without_a_push_it_says_what_the_window_is(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 2, "--set", "push=[]")
-    assert "There is no push: the window is the whole run" in said.out
+    outcome = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 2, "--set", "push=[]")
+    assert "There is no push: the window is the whole run" in outcome.out
 
 
 def test_a_users_own_observer_by_its_path(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", OWN, "--worlds", 2, "--json")
-    assert json.loads(said.out)["tuned"] == ["gain"]
+    outcome = cmg_mj("tune", quick, "--observer", OWN, "--worlds", 2, "--json")
+    assert json.loads(outcome.out)["tuned"] == ["gain"]
 
 
 def test_help_names_the_experiment() -> None:
@@ -124,7 +124,7 @@ def test_wrong_input_is_one_line(quick: str, arguments: list[str], line: str) ->
 
 def test_figures_are_plain_json(quick: str) -> None:
     """Nothing that JSON does not know, such as NaN."""
-    said = cmg_mj("tune", quick, "--observer", "homogeneous", "--parameters", "k1", "--worlds", 2, "--json")
-    assert TypeAdapter(dict).validate_json(said.out)
-    assert "NaN" not in said.out
-    assert "Infinity" not in said.out
+    outcome = cmg_mj("tune", quick, "--observer", "homogeneous", "--parameters", "k1", "--worlds", 2, "--json")
+    assert TypeAdapter(dict).validate_json(outcome.out)
+    assert "NaN" not in outcome.out
+    assert "Infinity" not in outcome.out

@@ -109,14 +109,14 @@ def test_the_verdict_is_that_of_the_ratio_in_the_table() -> None:
 
 
 @pytest.mark.parametrize(
-    ("zeros", "said"), [((0.104, 0.10402), "0.1040 rad/s"), ((0.1, 0.2), "0.1000 to 0.2000 rad/s")]
+    ("zeros", "message"), [((0.104, 0.10402), "0.1040 rad/s"), ((0.1, 0.2), "0.1000 to 0.2000 rad/s")]
 )
-def test_an_estimate_of_zero_is_one_number_where_it_is_the_same(zeros: tuple[float, float], said: str) -> None:
+def test_an_estimate_of_zero_is_one_number_where_it_is_the_same(zeros: tuple[float, float], message: str) -> None:
     recorded = recorder("linear", lambda *_: {"tau": 0.03})
     study = tune(load_scenario("observer_tuning", observer="linear"), worlds=2, recorded=recorded)
     levels = [dataclasses.replace(study.levels[0], zero_rms=zero) for zero in zeros]
     caption = str(tuning_table(dataclasses.replace(study, levels=levels)).caption)
-    assert f"An estimate of zero: {said}." in caption
+    assert f"An estimate of zero: {message}." in caption
 
 
 @pytest.mark.slow

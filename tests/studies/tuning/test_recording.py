@@ -63,8 +63,8 @@ def test_half_a_second_of_warm_up_is_enough_for_the_papers_observers() -> None:
     whole, short = (record(scenario, range(4), warm_up_s=span) for span in (2.0, 0.5))
     model = prepare(scenario).plant.reduced
     for name in ("linear", "ltv", "homogeneous"):
-        of = make_observer(name, DT, model)
-        np.testing.assert_allclose(short.errors(of), whole.errors(of), rtol=1e-3)
+        estimator = make_observer(name, DT, model)
+        np.testing.assert_allclose(short.errors(estimator), whole.errors(estimator), rtol=1e-3)
 
 
 def test_worlds_that_fell_are_left_out_and_too_many_are_refused() -> None:
@@ -83,8 +83,8 @@ def test_noise_is_that_of_the_level() -> None:
 def test_scenarios_that_differ_in_anything_that_is_recorded_have_recordings_of_their_own() -> None:
     changes = ([], ["sensors.encoder.counts_per_revolution=360"], ["controller.rate_limit_rad_s=2"])
     scenarios = [load_scenario("observer_tuning", ["seed=5", "duration_s=3.2", *change]) for change in changes]
-    made = recorder([(scenario, range(2), 400.0) for scenario in scenarios])
+    result = recorder([(scenario, range(2), 400.0) for scenario in scenarios])
     for scenario in scenarios:
-        asked = made(scenario, range(2), noise_ug_rthz=400.0, warm_up_s=2.0)
+        asked = result(scenario, range(2), noise_ug_rthz=400.0, warm_up_s=2.0)
         alone = record(scenario, range(2), noise_ug_rthz=400.0)
         np.testing.assert_array_equal(asked.trajectory["y2_rad"], alone.trajectory["y2_rad"])

@@ -60,12 +60,12 @@ class View:
 def views(path: Path) -> list[View]:
     reader = RrdReader(path)
     (store,) = reader.blueprints()
-    found: dict[str, View] = {}
+    result: dict[str, View] = {}
     for chunk in reader.stream(store=store):
         matched = re.match(r"/view/([^/]+)/?(.*)", chunk.entity_path)
         if not matched:
             continue
-        view, below = found.setdefault(matched[1], View()), matched[2]
+        view, below = result.setdefault(matched[1], View()), matched[2]
         batch = chunk.to_record_batch()
         values: dict[str, Any] = {name: batch.column(name).to_pylist()[0] for name in batch.schema.names if ":" in name}
         overall_observers = re.sub(r"^ViewContents/overrides(/.*?)/visualizers.*", r"\1", below)
@@ -84,11 +84,11 @@ def views(path: Path) -> list[View]:
         for name in ("position", "look_target"):
             if values.get(f"EyeControls3D:{name}"):
                 view.eye[name] = np.array(values[f"EyeControls3D:{name}"][0])
-    return list(found.values())
+    return list(result.values())
 
 
-def named(found: Sequence[View], name: str) -> list[View]:
-    return [view for view in found if view.name == name]
+def named(result: Sequence[View], name: str) -> list[View]:
+    return [view for view in result if view.name == name]
 
 
 def recorded(experiment: Experiment) -> Run:
@@ -132,7 +132,7 @@ def compared() -> tuple[Experiment, list[Run]]:
 
 def test_the_best_open_loop_observers_are_on(all_observers: tuple[Experiment, Run], tmp_path: Path) -> None:
     experiment, run = all_observers
-    found = views(write(tmp_path / "it.rrd", experiment, [run]))
+    result = views(write(tmp_path / "it.rrd", experiment, [run]))
     few = best_observers(run)
     assert few[0] == "homogeneous"
     assert len(few) == 3
@@ -142,7 +142,7 @@ def test_the_best_open_loop_observers_are_on(all_observers: tuple[Experiment, Ru
         ("Tilt rate [rad/s]", "rate_estimate"),
         ("Estimation error of the tilt rate [rad/s]", "rate_error"),
     ):
-        first, second = sorted(named(found, title), key=lambda view: len(view.grey))
+        first, second = sorted(named(result, title), key=lambda view: len(view.grey))
         assert first.hidden == {f"/homogeneous/{folder}/{part}" for part in off}
         assert second.grey == first.hidden
         assert f"/homogeneous/{folder}/**" in first.contents
@@ -152,19 +152,19 @@ def test_the_best_open_loop_observers_are_on(all_observers: tuple[Experiment, Ru
 @pytest.mark.slow
 def test_the_best_runs_are_on(compared: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
     experiment, runs = compared
-    found = views(write(tmp_path / "it.rrd", experiment, runs))
+    result = views(write(tmp_path / "it.rrd", experiment, runs))
     few = best_runs(runs)
     on = {f"{i:02}_{run.name}" for i, run in enumerate(runs, 1) if run.name in few}
     for title in ("Tilt, true [deg]", "Command, gimbal rate [rad/s]"):
         first, second = sorted(
-            (view for view in named(found, title) if len(view.contents) > 2), key=lambda v: len(v.grey)
+            (view for view in named(result, title) if len(view.contents) > 2), key=lambda v: len(v.grey)
         )
         assert len(first.contents) == len(runs)
         assert first.contents == second.contents == sorted(first.contents)
         assert {entity.split("/")[1] for entity in set(first.contents) - first.hidden} == on
         assert second.listed == set(second.contents)
         assert {entity.split("/")[1] for entity in second.listed - second.grey} == on
-    lanes = {len(view.contents) for view in named(found, "Phase")}
+    lanes = {len(view.contents) for view in named(result, "Phase")}
     assert lanes == {1, len(few), len(runs)}
     text = summary_of_runs(experiment, runs)
     names = [line.split("|")[1].strip().strip("*") for line in text.splitlines() if line.startswith("| ")]

@@ -425,9 +425,9 @@ def test_rerun_verifies_it_and_finds_a_cut(path: Path, tmp_path: Path) -> None:
 
 
 def test_the_same_run_gives_the_same_recording(path: Path, experiment: Experiment, tmp_path: Path) -> None:
-    again = write(tmp_path / "again.rrd", experiment, [recorded(experiment)])
+    repetition = write(tmp_path / "again.rrd", experiment, [recorded(experiment)])
     compare = ("compare", "--unordered")
-    assert rerun(tmp_path, *compare, path, again).returncode == 0
+    assert rerun(tmp_path, *compare, path, repetition).returncode == 0
     other = write(tmp_path / "other.rrd", experiment, [recorded(prepare(scenario("seed=1")))])
     assert rerun(tmp_path, *compare, path, other).returncode != 0
 

@@ -244,11 +244,11 @@ def test_a_stopped_controller_starts_again_with_another_observer() -> None:
         studio.pause(False)
         rows = studio.rows
         studio.run(0.2)
-        again = studio.rows[len(rows) :]
-        first = np.searchsorted(rows[:, TIME], again[0, TIME] - 1e-9)
-        common = min(len(again), len(rows) - first)
+        rerun = studio.rows[len(rows) :]
+        first = np.searchsorted(rows[:, TIME], rerun[0, TIME] - 1e-9)
+        common = min(len(rerun), len(rows) - first)
         assert common > 10
-        same(again[:common], rows[first : first + common])
+        same(rerun[:common], rows[first : first + common])
 
 
 def test_a_fall_is_said_and_reset_stands_up_again() -> None:

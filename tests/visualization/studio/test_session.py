@@ -62,8 +62,8 @@ def test_it_keeps_the_clocks_pace() -> None:
             studio.now += 0.01
             studio.handle.sync()
         assert studio.data.time == pytest.approx(1.1, abs=0.006)
-        (said,) = studio.heard(messages.StepControlSnapshot)
-        assert said.speed_measured == pytest.approx(10.0, abs=5.0)
+        (remark,) = studio.heard(messages.StepControlSnapshot)
+        assert remark.speed_measured == pytest.approx(10.0, abs=5.0)
         studio.now += 60.0  # a machine that sleeps for a minute does not run it to catch up
         studio.handle.sync()
         assert studio.data.time < 1.5
@@ -186,10 +186,10 @@ def test_history_brings_back_what_was_chosen() -> None:
         studio.pause(False)
         studio.run(0.2)
         assert not np.array_equal(studio.live.model.body_ipos, ipos)
-        again = studio.rows
+        rerun = studio.rows
         then = rows[(rows[:, 0] > time - 1e-9) & (rows[:, 0] < 2.0 - 1e-9)]
-        assert len(again) > 30
-        np.testing.assert_array_equal(again[: len(then)], then[: len(again)])
+        assert len(rerun) > 30
+        np.testing.assert_array_equal(rerun[: len(then)], then[: len(rerun)])
 
 
 def test_what_is_no_longer_remembered_starts_afresh_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -133,9 +133,9 @@ def test_what_is_chosen_is_chosen_on_all_axes_and_history_brings_it_back() -> No
         studio.run(0.7)
         assert not np.array_equal(live.model.body_ipos, ipos)
         assert [part.scenario.plant.equilibrium_bias_deg for part in live.now.parts] == [0.5, -0.3]
-        again, then = studio.rows, before[(before[:, 0] > time - 1e-9) & (before[:, 0] < 2.0 - 1e-9)]
+        rerun, then = studio.rows, before[(before[:, 0] > time - 1e-9) & (before[:, 0] < 2.0 - 1e-9)]
         assert len(then) > 100
-        np.testing.assert_array_equal(again[: len(then)], then[: len(again)])
+        np.testing.assert_array_equal(rerun[: len(then)], then[: len(rerun)])
         studio.send(
             ChangeSettings({OBSERVER: "homogeneous"}), ChangeSettings(choosable_laws(live.base)["the scenario's"])
         )
