@@ -85,8 +85,8 @@ def test_a_written_scenario_reruns_to_the_same_bits(kind: str, monkeypatch: pyte
     monkeypatch.chdir("..")
     trajectories = [Path(f"{place}/trajectory.parquet").read_bytes() for place in ("first", "again", "rerun")]
     assert trajectories[0] == trajectories[1] == trajectories[2]
-    written = [Path(f"{place}/scenario.toml").read_text() for place in ("first", "again", "rerun")]
-    assert written[0] == written[1] == written[2]
+    scenarios = [Path(f"{place}/scenario.toml").read_text() for place in ("first", "again", "rerun")]
+    assert scenarios[0] == scenarios[1] == scenarios[2]
 
 
 def test_another_seed_is_another_run() -> None:
@@ -168,13 +168,15 @@ def test_numbers_json_does_not_know() -> None:
 @pytest.mark.slow
 def test_a_comparison_of_one_world_equals_single_runs() -> None:
     file = write("duration_s = 0.5\n[[push]]\nstart_s = 0.2\n[observer]\nkind = 'homogeneous'\nk1 = 30.0")
-    mine = f"{__name__}:Mine"
-    outcome = cmg_mj("compare", file, "--worlds", 1, "--observers", f"ltv,homogeneous,{mine}", "--json", "--out", "it")
+    user_observer = f"{__name__}:Mine"
+    outcome = cmg_mj(
+        "compare", file, "--worlds", 1, "--observers", f"ltv,homogeneous,{user_observer}", "--json", "--out", "it"
+    )
     assert (outcome.status, outcome.err) == (0, "")
-    compared = json.loads(outcome.out)
-    assert json.loads(Path("it/summary.json").read_text()) == compared
-    assert [entry["observer"] for entry in compared] == ["ltv", "homogeneous", mine, *REFERENCES]
-    for entry, name in zip(compared, ("ltv", "homogeneous", "Mine"), strict=False):
+    rows = json.loads(outcome.out)
+    assert json.loads(Path("it/summary.json").read_text()) == rows
+    assert [entry["observer"] for entry in rows] == ["ltv", "homogeneous", user_observer, *REFERENCES]
+    for entry, name in zip(rows, ("ltv", "homogeneous", "Mine"), strict=False):
         single = json.loads(cmg_mj("run", file, "--observer", entry["observer"], "--json", "--out", name).out)
         shared = {key: entry[key] for key in single.keys() & entry.keys()}
         assert shared == {key: single[key] for key in shared}
@@ -249,9 +251,9 @@ def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, obser
     assert rerun.out == first.out
     assert [row["observer"] for row in json.loads(rerun.out)][: -len(REFERENCES)] == same
     assert pq.read_table("a/worlds.parquet").equals(pq.read_table("b/worlds.parquet"))
-    written = tomllib.loads(Path("a/scenario.toml").read_text(encoding="utf-8"))
-    assert written == tomllib.loads(Path("b/scenario.toml").read_text(encoding="utf-8"))
-    assert written["compare"] == {"observers": same, "worlds": 2}
+    fields = tomllib.loads(Path("a/scenario.toml").read_text(encoding="utf-8"))
+    assert fields == tomllib.loads(Path("b/scenario.toml").read_text(encoding="utf-8"))
+    assert fields["compare"] == {"observers": same, "worlds": 2}
 
 
 @pytest.mark.slow
@@ -259,8 +261,8 @@ def test_options_come_before_what_the_scenario_says_to_compare() -> None:
     file = write("duration_s = 0.2\n[compare]\nobservers = ['ltv', 'linear', 'ltv']\nworlds = 3")
     plain = json.loads(cmg_mj("compare", file, "--json").out)
     assert [(row["observer"], row["worlds"]) for row in plain[: -len(REFERENCES)]] == [("ltv", 3), ("linear", 3)]
-    other = json.loads(cmg_mj("compare", file, "--json", "--observers", "homogeneous", "--worlds", 1).out)
-    assert [(row["observer"], row["worlds"]) for row in other[: -len(REFERENCES)]] == [("homogeneous", 1)]
+    rows = json.loads(cmg_mj("compare", file, "--json", "--observers", "homogeneous", "--worlds", 1).out)
+    assert [(row["observer"], row["worlds"]) for row in rows[: -len(REFERENCES)]] == [("homogeneous", 1)]
     fewer = json.loads(cmg_mj("compare", file, "--json", "--set", "compare.worlds=2").out)
     assert fewer[0]["worlds"] == 2
 

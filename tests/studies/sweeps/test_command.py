@@ -45,17 +45,17 @@ def test_the_files_of_a_sweep(tmp_path: Path) -> None:
     assert cells[2]["velocity_rms_error_rad_s_best"] == "gyro_free"
     rerun = cmg_mj("sweep", str(tmp_path / "out" / "study.toml"), "--out", str(tmp_path / "again"))
     assert rerun.status == 0
-    other = pq.read_table(tmp_path / "again" / "trials.parquet")
-    assert other.equals(pq.read_table(tmp_path / "out" / "trials.parquet"))
-    goes_on = cmg_mj(*SMALL, *SHORT, "--out", str(tmp_path / "out"))
-    assert "12 of 12 trials are there from before" in goes_on.err
+    rerun_trials = pq.read_table(tmp_path / "again" / "trials.parquet")
+    assert rerun_trials.equals(pq.read_table(tmp_path / "out" / "trials.parquet"))
+    second_outcome = cmg_mj(*SMALL, *SHORT, "--out", str(tmp_path / "out"))
+    assert "12 of 12 trials are there from before" in second_outcome.err
 
 
 WEIGHTS = "controller.lqr.state_cost"
 
 
 @pytest.mark.parametrize(
-    "varied",
+    "axes",
     [
         pytest.param(
             ["--set", f"{WEIGHTS}=[286, 3, 0, 0.08]", "--vary", "plant.flywheel_speed_rad_s=200,314"],
@@ -68,10 +68,10 @@ WEIGHTS = "controller.lqr.state_cost"
         ),
     ],
 )
-def test_gains_that_are_solved_for_rerun_from_their_weights(tmp_path: Path, varied: list[str]) -> None:
+def test_gains_that_are_solved_for_rerun_from_their_weights(tmp_path: Path, axes: list[str]) -> None:
     out, rerun = tmp_path / "out", tmp_path / "again"
-    pushed = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2", "--worlds", 2]
-    assert cmg_mj("sweep", "push_recovery", *varied, *pushed, "--out", out).status == 0
+    settings = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2", "--worlds", 2]
+    assert cmg_mj("sweep", "push_recovery", *axes, *settings, "--out", out).status == 0
     assert cmg_mj("sweep", out / "study.toml", "--out", rerun).status == 0
     first = pq.read_table(out / "trials.parquet")
     assert first.equals(pq.read_table(rerun / "trials.parquet"))
@@ -83,15 +83,17 @@ def test_gains_that_are_solved_for_rerun_from_their_weights(tmp_path: Path, vari
 def test_a_row_reruns_alone(tmp_path: Path) -> None:
     """Worlds 0, 1 and 2, fields that go together, a push: `cmg-mj run` with the row's values has its figures."""
     rates, torque = ("controller.rate_hz", "sensors.accelerometer.rate_hz"), "push.0.torque_n_m"
-    varied = ["--vary", f"{'+'.join(rates)}=100,200", "--vary", f"{torque}=0.3:0.5"]
-    own = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2"]
-    how = ["--sample", "2", "--worlds", "3", "--seed", "7", "--observers", "linear,gyro_free"]
-    assert cmg_mj("sweep", "push_recovery", *varied, *own, *how, "--out", tmp_path / "out").status == 0
+    axes = ["--vary", f"{'+'.join(rates)}=100,200", "--vary", f"{torque}=0.3:0.5"]
+    settings = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2"]
+    design = ["--sample", "2", "--worlds", "3", "--seed", "7", "--observers", "linear,gyro_free"]
+    assert cmg_mj("sweep", "push_recovery", *axes, *settings, *design, "--out", tmp_path / "out").status == 0
     rows = pq.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
     for row in (rows[0], rows[4], rows[8]):
-        of_row = [part for field in (*rates, torque) for part in ("--set", f"{field}={row[field]}")]
-        which = ["--observer", row["observer"], "--seed", row["seed"], "--world", row["world"]]
-        outcome = cmg_mj("run", "push_recovery", *own, *of_row, *which, "--json", "--out", tmp_path / "alone")
+        row_settings = [part for field in (*rates, torque) for part in ("--set", f"{field}={row[field]}")]
+        run_options = ["--observer", row["observer"], "--seed", row["seed"], "--world", row["world"]]
+        outcome = cmg_mj(
+            "run", "push_recovery", *settings, *row_settings, *run_options, "--json", "--out", tmp_path / "alone"
+        )
         assert outcome.status == 0, outcome
         alone = json.loads(outcome.out)
         figures = {key for key in FIGURES if row[key] is not None}
@@ -126,18 +128,18 @@ def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_design_for_indices(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    varied = ["--vary", f"{BIAS}=-1:1", "--vary", "sensors.accelerometer.noise_density_ug_rthz=log:100:800"]
-    arguments = ["sweep", "push_recovery", *varied, "--sobol", "16", "--worlds", "2", *SHORT, "--out", str(out)]
+    axes = ["--vary", f"{BIAS}=-1:1", "--vary", "sensors.accelerometer.noise_density_ug_rthz=log:100:800"]
+    arguments = ["sweep", "push_recovery", *axes, "--sobol", "16", "--worlds", "2", *SHORT, "--out", str(out)]
     outcome = cmg_mj(*arguments, "--observers", "linear")
     assert outcome.status == 0
     rows = pq.read_table(out / "indices.parquet").to_pylist()
-    of = {row["field"]: row for row in rows if row["figure"] == "velocity_rms_error_rad_s"}
-    noise = of["sensors.accelerometer.noise_density_ug_rthz"]
+    row_of = {row["field"]: row for row in rows if row["figure"] == "velocity_rms_error_rad_s"}
+    noise = row_of["sensors.accelerometer.noise_density_ug_rthz"]
     assert noise["total_low"] < noise["total"] < noise["total_high"]
     assert not any("push" in row["figure"] for row in rows)
-    in_short = f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]"
+    interval_text = f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]"
     assert "| total index, velocity RMS error |" in " ".join(outcome.out.split())
-    assert in_short in outcome.out
+    assert interval_text in outcome.out
     report = (out / "report.md").read_text(encoding="utf-8")
     assert f"| linear     | {BIAS} " in report
     assert f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]" in report
@@ -226,23 +228,26 @@ def test_another_study_is_refused_and_nothing_lost(tmp_path: Path) -> None:
 def test_killed_at_random_moments(tmp_path: Path) -> None:
     """The same command again and again, until it is done: the same trials as in one go."""
     arguments = [*SMALL[:-1], "40", "--vary", "controller.rate_hz=100,200", "--set", "duration_s=4", "--set", "push=[]"]
-    whole, killed = tmp_path / "whole", tmp_path / "killed"
-    cmg_mj(*arguments, "--out", str(whole))
+    uninterrupted, interrupted = tmp_path / "whole", tmp_path / "killed"
+    cmg_mj(*arguments, "--out", str(uninterrupted))
     rng = np.random.default_rng(5)
     kills = 0
     while kills < int(os.environ.get("CMG_MJ_KILLS", "3")):
         process = subprocess.Popen(
-            [*COMMAND, *arguments, "--out", str(killed)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, cwd=ROOT
+            [*COMMAND, *arguments, "--out", str(interrupted)],
+            stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            cwd=ROOT,
         )
         time.sleep(rng.uniform(0.5, 6.0))
         if process.poll() is None:
             process.send_signal(signal.SIGKILL)
         process.wait()
         kills += 1
-        chunks = killed / "chunks"
+        chunks = interrupted / "chunks"
         if chunks.exists() and kills % 3 == 0:  # all over again, now and then
             for path in chunks.iterdir():
                 path.unlink()
-    assert cmg_mj(*arguments, "--out", str(killed)).status == 0
-    assert (killed / "trials.parquet").read_bytes() == (whole / "trials.parquet").read_bytes()
-    assert not list(killed.rglob("*.partial"))
+    assert cmg_mj(*arguments, "--out", str(interrupted)).status == 0
+    assert (interrupted / "trials.parquet").read_bytes() == (uninterrupted / "trials.parquet").read_bytes()
+    assert not list(interrupted.rglob("*.partial"))

@@ -46,7 +46,7 @@ def test_how_long_in_words(minutes: float, words: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("message", "options", "points"),
+    ("axis_text", "options", "points"),
     [
         ("-1:1", {"design": "sample", "n": 20_000_000}, 20_000_000),
         ("-1:1", {"design": "sobol", "n": 2**22}, 2**24),
@@ -54,19 +54,19 @@ def test_how_long_in_words(minutes: float, words: str) -> None:
     ],
 )
 def test_the_points_of_a_very_large_study_are_not_drawn(
-    message: str, options: dict[str, Any], points: int, monkeypatch: pytest.MonkeyPatch
+    axis_text: str, options: dict[str, Any], points: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn: list[int] = []
-    sampled = study.sampled
+    counts: list[int] = []
+    sample = study.sampled
 
-    def noted(dimensions: int, n: int, *others: Any, **options: Any) -> Any:
-        drawn.append(n)
-        return sampled(dimensions, n, *others, **options)
+    def count_points(dimensions: int, n: int, *arguments: Any, **options: Any) -> Any:
+        counts.append(n)
+        return sample(dimensions, n, *arguments, **options)
 
-    monkeypatch.setattr(study, "sampled", noted)
+    monkeypatch.setattr(study, "sampled", count_points)
     monkeypatch.setattr(plan, "compute", lambda study, piece, tick: [study.points[at] for at, _ in piece.trials])
-    axes = tuple(parse_axis(field, message, field) for field in (BIAS, TORQUE))
+    axes = tuple(parse_axis(field, axis_text, field) for field in (BIAS, TORQUE))
     takes = plan.estimate_cost(SweepStudy(load_scenario("push_recovery"), axes, ("linear",), 2, **options))
-    assert drawn == [plan.POINTS]
+    assert counts == [plan.POINTS]
     assert (takes["points"], takes["trials"]) == (points, 2 * points)
     assert takes["chunks"] == -(-2 * points // study.CHUNK)

@@ -113,10 +113,10 @@ def test_in_a_study_file(sweep: str, complaint: str) -> None:
     ],
 )
 def test_from_python(options: dict[str, Any], complaint: str) -> None:
-    given: dict[str, Any] = {"vary": {BIAS: [0, 1]}} | options
-    with pytest.raises(InputError) as refused:
-        swept.sweep("push_recovery", **given)
-    assert_in(complaint, str(refused.value))
+    arguments: dict[str, Any] = {"vary": {BIAS: [0, 1]}} | options
+    with pytest.raises(InputError) as info:
+        swept.sweep("push_recovery", **arguments)
+    assert_in(complaint, str(info.value))
 
 
 def test_values_from_python(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,7 +155,7 @@ def test_a_whole_number_that_no_column_of_them_holds() -> None:
 
 def assert_in(pattern: str, message: str) -> None:
     """The parts of a pattern, with ` .* ` between, stand in a line one after the other."""
-    at = 0
+    position = 0
     for part in pattern.split(" .* "):
-        at = message.find(part, at)
-        assert at >= 0, f"{part!r} is not in {message!r}"
+        position = message.find(part, position)
+        assert position >= 0, f"{part!r} is not in {message!r}"

@@ -28,8 +28,10 @@ from cmg_mj.studies.sweeps.study import SweepStudy
 SETTINGS = ("duration_s=0.6", "push=[]")
 
 
-def study(varied: dict[str, str], observers: tuple[str, ...] = ("linear", "gyro_free"), worlds: int = 2) -> SweepStudy:
-    axes = [parse_axis(field, said, field) for field, said in varied.items()]
+def study(
+    axes_text: dict[str, str], observers: tuple[str, ...] = ("linear", "gyro_free"), worlds: int = 2
+) -> SweepStudy:
+    axes = [parse_axis(field, text, field) for field, text in axes_text.items()]
     return SweepStudy(load_scenario("push_recovery", SETTINGS), tuple(axes), observers, worlds)
 
 
@@ -51,10 +53,10 @@ def trials() -> pa.Table:
 @pytest.mark.slow
 def test_each_trial_is_the_run_of_its_own_row() -> None:
     """`cmg-mj run` with the row's own values, to the last bit."""
-    of = small()
-    assert trials().num_rows == of.trials == 32
+    sweep = small()
+    assert trials().num_rows == sweep.trials == 32
     for row in trials().to_pylist()[::5]:
-        settings = [f"{axis.field}={row[axis.field]}" for axis in of.axes]
+        settings = [f"{axis.field}={row[axis.field]}" for axis in sweep.axes]
         alone = prepare(load_scenario("push_recovery", [*SETTINGS, *settings], row["observer"]))
         (summary,) = alone.run(world=row["world"]).summaries
         assert {key: row[key] for key in summary if key in row} == {key: summary[key] for key in summary if key in row}
@@ -75,19 +77,21 @@ def test_killed_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert store.open() == 0
     computed = 0
 
-    def stop(done: float) -> None:
+    def stop(share: float) -> None:
         nonlocal computed
-        if done > 12:
+        if share > 12:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         run(store, stop)
-    there = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}
-    assert 1 <= len(there) < len(small().chunks)
+    chunk_times = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}
+    assert 1 <= len(chunk_times) < len(small().chunks)
     rerun = Store(tmp_path, small())
-    assert rerun.open() == 5 * len(there)
+    assert rerun.open() == 5 * len(chunk_times)
     run(rerun)
-    assert there.items() <= {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}.items()
+    assert (
+        chunk_times.items() <= {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}.items()
+    )
     merged(rerun, tmp_path / "trials.parquet")
     assert pq.read_table(tmp_path / "trials.parquet").equals(trials())
 
@@ -154,14 +158,14 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
 
     def fails(experiments: list[Experiment], worlds: list[int], **options: Unpack[SimulationOptions]) -> Result:
         batches.append(len(worlds))
-        if any(each.scenario.plant.initial_tilt_deg == 5.0 for each in experiments):
+        if any(experiment.scenario.plant.initial_tilt_deg == 5.0 for experiment in experiments):
             raise MemoryError("not in there")
         return run_batch(experiments, worlds, **options)
 
     monkeypatch.setattr(work, "run_batch", fails)
-    told = []
-    of = study({"plant.initial_tilt_deg": "0,5,1,2"}, ("linear",), 1)
-    rows = work.compute(of, of.chunks[0], told.append)
+    shares = []
+    sweep = study({"plant.initial_tilt_deg": "0,5,1,2"}, ("linear",), 1)
+    rows = work.compute(sweep, sweep.chunks[0], shares.append)
     assert [(row["outcome"], row["reason"] or "") for row in rows] == [
         ("done", ""),
         ("stopped", "MemoryError: not in there"),
@@ -169,8 +173,8 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
         ("done", ""),
     ]
     assert batches == [4, 2, 1, 1, 2]
-    assert told == sorted(told)  # what runs again is no step back
-    assert told[-1] == pytest.approx(1.0)
+    assert shares == sorted(shares)  # what runs again is no step back
+    assert shares[-1] == pytest.approx(1.0)
 
 
 def test_columns_are_those_of_a_worlds_table() -> None:

@@ -12,7 +12,7 @@ from cmg_mj.cli.tune import tune as tune_command
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.tuning import tune
 from tests.command import cmg_mj
-from tests.studies.tuning.own import OWN
+from tests.studies.tuning.user_observer import USER_OBSERVER
 
 
 @pytest.fixture
@@ -30,9 +30,9 @@ def test_command_prints_a_table_and_writes_what_reruns(quick: str) -> None:
     assert outcome.err == "Written to tuned. Run with the tuned observer: cmg-mj run tuned/scenario.toml\n"
     figures = json.loads(Path("tuned/tuned.json").read_text())
     (level,) = figures["levels"]
-    tuned = load_scenario("tuned/scenario.toml")
-    assert tuned.observer.kind == "linear"
-    assert tuned.observer.parameters == level["parameters"]
+    scenario = load_scenario("tuned/scenario.toml")
+    assert scenario.observer.kind == "linear"
+    assert scenario.observer.parameters == level["parameters"]
     assert cmg_mj("run", "tuned/scenario.toml", "--json").status == 0
 
 
@@ -65,19 +65,19 @@ def test_several_noises_make_a_scenario_each(quick: str) -> None:
 
 
 def test_an_interruption_keeps_the_noises_that_are_done(quick: str) -> None:
-    def until_the_second(share: float) -> None:
+    def stop_in_the_second(share: float) -> None:
         if share > 0.6:
             raise KeyboardInterrupt
 
     scenario = load_scenario(quick, ["observer.kind=linear"])
-    study = tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=until_the_second)
+    study = tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=stop_in_the_second)
     assert [level.noise_ug_rthz for level in study.levels] == [200.0]
 
-    def at_once(share: float) -> None:
+    def stop_at_once(share: float) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=at_once)
+        tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=stop_at_once)
 
 
 def test_without_a_push_it_says_what_the_window_is(quick: str) -> None:
@@ -86,7 +86,7 @@ def test_without_a_push_it_says_what_the_window_is(quick: str) -> None:
 
 
 def test_a_users_own_observer_by_its_path(quick: str) -> None:
-    outcome = cmg_mj("tune", quick, "--observer", OWN, "--worlds", 2, "--json")
+    outcome = cmg_mj("tune", quick, "--observer", USER_OBSERVER, "--worlds", 2, "--json")
     assert json.loads(outcome.out)["tuned"] == ["gain"]
 
 

@@ -18,9 +18,11 @@ Error = Callable[[dict[str, Any], str, int], float | None]
 """Point, observer, world -> the velocity error; None for a fall."""
 
 
-def made_up(varied: dict[str, str], observers: tuple[str, ...], worlds: int, error: Error, **options: Any) -> Trials:
+def make_trials(
+    axes_text: dict[str, str], observers: tuple[str, ...], worlds: int, error: Error, **options: Any
+) -> Trials:
     """A sweep whose velocity errors are given."""
-    axes = tuple(parse_axis(field, said, field) for field, said in varied.items())
+    axes = tuple(parse_axis(field, text, field) for field, text in axes_text.items())
     study = SweepStudy(load_scenario("push_recovery"), axes, observers, worlds, **options)
     rows = []
     for number, point in enumerate(study.points):
