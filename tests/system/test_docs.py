@@ -72,10 +72,10 @@ def module(name: str, code: str, folder: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec
     assert spec.loader
-    result = importlib.util.module_from_spec(spec)
-    sys.modules[name] = result
-    spec.loader.exec_module(result)
-    return result
+    module_object = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module_object
+    spec.loader.exec_module(module_object)
+    return module_object
 
 
 def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,11 +83,11 @@ def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest
     observer, test = (textwrap.dedent(block) for block in re.findall(r" *```python\n(.*?)```", text, flags=re.DOTALL))
     kind, path = re.findall(r'`"(\w+)": "([\w.:]+)",`', text)[0]
     home, _, name = path.partition(":")
-    result = module("an_observer_of_contributing", observer, tmp_path)
+    observer_module = module("an_observer_of_contributing", observer, tmp_path)
     monkeypatch.setitem(OBSERVERS, kind, f"an_observer_of_contributing:{name}")
     assert home == f"cmg_mj.observers.{kind}"
     assert f"`cmg_mj/observers/{kind}.py`" in text
-    assert result.__doc__
+    assert observer_module.__doc__
     test_contract.test_every_parameter_is_documented(kind)
     test_contract.test_step_has_no_memory_but_the_state(kind)
     test_contract.test_arrays_equal_floats_bit_by_bit(kind, 5)

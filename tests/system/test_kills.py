@@ -14,13 +14,13 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("what", "kills"),
+    ("mode", "kills"),
     [("whole", 30), ("moved", 25), ("random", 20)],
     ids=["while folders change names", "while files are moved", "whole runs, at random moments"],
 )
-def test_kills(what: str, kills: int) -> None:
+def test_kills(mode: str, kills: int) -> None:
     process = subprocess.run(
-        [sys.executable, "-m", "tests.system.kill_writers", what],
+        [sys.executable, "-m", "tests.system.kill_writers", mode],
         env=environment(),
         capture_output=True,
         text=True,

@@ -58,10 +58,10 @@ def test_a_run_whose_output_is_closed_is_written_whole(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_current_folder_that_is_gone(tmp_path: Path) -> None:
-    gone = tmp_path / "gone"
-    gone.mkdir()
+    folder = tmp_path / "gone"
+    folder.mkdir()
     process = shell(
-        f"rmdir ../gone; $CMG_MJ check push_recovery >/dev/null && $CMG_MJ run push_recovery --out {tmp_path}", gone
+        f"rmdir ../gone; $CMG_MJ check push_recovery >/dev/null && $CMG_MJ run push_recovery --out {tmp_path}", folder
     )
     assert process.returncode == 2
     assert process.stderr == "cmg-mj: the current folder: No such file or directory\n"

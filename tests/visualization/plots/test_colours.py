@@ -31,22 +31,22 @@ LAB += [[0.0259040371, 0.7827717662, -0.8086757660]]
 """Oklab (Ottosson 2020): distances in it are about those that are seen; black and white are 1 apart."""
 
 
-def linear(shown: list[Colour]) -> np.ndarray:
+def linear(colours: list[Colour]) -> np.ndarray:
     """Linear light, (n, 3), of sRGB."""
-    c = np.array(shown) / 255.0
+    c = np.array(colours) / 255.0
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
-def least_distance(shown: list[Colour], sight: str) -> float:
+def least_distance(colours: list[Colour], sight: str) -> float:
     """How far apart the two most alike are for one kind of sight."""
-    seen = np.clip(linear(shown) @ np.transpose(SIGHT[sight]), 0.0, 1.0)
-    lab = np.cbrt(seen @ np.transpose(LMS)) @ np.transpose(LAB)
-    apart = np.linalg.norm(lab[:, None] - lab, axis=-1)
-    return float(apart[np.triu_indices(len(shown), 1)].min())
+    response = np.clip(linear(colours) @ np.transpose(SIGHT[sight]), 0.0, 1.0)
+    lab = np.cbrt(response @ np.transpose(LMS)) @ np.transpose(LAB)
+    distances = np.linalg.norm(lab[:, None] - lab, axis=-1)
+    return float(distances[np.triu_indices(len(colours), 1)].min())
 
 
-def luminance(shown: list[Colour]) -> np.ndarray:
-    return linear(shown) @ [0.2126, 0.7152, 0.0722]
+def luminance(colours: list[Colour]) -> np.ndarray:
+    return linear(colours) @ [0.2126, 0.7152, 0.0722]
 
 
 @pytest.mark.parametrize(

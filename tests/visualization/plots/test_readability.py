@@ -22,7 +22,7 @@ TRUE = 0.5 * np.sin(np.linspace(0.0, 20.0, 2001))
 """From -0.5 to 0.5."""
 
 
-def seen(low: float, high: float) -> object:
+def with_margin(low: float, high: float) -> object:
     room = MARGIN * (high - low)
     return pytest.approx((low - room, high + room), rel=1e-3)
 
@@ -34,14 +34,14 @@ def noise(size: float) -> np.ndarray:
 def test_what_must_be_seen_is_seen_whole() -> None:
     spike = TRUE.copy()
     spike[7] = 4.0
-    assert axis_range([spike]) == seen(-0.5, 4.0)
-    assert axis_range([TRUE, spike]) == seen(-0.5, 4.0)
+    assert axis_range([spike]) == with_margin(-0.5, 4.0)
+    assert axis_range([TRUE, spike]) == with_margin(-0.5, 4.0)
 
 
 def test_an_outlier_of_an_estimate_is_not() -> None:
     spike = TRUE.copy()
     spike[7] = 1e6
-    assert axis_range([TRUE], [spike]) == seen(-0.5, 0.5)
+    assert axis_range([TRUE], [spike]) == with_margin(-0.5, 0.5)
 
 
 @pytest.mark.parametrize("bad", [noise(100.0), np.geomspace(1.0, 1e300, 2001), np.geomspace(1.0, 1e300, 2001) * -1.0])
@@ -62,7 +62,7 @@ def test_a_moderate_estimate_has_its_noise_shown() -> None:
 
 def test_values_that_are_none_are_passed_over() -> None:
     broken = np.array([math.nan, math.inf, -math.inf])
-    assert axis_range([TRUE, broken], [broken]) == seen(-0.5, 0.5)
+    assert axis_range([TRUE, broken], [broken]) == with_margin(-0.5, 0.5)
     assert axis_range([broken], [TRUE]) == axis_range([], [TRUE])
 
 

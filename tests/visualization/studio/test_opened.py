@@ -15,7 +15,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.visualization.studio import viewers
 from tests.command import COMMAND, cmg_mj, cmg_mj_process
 
-REFUSED = [
+BAD_ARGUMENTS = [
     (["no_such"], "'no_such': no such file, nor a bundled one"),
     (["push_recovery", "--set", "plant.no_such=1"], "plant.no_such"),
     (["push_recovery", "--observer", "homogenous"], "did you mean 'homogeneous'"),
@@ -23,7 +23,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "message"), REFUSED)
+@pytest.mark.parametrize(("arguments", "message"), BAD_ARGUMENTS)
 def test_a_bad_scenario_is_one_line(arguments: list[str], message: str, elsewhere: None) -> None:
     assert message in cmg_mj("studio", *arguments).complaint
 
@@ -38,18 +38,18 @@ def test_graphics_that_cannot_be_had_are_one_line(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize(
-    ("returned", "message"),
+    ("status_and_error", "message"),
     [
         ((1, "x\nValueError: Target not found: out\nbye"), "(ValueError: Target not found: out)"),
         ((134, ""), "(a window ends the process, status 134)"),
     ],
 )
 def test_graphics_are_tried_in_a_process_of_their_own(
-    monkeypatch: pytest.MonkeyPatch, returned: tuple[int, str], message: str
+    monkeypatch: pytest.MonkeyPatch, status_and_error: tuple[int, str], message: str
 ) -> None:
     monkeypatch.setattr(sys, "version_info", (3, 12, 0))
-    tried = subprocess.CompletedProcess([], returned[0], "", returned[1])
-    monkeypatch.setattr(viewers.subprocess, "run", lambda *_, **__: tried)
+    process = subprocess.CompletedProcess([], status_and_error[0], "", status_and_error[1])
+    monkeypatch.setattr(viewers.subprocess, "run", lambda *_, **__: process)
     with pytest.raises(InputError, match="take --viewer web") as error:
         viewers.check_graphics("vulkan")
     assert message in str(error.value)
@@ -65,10 +65,10 @@ def free_port() -> int:
 @pytest.mark.slow
 def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
     """In a process of its own: Studio hooks into Python's log, warnings and exceptions for as long as one lasts."""
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
+    with socket.socket() as other_socket:
+        other_socket.bind(("127.0.0.1", 0))
+        other_socket.listen()
+        port = other_socket.getsockname()[1]
         outcome = cmg_mj_process("studio", "push_recovery", "--port", port, cwd=tmp_path)
     assert f"Port {port} is already in use" in outcome.complaint
 
@@ -114,14 +114,14 @@ def test_the_command_listens_on_loopback_alone_and_ends_with_ctrl_c(tmp_path: Pa
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     try:
-        said = []
+        output = []
         assert process.stdout is not None
         for line in process.stdout:
-            said.append(line)
+            output.append(line)
             if "Model changed" in line:
                 break
-        assert any("http://localhost:" in line for line in said)
-        assert set(listening(process.pid)) == {"127.0.0.1"}
+        assert any("http://localhost:" in line for line in output)
+        assert set(listening_addresses(process.pid)) == {"127.0.0.1"}
         process.send_signal(signal.SIGINT)
         rest, _ = process.communicate(timeout=30)
         assert process.returncode == 0
@@ -130,15 +130,15 @@ def test_the_command_listens_on_loopback_alone_and_ends_with_ctrl_c(tmp_path: Pa
         process.kill()
 
 
-def listening(pid: int) -> list[str]:
+def listening_addresses(pid: int) -> list[str]:
     """The addresses at which a process listens."""
     sockets = {os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir() if entry.is_symlink()}
-    result = []
+    addresses = []
     for table in ("tcp", "tcp6"):
         path = Path(f"/proc/{pid}/net/{table}")
         for line in path.read_text().splitlines()[1:] if path.exists() else []:
             fields = line.split()
             if fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets:
                 address = bytes.fromhex(fields[1].split(":")[0])
-                result.append(socket.inet_ntop(socket.AF_INET, address[::-1]) if table == "tcp" else address.hex())
-    return result
+                addresses.append(socket.inet_ntop(socket.AF_INET, address[::-1]) if table == "tcp" else address.hex())
+    return addresses

@@ -85,7 +85,7 @@ def test_it_is_drawn_from_the_first_frame_on(
 
 
 @pytest.mark.parametrize(
-    ("widget", "does", "sends"),
+    ("widget", "action", "message"),
     [
         ("Button", pressed("Push +"), PushRequest(1.0, 0.1)),
         ("Button", pressed("Push -"), PushRequest(-1.0, 0.1)),
@@ -99,25 +99,25 @@ def test_what_is_pressed_is_sent(
     standing: SessionState,
     monkeypatch: pytest.MonkeyPatch,
     widget: str,
-    does: Any,
-    sends: messages.Message,
+    action: Any,
+    message: messages.Message,
 ) -> None:
     screen.panel.on_state(standing)
     screen.frame()
-    monkeypatch.setattr(module.imgui, widget, does)
+    monkeypatch.setattr(module.imgui, widget, action)
     screen.frame()
-    assert screen.sent == [sends]
+    assert screen.sent == [message]
 
 
 def test_of_several_axes_one_is_chosen(screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch) -> None:
     lists: list[str] = []
     combo = module.imgui.Combo
 
-    def listed(label: str, place: int, options: list[str]) -> tuple[bool, int]:
+    def record_list(label: str, place: int, options: list[str]) -> tuple[bool, int]:
         lists.append(label)
         return combo(label, place, options)
 
-    monkeypatch.setattr(module.imgui, "Combo", listed)
+    monkeypatch.setattr(module.imgui, "Combo", record_list)
     screen.panel.on_state(standing)
     screen.frame()
     assert lists == ["observer", "law", "rate fed back"]
@@ -136,35 +136,35 @@ def test_a_number_counts_once_it_is_typed_to_the_end(
     screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     screen.panel.on_state(standing)
-    done = {"now": False}
-    typed = iter([1.0, 1.2, 1.25])
+    edit = {"now": False}
+    values = iter([1.0, 1.2, 1.25])
     current = {"label": ""}
 
     def number(label: str, value: float, *_: Any) -> tuple[bool, float]:
         current["label"] = label
-        return (True, next(typed)) if label.startswith("e ") else (False, value)
+        return (True, next(values)) if label.startswith("e ") else (False, value)
 
     def is_e() -> bool:
         return current["label"].startswith("e ")
 
     monkeypatch.setattr(module.imgui, "InputDouble", number)
-    monkeypatch.setattr(module.imgui, "IsItemActive", lambda: is_e() and not done["now"])
-    monkeypatch.setattr(module.imgui, "IsItemDeactivatedAfterEdit", lambda: is_e() and done["now"])
+    monkeypatch.setattr(module.imgui, "IsItemActive", lambda: is_e() and not edit["now"])
+    monkeypatch.setattr(module.imgui, "IsItemDeactivatedAfterEdit", lambda: is_e() and edit["now"])
     screen.frame()
     screen.frame()
     assert screen.sent == []
-    done["now"] = True
+    edit["now"] = True
     screen.frame()
     assert screen.sent == [ChangeSettings({BIAS: 1.25})]
 
 
 def test_a_stopped_controller_is_said_and_can_be_started(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
-    said: list[str] = []
-    monkeypatch.setattr(module.imgui, "TextWrapped", said.append)
+    texts: list[str] = []
+    monkeypatch.setattr(module.imgui, "TextWrapped", texts.append)
     monkeypatch.setattr(module.imgui, "Button", pressed("Start it again"))
     screen.panel.on_state(SessionState(title="x", stopped="observer Mine raised KeyError: 'gone' at t = 2 s"))
     screen.frame()
-    assert "The controller has stopped: observer Mine raised KeyError: 'gone' at t = 2 s" in said
+    assert "The controller has stopped: observer Mine raised KeyError: 'gone' at t = 2 s" in texts
     assert screen.sent == [RestartController()]
 
 

@@ -62,7 +62,7 @@ def test_it_keeps_the_clocks_pace() -> None:
             studio.now += 0.01
             studio.handle.sync()
         assert studio.data.time == pytest.approx(1.1, abs=0.006)
-        (remark,) = studio.heard(messages.StepControlSnapshot)
+        (remark,) = studio.receive(messages.StepControlSnapshot)
         assert remark.speed_measured == pytest.approx(10.0, abs=5.0)
         studio.now += 60.0  # a machine that sleeps for a minute does not run it to catch up
         studio.handle.sync()
@@ -73,14 +73,14 @@ def test_pause_and_single_steps_change_nothing() -> None:
     with session() as studio:
         studio.run(1.0)
         studio.pause()
-        here = studio.data.time
+        pause_time = studio.data.time
         studio.now += 5.0
         studio.handle.sync()
-        assert studio.data.time == here
+        assert studio.data.time == pause_time
         for _ in range(3):
             studio.send(messages.SingleStepEvent())
             studio.handle.sync()
-        assert studio.data.time == pytest.approx(here + 3 * studio.live.timestep)
+        assert studio.data.time == pytest.approx(pause_time + 3 * studio.live.timestep)
         studio.pause(False)
         studio.run(2.0)
         same(studio.rows, of_runner("duration_s=4.0"))
@@ -187,9 +187,9 @@ def test_history_brings_back_what_was_chosen() -> None:
         studio.run(0.2)
         assert not np.array_equal(studio.live.model.body_ipos, ipos)
         rerun = studio.rows
-        then = rows[(rows[:, 0] > time - 1e-9) & (rows[:, 0] < 2.0 - 1e-9)]
+        first_rows = rows[(rows[:, 0] > time - 1e-9) & (rows[:, 0] < 2.0 - 1e-9)]
         assert len(rerun) > 30
-        np.testing.assert_array_equal(rerun[: len(then)], then[: len(rerun)])
+        np.testing.assert_array_equal(rerun[: len(first_rows)], first_rows[: len(rerun)])
 
 
 def test_what_is_no_longer_remembered_starts_afresh_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
