@@ -19,7 +19,7 @@ def table(*rows: tuple) -> pytest.MarkDecorator:
     """Parametrise with rows (what, input, expected fragments...)."""
     return pytest.mark.parametrize(
         ("wrong_input", "fragments"),
-        [pytest.param(wrong_input, fragments, id=what) for what, wrong_input, *fragments in rows],
+        [pytest.param(wrong_input, fragments, id=case) for case, wrong_input, *fragments in rows],
     )
 
 

@@ -27,7 +27,7 @@ def edited(rig: tuple[str, str] | None = None, cube: tuple[str, str] | None = No
     return check("duration_s = 0.1\n[plant]\nmodel = 'rig.xml'")
 
 
-def without(start: str) -> tuple[str, str]:
+def delete_element(start: str) -> tuple[str, str]:
     return rf"<{start}.*?/>", ""
 
 
@@ -37,25 +37,29 @@ BODY = '<body name="more" pos="1 0 0">{}<inertial pos="0 0 0" mass="1" diaginert
 @table(
     (
         "joint tilt",
-        {"rig": without('joint name="tilt"')},
+        {"rig": delete_element('joint name="tilt"')},
         "the model has no joint 'tilt'; its joints: cube1/flywheel, ",
     ),
     ("typo in tilt", {"rig": ('"tilt"', '"tlit"')}, "the model has no joint 'tilt'; did you mean 'tlit'?"),
     (
         "joint flywheel",
-        {"cube": without('joint name="flywheel"')},
+        {"cube": delete_element('joint name="flywheel"')},
         "has no joint 'cube1/flywheel', 'cube2/flywheel'; its joints: cube1/g",
     ),
-    ("joint gimbal", {"cube": without('joint name="gimbal"')}, "the model has no joint 'cube1/gimbal'"),
+    ("joint gimbal", {"cube": delete_element('joint name="gimbal"')}, "the model has no joint 'cube1/gimbal'"),
     (
         "actuator servo",
-        {"cube": without("intvelocity")},
+        {"cube": delete_element("intvelocity")},
         "has no actuator 'cube1/gimbal_servo', 'cube2/gimbal_servo'; its actuators: cube1/f",
     ),
-    ("actuator motor", {"cube": without("velocity name")}, "the model has no actuator 'cube1/flywheel_motor'"),
-    ("sensor encoder", {"cube": without("jointpos")}, "the model has no sensor 'cube1/gimbal_encoder'"),
-    ("accelerometer", {"rig": without('accelerometer name="accelerometer_inner"')}, "no sensor 'accelerometer_inner'"),
-    ("gyro", {"rig": without("gyro")}, "the model has no sensor 'fog'; its sensors: accelerometer_inner"),
+    ("actuator motor", {"cube": delete_element("velocity name")}, "the model has no actuator 'cube1/flywheel_motor'"),
+    ("sensor encoder", {"cube": delete_element("jointpos")}, "the model has no sensor 'cube1/gimbal_encoder'"),
+    (
+        "accelerometer",
+        {"rig": delete_element('accelerometer name="accelerometer_inner"')},
+        "no sensor 'accelerometer_inner'",
+    ),
+    ("gyro", {"rig": delete_element("gyro")}, "the model has no sensor 'fog'; its sensors: accelerometer_inner"),
     (
         "keyframe",
         {"rig": ("<keyframe>.*</keyframe>", "")},
@@ -142,7 +146,7 @@ def test_a_lock_where_the_keyframe_gives_no_rates() -> None:
         load_plant(model="rig.xml", lock_thrust_bearing=True)
 
 
-AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
+KEYFRAME_ANGLES = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
 """The keyframe's angles of tilt, gimbal, flywheel and gimbal."""
 
 
@@ -162,12 +166,12 @@ AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
     ("a mass of any size", {"cube": ('mass="1.66"', 'mass="1e300"')}, "mass of body 'frame' is no number of any size"),
     (
         "a keyframe that lies flat",
-        {"rig": (AT, "0.78539816339744828 1.5707963267948966 0 1.5707963267948966")},
+        {"rig": (KEYFRAME_ANGLES, "0.78539816339744828 1.5707963267948966 0 1.5707963267948966")},
         "the rig must stand upright, its mass above the tilt axis; it leans by 90 deg ('tilt' = -0.785398 would be up",
     ),
     (
         "gimbals a quarter turn off",
-        {"rig": (AT, "-0.78539816339744828 0 0 0")},
+        {"rig": (KEYFRAME_ANGLES, "-0.78539816339744828 0 0 0")},
         "the axis of 'cube1/flywheel' must be at right angles to the tilt's; it is 90 deg off ('cube1/gimbal' = ",
         "the axis of 'cube2/flywheel'",
         "keyframe 'equilibrium' must have the setpoint (act) of 'cube2/gimbal_servo' where its gimbal stands: 0, not",

@@ -171,12 +171,12 @@ class AsksForMuch(Mine):
 RETURN = "step(state, y, x, u) must return"
 
 
-def named(law: type) -> str:
+def law_path(law: type) -> str:
     return f"{__name__}:{law.__name__}"
 
 
 def set_to(law: type) -> list[str]:
-    return ["--set", f"controller.kind={named(law)}"]
+    return ["--set", f"controller.kind={law_path(law)}"]
 
 
 @table(
@@ -199,7 +199,7 @@ def set_to(law: type) -> list[str]:
 def test_a_law_that_cannot_work(wrong_input: type, fragments: list[str], command: str) -> None:
     """It is found before the run, so that not even a folder is made."""
     if command == "check":
-        Path("mine.toml").write_text(f"[controller]\nkind = '{named(wrong_input)}'")
+        Path("mine.toml").write_text(f"[controller]\nkind = '{law_path(wrong_input)}'")
         outcome = cmg_mj("check", "mine.toml")
         Path("mine.toml").unlink()
     else:
@@ -299,13 +299,13 @@ def test_gains_reach_a_law_of_ones_own_that_takes_them() -> None:
 def test_a_law_for_one_world_among_many(quick: str, wrong_input: type, fragments: list[str]) -> None:
     assert cmg_mj("run", quick, *set_to(wrong_input)).status == 0
     outcome = cmg_mj("compare", quick, *set_to(wrong_input), "--out", "compared")
-    assert_in_order([f"controller.kind = '{named(wrong_input)}': ", *fragments], outcome.complaint)
+    assert_in_order([f"controller.kind = '{law_path(wrong_input)}': ", *fragments], outcome.complaint)
     assert not Path("compared").exists()
 
 
 def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
     """A batch that had no dry run on arrays stops, rather than go on with an estimate that nobody made."""
-    settings = ["push=[]", "duration_s=0.1", f"controller.kind={named(ChangesWhatItIsGiven)}"]
+    settings = ["push=[]", "duration_s=0.1", f"controller.kind={law_path(ChangesWhatItIsGiven)}"]
     result = prepare(load_scenario("push_recovery", settings)).run_many(2)
     assert [outcome.kind for outcome in result.outcomes] == ["stopped"] * 2
     assert "raised ValueError: output array is read-only" in result.outcomes[0].reason
@@ -323,8 +323,8 @@ def test_a_law_that_fails_in_a_run(wrong_input: type, fragments: list[str], driv
     outcome = cmg_mj("run", "push_recovery", *set_to(wrong_input), "--driver", driver, "--out", "it")
     assert outcome.status == 2
     assert "stopped at 0.15 s" in outcome.out
-    written, complaint = outcome.err.splitlines()
-    assert written.startswith("Written to it. ")
+    note, complaint = outcome.err.splitlines()
+    assert note.startswith("Written to it. ")
     assert_in_order(["cmg-mj: ", *fragments, "what was recorded until then is in it"], complaint)
     assert len(assert_whole("it")) == 30
 
@@ -341,17 +341,17 @@ def test_a_law_that_fails_in_one_world_of_many() -> None:
 
 class FailsInWorld1(Mine):
     def command(self, k: int, demanded: Any) -> Any:
-        lost = np.zeros(np.shape(demanded))
+        error = np.zeros(np.shape(demanded))
         if k >= 30:
-            lost[1] = math.nan
-        return demanded + lost
+            error[1] = math.nan
+        return demanded + error
 
 
 def test_no_law_gets_beyond_the_limit() -> None:
     """Its next sample tells it what was commanded, as a float."""
     AsksForMuch.seen.clear()
     experiment = prepare(
-        load_scenario("push_recovery", ["push=[]", "duration_s=0.05", f"controller.kind={named(AsksForMuch)}"])
+        load_scenario("push_recovery", ["push=[]", "duration_s=0.05", f"controller.kind={law_path(AsksForMuch)}"])
     )
     AsksForMuch.seen.clear()
     trajectory = experiment.run().trajectory

@@ -187,8 +187,8 @@ def test_an_observer_that_fails_in_a_run(wrong_input: type, fragments: list[str]
     outcome = cmg_mj("run", "push_recovery", "--observer", kind, "--driver", driver, "--out", "it")
     assert outcome.status == 2
     assert "stopped at 0.15 s" in outcome.out
-    written, complaint = outcome.err.splitlines()
-    assert written.startswith("Written to it. ")
+    note, complaint = outcome.err.splitlines()
+    assert note.startswith("Written to it. ")
     assert_in_order(["cmg-mj: ", *fragments, "what was recorded until then is in it"], complaint)
     assert len(assert_whole("it")) == 30
 

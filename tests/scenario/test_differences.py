@@ -96,9 +96,9 @@ def test_folder_title_and_summary_tell(command: list[Any]) -> None:
     outcome = cmg_mj(command[0], "push_recovery", *command[1:], *settings)
     assert outcome.status == 0, outcome
     assert outcome.out.splitlines()[0].endswith(", seed 0, duration_s=0.1, equilibrium_bias_deg=1, push=none")
-    what = {"run": "homogeneous"}.get(command[0], command[0])
+    kind = {"run": "homogeneous"}.get(command[0], command[0])
     (folder,) = os.listdir("runs")
-    assert folder == f"push_recovery-{what}-0-duration_s=0.1-equilibrium_bias_deg=1-push=none"
+    assert folder == f"push_recovery-{kind}-0-duration_s=0.1-equilibrium_bias_deg=1-push=none"
     summary = json.loads(Path(f"runs/{folder}/summary.json").read_text())
     for entry in summary if isinstance(summary, list) else [summary]:
         assert entry["differs"] == {"duration_s": 0.1, "plant.equilibrium_bias_deg": 1.0, "push": []}

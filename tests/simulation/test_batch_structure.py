@@ -52,8 +52,8 @@ def values(seed: int = 3) -> dict[str, Any]:
 
 
 def test_these_are_all_fields_that_may_differ() -> None:
-    varied = {name.replace(".0.", ".") for name in values()} - {"plant.timestep_s"}
-    assert varied | {"controller.lqr"} == BATCHED_FIELDS.keys()
+    fields = {name.replace(".0.", ".") for name in values()} - {"plant.timestep_s"}
+    assert fields | {"controller.lqr"} == BATCHED_FIELDS.keys()
 
 
 @pytest.mark.slow

@@ -62,25 +62,25 @@ class Loop:
     """A user's own loop: physics steps, pushes by hand, and a record at the ticks."""
 
     def __init__(self, setup: Experiment, *, cold: bool = False) -> None:
-        self.of, self.plant = setup, setup.plant
+        self.setup, self.plant = setup, setup.plant
         self.controller = setup.axis_controller()
         self.data = mujoco.MjData(self.plant.model) if cold else self.plant.new_data()
         if cold:
             self.start()
-        self.noted: Any = None
+        self.last_tick: Any = None
         self.rows: list[tuple] = []
 
     def start(self) -> None:
         """The scenario's initial state as a user would set it, without any forward pass."""
         mujoco.mj_resetDataKeyframe(self.plant.model, self.data, self.plant.key)
-        tilt = math.radians(self.of.scenario.plant.initial_tilt_deg)
+        tilt = math.radians(self.setup.scenario.plant.initial_tilt_deg)
         self.data.qpos[self.plant.tilt] = self.plant.tilt_zero - self.plant.bias + tilt
 
     def push(self) -> None:
         """Set the torque of this instant."""
         t = self.data.time
         self.data.qfrc_applied[self.plant.tilt] = sum(
-            push.torque_n_m for push in self.of.scenario.push if push.start_s <= t + 1e-9 < push.end_s - 1e-9
+            push.torque_n_m for push in self.setup.scenario.push if push.start_s <= t + 1e-9 < push.end_s - 1e-9
         )
 
     def step(self, before: Callable[[], object] = lambda: None) -> None:
@@ -89,8 +89,8 @@ class Loop:
         angles = self.data.qpos.copy()
         before()
         mujoco.mj_step(self.plant.model, self.data)
-        if self.controller.tick is not self.noted:
-            self.noted = self.controller.tick
+        if self.controller.tick is not self.last_tick:
+            self.last_tick = self.controller.tick
             self.rows.append((*angles, *self.signals()))
 
     def signals(self) -> tuple[float, ...]:
@@ -99,18 +99,18 @@ class Loop:
         return (tick.y1, tick.y2, tick.fog, tick.u, tick.x_e, *tick.estimates[0])
 
     def steps(self) -> Iterator[int]:
-        return iter(range(round(self.of.scenario.duration_s / self.plant.model.opt.timestep)))
+        return iter(range(round(self.setup.scenario.duration_s / self.plant.model.opt.timestep)))
 
     def by_control(self) -> Loop:
         for _ in self.steps():
             self.step(lambda: control(self.plant, self.controller, self.data))
         return self
 
-    def by_callback(self, between: Callable[[], object] = lambda: None) -> Loop:
+    def by_callback(self, action: Callable[[], object] = lambda: None) -> Loop:
         with control_callback(self.plant, self.controller):
             for _ in self.steps():
                 self.step()
-                between()
+                action()
         return self
 
 
@@ -250,16 +250,16 @@ def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) 
     settings = (f"plant.integrator={integrator}", f"controller.rate_hz={rate_hz}", "plant.timestep_s=0.001")
     setup, controller, calls = counting(*settings)
     plant, data = setup.plant, setup.plant.new_data()
-    seen: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     with control_callback(plant, controller) as callback:
 
-        def counted(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-            seen["callback"] += 1
+        def count_calls(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+            counts["callback"] += 1
             callback(model, data)
 
-        mujoco.set_mjcb_control(counted)
+        mujoco.set_mjcb_control(count_calls)
         mujoco.mj_step(plant.model, data, 400)
-    assert seen["callback"] == 400 * (4 if integrator == "RK4" else 1)
+    assert counts["callback"] == 400 * (4 if integrator == "RK4" else 1)
     assert calls == {"init": 1, "step": 400 * rate_hz // 1000 - 1}
 
 
