@@ -52,8 +52,8 @@ def test_correction_is_the_printed_one_at_any_gain(L: float) -> None:
     slope, estimator = printed_slope(PAPER), high_gain()
     for e in (-0.2, -0.01, 0.003, 0.1):
         copy = slope(np.array([0.0, 0.0, L]), 0.0, 0.0, 0.0)[:2]
-        printed = copy - slope(np.array([e, 0.0, L]), 0.0, 0.0, 0.0)[:2]
-        assert estimator.correction(e, L) == pytest.approx(tuple(printed), rel=1e-12)
+        expected = copy - slope(np.array([e, 0.0, L]), 0.0, 0.0, 0.0)[:2]
+        assert estimator.correction(e, L) == pytest.approx(tuple(expected), rel=1e-12)
 
 
 CASES = [

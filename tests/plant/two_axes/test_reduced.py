@@ -52,8 +52,8 @@ def test_what_grows_is_what_the_reduced_models_say(plant: Plant) -> None:
 
 def test_both_rigs_have_the_same_reduced_models() -> None:
     """The floor holds the base as the world holds the thrust bearing."""
-    fixed, free = (load_plant(model=name, equilibrium_bias_deg=0.0) for name in MODELS)
-    for one, other in zip(fixed.axes, free.axes, strict=True):
+    fixed_base, free_base = (load_plant(model=name, equilibrium_bias_deg=0.0) for name in MODELS)
+    for one, other in zip(fixed_base.axes, free_base.axes, strict=True):
         np.testing.assert_allclose(astuple(one.reduced), astuple(other.reduced), rtol=1e-9)
 
 
@@ -71,11 +71,11 @@ def test_it_is_about_the_robot_that_was_measured(plant: Plant) -> None:
 
 def test_a_base_in_the_air_gives_way() -> None:
     plant = load_plant(model="two_axes_free_base.xml", equilibrium_bias_deg=0.0)
-    lifted = copy.copy(plant.model)
-    lifted.key_qpos[plant.key, 2] += 0.01
+    model = copy.copy(plant.model)
+    model.key_qpos[plant.key, 2] += 0.01
     for axis in plant.axes:
         standing = inertia_about(plant.model, plant.key, axis.line, {}).tilt_inertia
-        assert inertia_about(lifted, plant.key, axis.line, {}).tilt_inertia < 0.3 * standing
+        assert inertia_about(model, plant.key, axis.line, {}).tilt_inertia < 0.3 * standing
 
 
 def test_a_base_on_two_feet_gives_way_about_the_line_between_them() -> None:

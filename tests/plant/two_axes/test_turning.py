@@ -64,7 +64,7 @@ def asked_of(
     return np.array(torques[0]) - torques[1]
 
 
-def against(plant: Plant, w: float, angles: list[float]) -> list[float]:
+def compensation(plant: Plant, w: float, angles: list[float]) -> list[float]:
     """u_i = w sum_j c_ij sin(x3_j)/cos(x3_i)."""
     return [
         w * float(row @ np.sin(angles)) / math.cos(angle)
@@ -88,7 +88,7 @@ def test_the_swept_momentum_tilts_the_other_axis(plant: Plant, w: float, angles:
 @pytest.mark.parametrize("angles", ANGLES)
 @pytest.mark.parametrize("w", [1.0, -3.0])
 def test_gimbals_turned_against_it_leave_nothing(plant: Plant, w: float, angles: list[float]) -> None:
-    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, against(plant, w, angles))
+    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, compensation(plant, w, angles))
     assert max(abs(roll), abs(pitch)) < 1e-12
 
 
@@ -106,7 +106,7 @@ def test_the_tangent_of_the_other_angle_is_right_for_small_angles_alone(plant: P
 def test_the_wrong_sign_doubles_it(plant: Plant) -> None:
     w, angles = 1.0, [0.6, 0.3]
     none = asked_of(plant, {"yaw": w}, angles, [0.0, 0.0])
-    wrong = asked_of(plant, {"yaw": w}, angles, [-u for u in against(plant, w, angles)])
+    wrong = asked_of(plant, {"yaw": w}, angles, [-u for u in compensation(plant, w, angles)])
     np.testing.assert_allclose(wrong[1:], 2.0 * none[1:], rtol=1e-9)
 
 
@@ -130,19 +130,19 @@ def rig_with(tmp_path: Path, *changes: tuple[str, str]) -> Plant:
 
 
 WHEELS = "0 0 0 0 314 0 -314 0 314 0 -314", "0 0 314 0 -314 0 314 0 -314"
-OTHERS = {
+OTHER_WHEELS = {
     "pitch's wheels the other way round": ("0 0 0 0 314 0 -314 0 -314 0 314", "0 0 314 0 -314 0 -314 0 314"),
     "pitch's wheels half as fast": ("0 0 0 0 314 0 -314 0 157 0 -157", "0 0 314 0 -314 0 157 0 -157"),
     "a wheel of roll's slow": ("0 0 0 0 282.6 0 -314 0 314 0 -314", "0 0 282.6 0 -314 0 314 0 -314"),
 }
 
 
-@pytest.mark.parametrize("wheels", OTHERS.values(), ids=OTHERS)
+@pytest.mark.parametrize("wheels", OTHER_WHEELS.values(), ids=OTHER_WHEELS)
 def test_other_wheels_have_other_signs_and_sizes(wheels: tuple[str, str], tmp_path: Path) -> None:
     """And the rates they give cancel what these wheels ask for."""
     plant = rig_with(tmp_path, *zip(WHEELS, wheels, strict=True))
     w, angles = 1.5, [0.6, -0.4]
-    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, against(plant, w, angles))
+    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, compensation(plant, w, angles))
     assert max(abs(roll), abs(pitch)) < 1e-12
     u = [1.0, 1.0]  # a positive rate pushes about its axis, whichever way the wheels turn
     assert np.all(asked_of(plant, {}, [0.0, 0.0], u)[1:] < -0.1)
@@ -165,7 +165,7 @@ def test_a_slow_wheel_couples_the_axes_directly(tmp_path: Path) -> None:
     A pitch rate turns it against roll, a roll rate against pitch: 0.1 H x2, which is a tilt acceleration of 0.10/s
     times the other's rate, beside poles of 6.4/s. Turning gimbals change it, which yaw feels.
     """
-    plant = rig_with(tmp_path, *zip(WHEELS, OTHERS["a wheel of roll's slow"], strict=True))
+    plant = rig_with(tmp_path, *zip(WHEELS, OTHER_WHEELS["a wheel of roll's slow"], strict=True))
     left = 0.1 * H
     _, roll, _ = asked_of(plant, {"pitch": 0.5}, [0.0, 0.0], [0.0, 0.0])
     assert abs(roll) == pytest.approx(left * 0.5, rel=1e-9)
@@ -184,18 +184,18 @@ def test_a_gimbal_that_is_off_pushes_yaw_and_is_made_up_for_on_the_mean() -> Non
     """5 degrees ahead of its partner: H sin(5 deg) lies along roll's line, and turns with the gimbals."""
     plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)
     off = math.radians(5.0)
-    still, turned = [0.0, 0.0], [1.0, 0.0]
-    _, _, pitch = asked_of(plant, {"yaw": 1.0}, still, still, off)
+    zeros, gimbal_rates = [0.0, 0.0], [1.0, 0.0]
+    _, _, pitch = asked_of(plant, {"yaw": 1.0}, zeros, zeros, off)
     assert pitch == pytest.approx(-H * math.sin(off), rel=1e-9)
-    yaw, roll, _ = asked_of(plant, {}, still, turned, off)
+    yaw, roll, _ = asked_of(plant, {}, zeros, gimbal_rates, off)
     assert abs(yaw) == pytest.approx(H * math.sin(off), rel=1e-9)
     assert abs(roll) == pytest.approx(H * (1.0 + math.cos(off)), rel=1e-9)
-    mean = against(plant, 1.0, [off / 2.0, 0.0])
-    _, _, left = asked_of(plant, {"yaw": 1.0}, still, mean, off)
+    mean = compensation(plant, 1.0, [off / 2.0, 0.0])
+    _, _, left = asked_of(plant, {"yaw": 1.0}, zeros, mean, off)
     assert abs(left) < 1e-3 * abs(pitch)
 
 
-def asked(plant: Plant, rates: dict[str, float]) -> np.ndarray:
+def tilt_torques(plant: Plant, rates: dict[str, float]) -> np.ndarray:
     """Torques on roll and pitch without accelerations, the wheels standing [N m]."""
     data = mujoco.MjData(plant.model)
     mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
@@ -209,22 +209,22 @@ def asked(plant: Plant, rates: dict[str, float]) -> np.ndarray:
 def test_a_tilt_that_is_swept_round_tilts_the_other_axis(plant: Plant) -> None:
     """By (I_roll + I_pitch - I_yaw) w x2; gimbals turned at w d x2 push as much the other way."""
     w, rate = 1.5, 0.2
-    for i, j, moving in ((0, 1, "pitch"), (1, 0, "roll")):
-        both, alone, turn = ({"yaw": w, moving: rate}, {moving: rate}, {"yaw": w})
-        swept = (asked(plant, both) - asked(plant, alone) - asked(plant, turn))[i]
+    for i, j, axis in ((0, 1, "pitch"), (1, 0, "roll")):
+        both, alone, turn = ({"yaw": w, axis: rate}, {axis: rate}, {"yaw": w})
+        coupling = (tilt_torques(plant, both) - tilt_torques(plant, alone) - tilt_torques(plant, turn))[i]
         u = [0.0, 0.0]
         u[i] = w * plant.turning.inertia[i, j] * rate
-        pushed = asked_of(plant, {}, [0.0, 0.0], u)[1 + i]
-        assert abs(swept) > 0.1
-        assert pushed == pytest.approx(-swept, rel=1e-3)
+        push = asked_of(plant, {}, [0.0, 0.0], u)[1 + i]
+        assert abs(coupling) > 0.1
+        assert push == pytest.approx(-coupling, rel=1e-3)
 
 
 def test_what_accelerometers_show_of_a_tilt_that_is_swept_round(plant: Plant) -> None:
     w, rate = 1.5, 0.2
-    for i, j, moving in ((0, 1, "pitch"), (1, 0, "roll")):
+    for i, j, axis_name in ((0, 1, "pitch"), (1, 0, "roll")):
         data = plant.new_data()
         mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
-        data.joint("yaw").qvel[0], data.joint(moving).qvel[0] = w, rate
+        data.joint("yaw").qvel[0], data.joint(axis_name).qvel[0] = w, rate
         mujoco.mj_forward(plant.model, data)
         axis = plant.axes[i]
         forces = axis.ideal(data.sensordata, data.qvel).accelerations
