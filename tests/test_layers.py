@@ -20,16 +20,16 @@ ROOT = PACKAGE.parent
 
 ARCHITECTURE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 TABLE = ARCHITECTURE.split("## The packages")[1].split("\n\n| library |")[0]
-ABOVE, BELOW = (
+UPPER_PACKAGES, LOWER_PACKAGES = (
     re.findall(r"^\| `(\w+)` \|", part, re.MULTILINE) for part in TABLE.split("nothing above this line imports MuJoCo")
 )
 """The packages from top to bottom, as docs/architecture.md lists them."""
-ORDER = [*ABOVE, *BELOW]
+ORDER = [*UPPER_PACKAGES, *LOWER_PACKAGES]
 MOST_ENTRIES = 18
 
 HEAVY = dict(re.findall(r"^\| ([\w.]+) \| `([\w/]+)` \|$", ARCHITECTURE, re.MULTILINE))
 """Library -> the only sub-package or module that imports it, because it costs time."""
-AT_ONCE = ("cmg_mj.visualization.recording", "cmg_mj.replay.recording", "cmg_mj.simulation.gymnasium_env")
+EAGER = ("cmg_mj.visualization.recording", "cmg_mj.replay.recording", "cmg_mj.simulation.gymnasium_env")
 """These import theirs when they are imported; the others when they need it."""
 
 
@@ -49,12 +49,12 @@ def of_package(package: str) -> list[str]:
     return [name for name in modules() if package_of(name) == package]
 
 
-def imported_names(tree: ast.AST, where: str) -> Iterator[tuple[int, str]]:
+def imported_names(tree: ast.AST, place: str) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{where}:{node.lineno}: write the whole name"
+            assert node.level == 0, f"{place}:{node.lineno}: write the whole name"
             yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
 
 
@@ -114,40 +114,44 @@ def test_a_package_says_its_job_in_a_sentence(package: str) -> None:
 @pytest.mark.parametrize("package", ORDER)
 def test_imports_run_upward_only(package: str) -> None:
     depth = ORDER.index(package)
-    below = [
+    downward_imports = [
         f"{module}:{line} imports {name}"
         for module in of_package(package)
         for line, name in imports(module)
         if name.startswith("cmg_mj.") and (other := package_of(name)) in ORDER and ORDER.index(other) > depth
     ]
-    assert not below
+    assert not downward_imports
 
 
 def test_a_downward_import_would_be_seen() -> None:
     """The order is not trivially held: the loop does use the controller, the command line the scenario."""
-    used = {
+    dependencies = {
         package: {package_of(name) for module in of_package(package) for _, name in imports(module)}
         for package in ORDER
     }
-    assert "controllers" in used["simulation"]
-    assert "scenario" in used["cli"]
+    assert "controllers" in dependencies["simulation"]
+    assert "scenario" in dependencies["cli"]
     assert ORDER.index("controllers") < ORDER.index("scenario") < ORDER.index("simulation") < ORDER.index("cli")
 
 
 def test_no_circle_of_modules() -> None:
     """Among the imports that are made when a module is imported; those inside functions are made later."""
     graph = {module: set(at_import(module)) - {module} for module in modules()}
-    done: set[str] = set()
-    while ready := {module for module, used in graph.items() if module not in done and used <= done | {module}}:
-        done |= ready
-    assert not {module: used - done for module, used in graph.items() if module not in done}
+    finished: set[str] = set()
+    while ready := {
+        module
+        for module, dependencies in graph.items()
+        if module not in finished and dependencies <= finished | {module}
+    }:
+        finished |= ready
+    assert not {module: dependencies - finished for module, dependencies in graph.items() if module not in finished}
 
 
 @pytest.mark.slow
 def test_nothing_above_the_line_imports_mujoco() -> None:
     """One package after the other: the first that brings MuJoCo, or what is as heavy, is named."""
     code = "import importlib, sys\n"
-    light = [name for package in ABOVE for name in of_package(package) if not uses_casadi(name)]
+    light = [name for package in UPPER_PACKAGES for name in of_package(package) if not uses_casadi(name)]
     for name in light:
         code += f"importlib.import_module({name!r})\n"
         for heavy in ("mujoco", "control", "pyarrow", *HEAVY):
@@ -160,13 +164,13 @@ def uses_casadi(module: str) -> bool:
     return module.startswith("cmg_mj.codegen.export.")
 
 
-@pytest.mark.parametrize("package", ABOVE)
+@pytest.mark.parametrize("package", UPPER_PACKAGES)
 def test_upper_packages_do_not_name_mujoco(package: str) -> None:
     """Not even inside a function."""
-    named = [
+    places = [
         f"{name}:{line}" for name in of_package(package) for line, used in imports(name) if used.startswith("mujoco")
     ]
-    assert not named
+    assert not places
 
 
 def test_every_observer_works_without_mujoco() -> None:
@@ -195,7 +199,7 @@ def test_only_one_place_knows_a_heavy_library(library: str) -> None:
 @pytest.mark.slow
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     """All modules but these leave them out: nothing imports matplotlib before a plot is drawn."""
-    inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.dask_", *AT_ONCE)
+    inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.dask_", *EAGER)
     code = "import importlib, sys\n"
     for name in modules():
         if not name.startswith(inner):

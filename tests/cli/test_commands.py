@@ -271,7 +271,7 @@ def test_numbers_that_there_are_not() -> None:
     outcome = cmg_mj("compare", "my.toml", "--worlds", 1, "--observers", "linear", "--out", "it")
     assert outcome.status == 0
     assert re.search(r"^ linear( +-){9} +100%$", outcome.out, re.MULTILINE)
-    assert "zero" not in outcome.out.splitlines()  # nothing stood, on whose motion it could ride along
+    assert "zero" not in outcome.out.splitlines()  # nothing stood, on whose motion it could run open loop
     (summary,) = json.loads(Path("it/summary.json").read_text())
     assert (summary["fell"], summary["tilt_rms_deg"]) == (True, None)
 

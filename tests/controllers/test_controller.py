@@ -523,7 +523,7 @@ def test_gimbals_move_oppositely_at_the_commanded_rate() -> None:
 # --- something else while it runs --------------------------------------------------------------------------
 
 
-def test_another_observer_rides_along_and_takes_over() -> None:
+def test_another_observer_is_open_loop_first_and_takes_over() -> None:
     """The command is the one's until the other takes over, which began with the next sample and knows its held u."""
     one, other = Script(lambda k: Estimate(0.0, 1.0, 0.0)), Script(lambda k: Estimate(0.0, -1.0, 0.0))
     loop = controller(one)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import Said, cmg_mj
+from tests.command import CommandOutcome, cmg_mj
 
 RATE = "must be a number greater than or equal to 0.1 and at most 1e+06"
 OVER_0, FROM_0 = "must be a number greater than 0", "must be a number greater than or equal to 0"
@@ -23,7 +23,7 @@ def table(*rows: tuple) -> pytest.MarkDecorator:
     )
 
 
-def check(text: str | bytes) -> Said:
+def check(text: str | bytes) -> CommandOutcome:
     Path("my.toml").write_bytes(text.encode() if isinstance(text, str) else text)
     return cmg_mj("check", "my.toml")
 

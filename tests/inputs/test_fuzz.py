@@ -24,7 +24,7 @@ from cmg_mj import load_scenario
 from cmg_mj.inputs.bundled import folder
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import prepare
-from tests.command import Said, cmg_mj, cmg_mj_process
+from tests.command import CommandOutcome, cmg_mj, cmg_mj_process
 from tests.tiers import slow_but
 
 SCENARIOS, MODELS, IN_PROCESSES = 400, 200, 6
@@ -251,7 +251,7 @@ def start(name: str) -> None:
     experiment.resolved()
 
 
-def case(outcome: Said) -> bool:
+def case(outcome: CommandOutcome) -> bool:
     """Judge what `check` says of a file, and start it if that is valid; whether it is."""
     if outcome.status == 0:
         start("my.toml")

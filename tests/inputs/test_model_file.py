@@ -12,11 +12,11 @@ import pytest
 from cmg_mj import load_plant
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import folder
-from tests.command import Said, cmg_mj
+from tests.command import CommandOutcome, cmg_mj
 from tests.inputs.complaints import assert_in_order, check, table
 
 
-def edited(rig: tuple[str, str] | None = None, cube: tuple[str, str] | None = None) -> Said:
+def edited(rig: tuple[str, str] | None = None, cube: tuple[str, str] | None = None) -> CommandOutcome:
     """`check` on a copy of the bundled model, in which a pattern has been replaced."""
     for name, edit in (("scissored_pair.xml", rig), ("cube.xml", cube)):
         text = (folder("models") / name).read_text()

@@ -143,7 +143,7 @@ RETURN = "step(state, y, u) must return"
     ("signals", NamesNoSignals, "extra_signals must be a tuple of names like ('bias_rad',), each once, not 'bias_rad'"),
     ("a signal too few", OwesASignal, f"{RETURN} (state, (x1, x2, x3, bias_rad)), not (state, "),
 )
-@pytest.mark.parametrize("place", ["in the loop", "riding along", "compared"])
+@pytest.mark.parametrize("place", ["in the loop", "open loop", "compared"])
 def test_an_observer_that_cannot_work(wrong_input: type, fragments: list[str], place: str) -> None:
     """It is found before the run, so that not even a folder is made."""
     kind = f"{__name__}:{wrong_input.__name__}"

@@ -12,7 +12,7 @@ import pytest
 
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.recording.replay_recording import MAIN
-from tests.command import ROOT, Said, cmg_mj
+from tests.command import ROOT, CommandOutcome, cmg_mj
 from tests.replay.logs.motion import COLUMNS, sine, write_csv
 
 LOG = ROOT / "examples" / "data" / "stepper_encoder_gyro.csv"
@@ -26,7 +26,7 @@ def _logs(elsewhere: None) -> None:
     write_csv("sine.csv", sine())
 
 
-def replay(*arguments: object) -> Said:
+def replay(*arguments: object) -> CommandOutcome:
     return cmg_mj("replay", *arguments)
 
 

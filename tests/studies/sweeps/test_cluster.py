@@ -22,7 +22,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.dask_worker import compute_part, part_of
 from cmg_mj.studies.sweeps.study import SweepStudy
-from tests.command import COMMAND, ROOT, Said, cmg_mj, cmg_mj_process, environment
+from tests.command import COMMAND, ROOT, CommandOutcome, cmg_mj, cmg_mj_process, environment
 
 needs_distributed = pytest.mark.skipif(
     find_spec("distributed") is None,
@@ -48,7 +48,7 @@ KILLS_ITSELF = f"{IN_A_TRIAL} and {KILL}"
 KILLS_ITSELF_ONCE = f"{IN_A_TRIAL} and (pathlib.Path('cluster').unlink(), {KILL})"
 
 
-def sweep(cwd: Path, out: str, *arguments: str) -> Said:
+def sweep(cwd: Path, out: str, *arguments: str) -> CommandOutcome:
     return cmg_mj_process(*SWEEP, "--out", out, *arguments, cwd=cwd)
 
 
