@@ -168,7 +168,10 @@ def uses_casadi(module: str) -> bool:
 def test_upper_packages_do_not_name_mujoco(package: str) -> None:
     """Not even inside a function."""
     places = [
-        f"{name}:{line}" for name in of_package(package) for line, used in imports(name) if used.startswith("mujoco")
+        f"{name}:{line}"
+        for name in of_package(package)
+        for line, import_name in imports(name)
+        if import_name.startswith("mujoco")
     ]
     assert not places
 
@@ -191,7 +194,9 @@ print("mujoco" in sys.modules)
 @pytest.mark.parametrize("library", sorted(HEAVY))
 def test_only_one_place_knows_a_heavy_library(library: str) -> None:
     place = f"cmg_mj.{HEAVY[library].replace('/', '.')}"
-    users = {name for name in modules() for _, used in imports(name) if f"{used}.".startswith(f"{library}.")}
+    users = {
+        name for name in modules() for _, import_name in imports(name) if f"{import_name}.".startswith(f"{library}.")
+    }
     assert users
     assert {name for name in users if not f"{name}.".startswith(f"{place}.")} == set()
 

@@ -29,8 +29,8 @@ class Mine:
     def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
         return state + 1, self.command(state, -35.0 * x.x1 - 4.0 * x.x2 + x.x3)
 
-    def command(self, k: int, demanded: Any) -> Any:
-        return demanded
+    def command(self, k: int, demand: Any) -> Any:
+        return demand
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -90,17 +90,17 @@ class ReturnsACommand(Mine):
 
 
 class ReturnsText(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
+    def command(self, k: int, demand: Any) -> Any:
         return "0.0"
 
 
 class ReturnsAList(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return [demanded]
+    def command(self, k: int, demand: Any) -> Any:
+        return [demand]
 
 
 class GivesNanAtOnce(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
+    def command(self, k: int, demand: Any) -> Any:
         return math.nan
 
 
@@ -122,33 +122,33 @@ class TrimsNothing(Mine):
 
 
 class ForOneWorld(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return math.copysign(1.0, demanded)
+    def command(self, k: int, demand: Any) -> Any:
+        return math.copysign(1.0, demand)
 
 
 class ForgetsWorlds(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
+    def command(self, k: int, demand: Any) -> Any:
         return 0.0
 
 
 class FailsLater(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return 1 / 0 if k == 30 else demanded
+    def command(self, k: int, demand: Any) -> Any:
+        return 1 / 0 if k == 30 else demand
 
 
 class GivesNan(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return demanded * (math.nan if k >= 30 else 1.0)
+    def command(self, k: int, demand: Any) -> Any:
+        return demand * (math.nan if k >= 30 else 1.0)
 
 
 class GivesInfinity(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return demanded * 0.0 + (math.inf if k >= 30 else 0.0)
+    def command(self, k: int, demand: Any) -> Any:
+        return demand * 0.0 + (math.inf if k >= 30 else 0.0)
 
 
 class ReturnsTextLater(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return "0.0" if k == 30 else demanded
+    def command(self, k: int, demand: Any) -> Any:
+        return "0.0" if k == 30 else demand
 
 
 class ChangesWhatItIsGiven(Mine):
@@ -161,10 +161,10 @@ class ChangesWhatItIsGiven(Mine):
 class AsksForMuch(Mine):
     """Far beyond the limit, with NumPy's numbers."""
 
-    seen: ClassVar[list] = []
+    commands: ClassVar[list] = []
 
     def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
-        self.seen.append(u)
+        self.commands.append(u)
         return state + 1, np.float64(1000.0)
 
 
@@ -340,25 +340,25 @@ def test_a_law_that_fails_in_one_world_of_many() -> None:
 
 
 class FailsInWorld1(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        error = np.zeros(np.shape(demanded))
+    def command(self, k: int, demand: Any) -> Any:
+        error = np.zeros(np.shape(demand))
         if k >= 30:
             error[1] = math.nan
-        return demanded + error
+        return demand + error
 
 
 def test_no_law_gets_beyond_the_limit() -> None:
     """Its next sample tells it what was commanded, as a float."""
-    AsksForMuch.seen.clear()
+    AsksForMuch.commands.clear()
     experiment = prepare(
         load_scenario("push_recovery", ["push=[]", "duration_s=0.05", f"controller.kind={law_path(AsksForMuch)}"])
     )
-    AsksForMuch.seen.clear()
+    AsksForMuch.commands.clear()
     trajectory = experiment.run().trajectory
     assert trajectory is not None
     np.testing.assert_array_equal(trajectory["u_rad_s"], 4.7)
-    assert AsksForMuch.seen == [0.0] + [4.7] * (len(trajectory) - 1)
-    assert all(type(u) is float for u in AsksForMuch.seen)
+    assert AsksForMuch.commands == [0.0] + [4.7] * (len(trajectory) - 1)
+    assert all(type(u) is float for u in AsksForMuch.commands)
     many = experiment.run_many(2).trajectory
     assert many is not None
     np.testing.assert_array_equal(many["u_rad_s"], 4.7)

@@ -80,7 +80,7 @@ def test_a_users_class_in_a_scenario() -> None:
         (USER_OBSERVER, {"gain": 200.0}, r"observer .*Mine: RuntimeError: gain is far too large"),
         (f"{__name__}:Yours", {}, r"observer\.kind = .*Yours': cannot be imported: AttributeError"),
         (f"{__name__}:Open", {}, r"must be a class with the methods init\(y\) and step\(state, y, u\)"),
-        (f"{__name__}:MINE", {}, r"must be a class with the methods"),
+        (f"{__name__}:USER_OBSERVER", {}, r"must be a class with the methods"),
         (":", {}, r"observer\.kind = ':': cannot be imported"),
     ],
 )

@@ -51,17 +51,17 @@ def test_its_observer_is_not_the_controllers(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_it_counts_instructions_and_stack(tmp_path: Path) -> None:
     """Exactly, and always the same: a step with 250 more instructions takes 250 more."""
-    costs = []
+    step_costs = []
     for more in ("", '__asm volatile(".rept 250\\n\\tnop\\n\\t.endr");'):
         with Board(toy(tmp_path, step=more), counting=True) as board:
             assert board.calibration_counts() == [0, 100, 1000]
             board.init(0.0, 0.0, 0.0)
             counts = {board.step(0.1, 0.2, 0.3, 0.4)[1] for _ in range(20)}
             assert len(counts) == 1
-            costs.append(counts.pop())
-    assert costs[1].instructions - costs[0].instructions == 250
-    assert 0 < costs[0].instructions < 20
-    assert costs[0].stack == 0
+            step_costs.append(counts.pop())
+    assert step_costs[1].instructions - step_costs[0].instructions == 250
+    assert 0 < step_costs[0].instructions < 20
+    assert step_costs[0].stack == 0
 
 
 def test_it_knows_the_deepest_stack(tmp_path: Path) -> None:

@@ -64,7 +64,9 @@ def test_the_points_of_a_very_large_study_are_not_drawn(
         return sample(dimensions, n, *arguments, **options)
 
     monkeypatch.setattr(study, "sampled", count_points)
-    monkeypatch.setattr(plan, "compute", lambda study, piece, tick: [study.points[at] for at, _ in piece.trials])
+    monkeypatch.setattr(
+        plan, "compute", lambda study, piece, tick: [study.points[number] for number, _ in piece.trials]
+    )
     axes = tuple(parse_axis(field, axis_text, field) for field in (BIAS, TORQUE))
     takes = plan.estimate_cost(SweepStudy(load_scenario("push_recovery"), axes, ("linear",), 2, **options))
     assert counts == [plan.POINTS]

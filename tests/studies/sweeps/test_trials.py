@@ -75,11 +75,9 @@ def test_killed_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(study_module, "CHUNK", 5)
     store = Store(tmp_path, small())
     assert store.open() == 0
-    computed = 0
 
-    def stop(share: float) -> None:
-        nonlocal computed
-        if share > 12:
+    def stop(n_trials: float) -> None:
+        if n_trials > 12:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -156,13 +154,13 @@ def test_an_observer_that_raises_at_a_rig_that_lies_costs_nothing() -> None:
 def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     batches = []
 
-    def fails(experiments: list[Experiment], worlds: list[int], **options: Unpack[SimulationOptions]) -> Result:
+    def fail(experiments: list[Experiment], worlds: list[int], **options: Unpack[SimulationOptions]) -> Result:
         batches.append(len(worlds))
         if any(experiment.scenario.plant.initial_tilt_deg == 5.0 for experiment in experiments):
             raise MemoryError("not in there")
         return run_batch(experiments, worlds, **options)
 
-    monkeypatch.setattr(work, "run_batch", fails)
+    monkeypatch.setattr(work, "run_batch", fail)
     shares = []
     sweep = study({"plant.initial_tilt_deg": "0,5,1,2"}, ("linear",), 1)
     rows = work.compute(sweep, sweep.chunks[0], shares.append)

@@ -36,11 +36,11 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[matplotlib.figure.Figure]:
     saved_figures: list[matplotlib.figure.Figure] = []
     save = matplotlib.figure.Figure.savefig
 
-    def keep(saved_figure: matplotlib.figure.Figure, *args: Any, **kwargs: Any) -> None:
+    def save_and_keep(saved_figure: matplotlib.figure.Figure, *args: Any, **kwargs: Any) -> None:
         saved_figures.append(saved_figure)
         save(saved_figure, *args, **kwargs)
 
-    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", keep)
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", save_and_keep)
     return saved_figures
 
 
