@@ -20,7 +20,7 @@ HANGS_AFTER_S = 900.0
 
 @dataclass(frozen=True)
 class CommandOutcome:
-    """What a command left behind: its exit status and what it wrote."""
+    """The outcome of a command: its exit status and its output."""
 
     status: int
     out: str

@@ -65,7 +65,7 @@ def calibration_loop() -> float:
 
 
 def slowness() -> float:
-    """How many times longer than the reference's this machine takes now; at least 1."""
+    """Return the ratio of this machine's time to the reference's, at least 1."""
     return max(1.0, statistics.median(calibration_loop() for _ in range(7)) / REFERENCE_S)
 
 

@@ -14,7 +14,7 @@ FOLDERS = ("cmg_mj", "docs", "examples", "models", "scenarios", "tests", "typing
 
 
 class Footprint:
-    """What lies in the folders of a repository.
+    """The contents of the folders of a repository.
 
     A folder's time of change tells whether an entry came or went, so a look at it costs a call for each folder.
 

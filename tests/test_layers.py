@@ -222,7 +222,7 @@ def test_public_names_are_what_they_say() -> None:
 
 
 def test_type_checkers_know_the_public_names() -> None:
-    """What `cmg_mj/__init__.py` imports for type checkers is what it hands out."""
+    """`cmg_mj/__init__.py` hands out the names that it imports for type checkers."""
     tree = ast.parse(modules()["cmg_mj"].read_text(encoding="utf-8"))
     imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
     names = {

@@ -1,4 +1,4 @@
-"""What holds the tests together: tiers, the limit of processor time, and that nothing is left in the repository."""
+"""Tiers, the limit of processor time, and the check that tests leave nothing in the repository."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a rig consists of, by name and kind, and what a model lacks of it: all of it, not the first."""
+"""The parts of a rig, by name and kind; finds all parts that a model lacks, not only the first."""
 
 from __future__ import annotations
 

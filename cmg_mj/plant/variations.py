@@ -1,4 +1,4 @@
-"""How a rig differs from its model file: integrator and step, friction, servos, wheels, the equilibrium bias."""
+"""Differences of a rig from its model file: integrator and step, friction, servos, wheels, the equilibrium bias."""
 
 from __future__ import annotations
 

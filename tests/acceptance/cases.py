@@ -1,4 +1,4 @@
-"""What the acceptance tests run: observers in the loop, and all of them in open loop on the gyro's."""
+"""The runs of the acceptance tests: observers in the loop, and all of them in open loop on the gyro's."""
 
 from __future__ import annotations
 

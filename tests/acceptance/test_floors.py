@@ -21,7 +21,7 @@ def loop(name: str, key: str, reference: str | None = None, worlds: int = GROUP)
 
 
 def upper_end(a: np.ndarray, b: np.ndarray) -> float:
-    """Of the 95 % interval of the ratio of two means over the same worlds, to first order."""
+    """Return the upper end of the 95 % interval of the ratio of two means over the same worlds, to first order."""
     ratio = a.mean() / b.mean()
     return ratio + 2.09 * np.std((a - ratio * b) / b.mean(), ddof=1) / np.sqrt(len(a))
 

@@ -1,4 +1,4 @@
-"""What a scenario of several axes says, what is written of its run, and what is refused."""
+"""Scenarios of several axes: their description, the files of their runs, and refusals."""
 
 import json
 from pathlib import Path
@@ -116,7 +116,7 @@ def test_sensors_of_an_axis_have_rates_of_their_own() -> None:
 
 
 def test_the_true_rate_is_used_throughout_where_it_is_fed_back() -> None:
-    """What the observer says then changes nothing, the gimbals' turn against the other axis included."""
+    """The observer's estimate then changes nothing, the gimbals' turn against the other axis included."""
     runs = [two_axes("controller.feedback=truth", f"observer.kind={kind}").run() for kind in ("homogeneous", "linear")]
     first, second = (run.trajectory for run in runs)
     assert first is not None

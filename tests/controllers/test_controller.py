@@ -70,7 +70,7 @@ def test_the_extended_pair_is_controllable() -> None:
 
 
 def test_closed_loop_poles_of_table_2() -> None:
-    """Of the law itself, differentiated: A_e - B_e K_e has -10.47 +- 4.60j and -0.203 +- 0.295j."""
+    """The law itself, differentiated: A_e - B_e K_e has -10.47 +- 4.60j and -0.203 +- 0.295j."""
     K = [[-StateFeedback(DT)(*row)[0] for row in (1e-3 * np.eye(4)).tolist()]]
     poles = np.linalg.eigvals(A_E - B_E @ (1e3 * np.array(K)))
     expected = [-10.47 - 4.60j, -10.47 + 4.60j, -0.203 - 0.295j, -0.203 + 0.295j]

@@ -1,4 +1,4 @@
-"""What the tests of wrong input say and look for."""
+"""Helpers and common messages of the tests of wrong input."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ SCENARIOS, MODELS, IN_PROCESSES = 400, 200, 6
 GROUP = 25  # cases a test, so that the workers share them
 HANG_S = 20.0
 TICKS = 3
-"""What gets so far has started."""
+"""A run that gets so far has started."""
 
 NUMBERS = [0, 1, -1, 2, 0.5, 1e-3, 1e-9, 1e9, 1e17, 1e30, 1e300, 1e306, 1.7e308, 5e-324, 1e-300, -1e308, 10**20, 2**127]
 NUMBERS += [float("nan"), float("inf"), -float("inf"), 0.0049999, 1 / 3, 200, 1000, 0.1, 45, 90]

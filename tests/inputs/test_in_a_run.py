@@ -1,4 +1,4 @@
-"""What goes wrong while a run goes on, or when it is written."""
+"""Failures during a run, or when its files are written."""
 
 from __future__ import annotations
 

@@ -319,7 +319,7 @@ def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
 )
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_a_law_that_fails_in_a_run(wrong_input: type, fragments: list[str], driver: str) -> None:
-    """What was recorded until then is kept."""
+    """The recording until then is kept."""
     outcome = cmg_mj("run", "push_recovery", *set_to(wrong_input), "--driver", driver, "--out", "it")
     assert outcome.status == 2
     assert "stopped at 0.15 s" in outcome.out

@@ -182,7 +182,7 @@ def test_an_observer_for_one_world_among_many(quick: str, wrong_input: type, fra
 )
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_an_observer_that_fails_in_a_run(wrong_input: type, fragments: list[str], driver: str) -> None:
-    """What was recorded until then is kept."""
+    """The recording until then is kept."""
     kind = f"{__name__}:{wrong_input.__name__}"
     outcome = cmg_mj("run", "push_recovery", "--observer", kind, "--driver", driver, "--out", "it")
     assert outcome.status == 2
@@ -213,7 +213,7 @@ def test_an_open_loop_observer_that_gives_nan_harms_nobody(quick: str) -> None:
 
 
 def test_an_observer_that_changes_its_own_arrays_is_judged_as_in_one_world(quick: str) -> None:
-    """What it has said at a tick is not what it says later."""
+    """A change of its arrays does not reach the estimates of earlier ticks."""
     experiment = prepare(load_scenario(quick, [], f"{__name__}:ChangesInPlace"))
     one, many = experiment.run(), experiment.run_many(2)
     assert one.trajectory is not None

@@ -28,7 +28,7 @@ EPSILON, BOUND = 0.0287, 10.4
 """Defaults that are not a paper's: epsilon of linear_high_gain and L of super_twisting, from `cmg-mj tune`."""
 
 NOISE = TiltNoise(0.0063, 0.41, 0.89, 3.1e-4)
-"""Of the bundled rig's accelerometers, 400 ug/rtHz at 200 Hz."""
+"""The noise of the bundled rig's accelerometers, 400 ug/rtHz at 200 Hz."""
 
 Signal = Sequence[float] | np.ndarray
 

@@ -1,4 +1,4 @@
-"""What every observer must be: a value with pure, elementwise init and step, that filters and starts at rest."""
+"""The contract of every observer: a value with pure, elementwise init and step, that filters and starts at rest."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def relative_errors(package_step: np.ndarray, reference: np.ndarray) -> float:
 
 
 DURATIONS_S = slow_but([2.5, 4.0], 2.5)
-"""Of the closed loop that the observer is compared along."""
+"""Durations of the closed loop along which the observer is compared."""
 
 
 # --- along a closed-loop run ---------------------------------------------------------------------------

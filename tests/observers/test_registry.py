@@ -85,7 +85,7 @@ def test_a_users_class_in_a_scenario() -> None:
     ],
 )
 def test_what_is_wrong_with_a_class_is_named_in_one_line(kind: str, parameters: dict, message: str) -> None:
-    """What is wrong with a name, or with a parameter of the bench's own: tests/inputs/."""
+    """tests/inputs/ has wrong names and wrong parameters of the bench's own."""
     with pytest.raises(InputError, match=message) as info:
         observer(kind, **parameters)
     assert "\n" not in str(info.value)

@@ -89,7 +89,7 @@ class Lagrangian:
 
     @cached_property
     def bias(self) -> Function:
-        """What the Euler-Lagrange equations (1) have besides M ddq: tau = M ddq + bias(q, dq) [N m]."""
+        """The terms of the Euler-Lagrange equations (1) besides M ddq: tau = M ddq + bias(q, dq) [N m]."""
         dL_dq = sp.Matrix([self.T - self.P]).jacobian(self.q).T
         bias = _compile(self._dT_ddq.jacobian(self.q) * self.dq - dL_dq, self.q, self.dq)
         return lambda q, dq: bias(q, dq)[..., 0]
@@ -142,7 +142,7 @@ def scissored_pair(K_a: float, *, yaw_term: bool = True) -> Lagrangian:
 
 @cache
 def flywheel_weights(first_moment: float) -> Lagrangian:
-    """What P gains if each flywheel's mass times its offset along d_1 is first_moment [kg m]. T is left out."""
+    """Add to P the weights of flywheels whose mass times offset along d_1 is first_moment [kg m]. T is omitted."""
     q, dq = _coordinates("a", "b", "c1", "d1", "c2", "d2")
     height_1, height_2 = ((R_AB(q[k + 1]) * R_BC(q[k]) * R_AB(q[1]))[0, 2] for k in (2, 4))
     return Lagrangian(q, dq, sp.S.Zero, first_moment * g * (height_1 + height_2))

@@ -1,4 +1,4 @@
-"""What the motion must conserve and the work it must account for, in terms of the paper's own T and P.
+"""Conservation laws and the balance of work of the motion, in terms of the paper's own T and P.
 
 The flywheels spin with 54 J each, which would hide everything else, so the energy watched is the platform's:
 T + P without 1/2 J_d (axial absolute angular velocity)^2 of each flywheel. P is counted from the hanging

@@ -61,7 +61,7 @@ def test_a_servo_by_settings_is_that_of_a_file(tmp_path: Path) -> None:
 
 
 def servo_torques(plant: Plant, error: float, rate: float) -> list[float]:
-    """Of both servos with the setpoint ahead of the gimbal, which turns [N m]."""
+    """Return the torques of both servos with the setpoint ahead of the gimbal, which turns [N m]."""
     data = plant.new_data()
     for i, module in enumerate(plant.modules):
         data.act[i] = data.qpos[module.gimbal] + error

@@ -159,7 +159,7 @@ def test_a_window_of_ones_own() -> None:
 
 
 def test_tune_on_a_log() -> None:
-    """Of a sine without noise the smallest time constant is the best; fitted on one part, scored on the other."""
+    """For a sine without noise the smallest time constant is the best; fitted on one part, scored on the other."""
     arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
     outcome = cmg_mj("tune-log", *arguments, "--split", "0.3", "--json", "--out", "it")
     result = json.loads(outcome.out)

@@ -1,4 +1,4 @@
-"""What is said of a reference beside the tilt, in a replay and in tuning alike."""
+"""Remarks on a reference beside the tilt, in a replay and in tuning alike."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_the_other_way_round(tmp_path: Path) -> None:
 
 
 def test_late_is_late_by_the_logs_own_rows() -> None:
-    """Of 100 Hz rows 0.2 ms are nothing, to however quick a rate they are resampled."""
+    """A delay of 0.2 ms is nothing for rows at 100 Hz, to however quick a rate they are resampled."""
     for rate in (None, 1000.0):
         notes = remarks(REAL, ENCODER, delay_s=0.0119, rate_hz=rate)
         assert [line for line in notes if "Beside the tilt" in line] == []

@@ -89,7 +89,7 @@ def test_a_runs_recording_as_any_parquet(run: Path) -> None:
 
 @pytest.mark.slow
 def test_who_takes_part(tmp_path: Path) -> None:
-    """What an observer needs and what is there decide, for every combination."""
+    """The observer's needs and the log's signals decide, for every combination."""
     plain = log(tmp_path)
     t = DT * np.arange(N)
     gimbals = {"gimbal_rad": 0.01 * t, "command_rad_s": 0.01 + 0.0 * t}

@@ -90,7 +90,7 @@ def test_another_filter_does_not(noise: TiltNoise) -> None:
 
 
 def inputs(y1: np.ndarray, edges: list[int]) -> np.ndarray:
-    """Of each sample the sums of y1 over the shares of the past, one by one, (n_rows, n_worlds, n_taps)."""
+    """Sum y1 over the shares of the past of each sample, one by one, (n_rows, n_worlds, n_taps)."""
     past = np.vstack([np.repeat(y1[:1], edges[-1], axis=0), y1])
     shares = [
         [past[edges[-1] + k - older + 1 : edges[-1] + k - newer + 1].sum(axis=0) for newer, older in pairwise(edges)]
@@ -148,7 +148,7 @@ def swing(runs: int, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def test_the_matched_filter_reaches_the_floor_of_y1() -> None:
-    """Of a linear system with white noise no filter is better than Kalman's, and the fit comes to within a per cent."""
+    """No filter is better than Kalman's on a linear system with white noise, and the fit comes to within a per cent."""
     y1, rate, best = swing(40, seed=6)
     result = math.sqrt(np.mean(floors_of(y1, rate) ** 2))
     assert 0.98 * best < result < 1.01 * best < 0.6 * rate.std()

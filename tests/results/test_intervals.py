@@ -28,7 +28,7 @@ TIMES = 10_000
 
 
 def share_that_holds(mean: float, samples: np.ndarray) -> float:
-    """Of the samples, (n_samples, n_worlds), how many have the mean in their interval."""
+    """Return the share of the samples, (n_samples, n_worlds), that have the mean in their interval."""
     result = [known_interval(values) for values in samples]
     return float(np.mean([interval is not None and interval.low <= mean <= interval.high for interval in result]))
 

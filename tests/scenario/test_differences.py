@@ -1,4 +1,4 @@
-"""What differs from the bundled scenario: in the folder's name, the title line and the summary."""
+"""Differences from the bundled scenario: in the folder's name, the title line and the summary."""
 
 from __future__ import annotations
 

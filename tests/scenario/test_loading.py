@@ -119,7 +119,7 @@ def test_the_last_setting_counts() -> None:
 
 
 def test_another_observer_brings_its_own_parameters() -> None:
-    """Those of the file's observer do not pass to it; those set on the command line do."""
+    """The parameters of the file's observer do not pass to it; parameters set on the command line do."""
     file = write("[observer]\nkind = 'homogeneous'\nk1 = 30.0")
     assert load_scenario(file, observer="homogeneous").observer.parameters == {"k1": 30.0}
     assert load_scenario(file, observer="ltv").observer.parameters == {}

@@ -1,4 +1,4 @@
-"""What a cheap part and its mounting do to a reading, against closed forms: at the sensor, and in the loop.
+"""Errors of a cheap part and its mounting, against closed forms: at the sensor, and in the loop.
 
 Seeds are fixed; statistical bounds are those a correct sensor meets 999 times of 1000.
 """
@@ -39,7 +39,7 @@ def ideal(forces: Any) -> IdealReading:
 
 
 def read_forces(forces: Any, **errors: Any) -> np.ndarray:
-    """What parts without noise show of specific forces, (4,)."""
+    """Read specific forces, (4,), with parts without noise."""
     return np.array(Accelerometer(**QUIET, **errors).make_reading_function()(ideal(forces), (0.0,) * 4))
 
 

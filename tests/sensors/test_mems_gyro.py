@@ -26,7 +26,7 @@ def quiet(**settings: float) -> dict[str, Any]:
 
 
 def read_rate(rate: np.ndarray, dt: float = DT, seed: int = 0, world: int = 0, **settings: Any) -> np.ndarray:
-    """What a gyro shows of one world's rate, (n,) [rad/s] -> (n,) [deg/s]."""
+    """Read one world's rate with a gyro, (n,) [rad/s] -> (n,) [deg/s]."""
     gyro = MemsGyro(**settings)
     return np.degrees(gyro.make_reading_function(dt, normals(seed, world, 3, gyro.channels))(rate[:, None])[:, 0])
 
@@ -62,7 +62,7 @@ def test_allan_deviation_of_the_flicker_is_the_bias_instability(worlds: int, tol
 
 
 def test_the_mean_at_rest_is_taken_off() -> None:
-    """What is shown before the run, for a second, is on the mean zero."""
+    """The reading before the run, for a second, is on the mean zero."""
     noise = quiet(bias_instability_deg_h=82.0, noise_density_deg_s_rthz=0.005)
     raw = read_rate(np.zeros(500), calibration_s=0.0, **noise)
     calibrated = read_rate(np.zeros(300), calibration_s=1.0, **noise)

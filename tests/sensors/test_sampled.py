@@ -1,4 +1,4 @@
-"""What the sensors make of an ideal reading, by closed forms and by statistics with confidence bounds.
+"""The sensors' readings of an ideal reading, by closed forms and by statistics with confidence bounds.
 
 Seeds are fixed, so that nothing here fails by chance; the bounds are those a correct sensor meets 999 times of 1000.
 """

@@ -24,7 +24,7 @@ def two_accelerometers(plant: Plant, data: mujoco.MjData) -> float:
 
 
 def one_accelerometer(data: mujoco.MjData, place: str) -> float:
-    """What a single one would take for the tilt: the direction of its specific force, [rad]."""
+    """Return the tilt that a single accelerometer would show: the direction of its specific force [rad]."""
     x, _, z = data.sensor(f"accelerometer_{place}").data
     return math.atan2(-x, z)
 

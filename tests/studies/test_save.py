@@ -222,7 +222,7 @@ def test_observers_of_one_name_from_two_places_do_not_overwrite_each_other() -> 
 
 
 def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
-    """Those without one run untrimmed; alone, they are refused (tests/inputs/)."""
+    """Observers without one run untrimmed; alone, they are refused (tests/inputs/)."""
     scenario = load_scenario("bias_estimation", ["duration_s=0.5"])
     experiments = comparison.prepare_comparison(scenario, ["linear", "adaptive", "homogeneous_adaptive"])
     assert [experiment.scenario.controller.bias_trim_s for experiment in experiments] == [0.0, 1.0, 1.0]

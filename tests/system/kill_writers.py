@@ -20,7 +20,7 @@ from cmg_mj.results.run_folder import RunFolder, swap
 from cmg_mj.results.run_folder.manifest import HIDDEN
 
 EVENTS = {"open", "os.link", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.chmod", "os.utime"}
-"""What changes files, as Python's audit hooks name it."""
+"""Events that change files, as Python's audit hooks name them."""
 
 OLD, NEW = {"a": "old", "b": "old", "c": "old"}, {"b": "new", "c": "new", "d": "new"}
 
@@ -49,7 +49,7 @@ def save(texts: dict[str, str], complete: bool = True) -> None:
 
 
 def read_files() -> dict[str, str]:
-    """What a plain reader finds."""
+    """Read the files as a plain reader does."""
     return {file.name: file.read_text() for file in Path("it").iterdir() if file.is_file()}
 
 

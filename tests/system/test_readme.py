@@ -44,7 +44,7 @@ def section(title: str) -> str:
 
 
 def first_cells(text: str) -> list[str]:
-    """What stands in backticks at the beginning of a table's rows."""
+    """Return the text in backticks at the beginning of a table's rows."""
     return re.findall(r"^\| `([^`]+)` \|", text, flags=re.MULTILINE)
 
 

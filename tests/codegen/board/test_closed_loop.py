@@ -63,7 +63,7 @@ DOUBLE = re.compile(
     r"__aeabi_\w*d\w*|__\w*df\w*|(pow|exp|log|sqrt|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|f(abs|max|min|mod)"
     r"|floor|ceil|copysign|hypot|expm1|log1p)"
 )
-"""What computes in double precision on this processor: the compiler's helpers, and the C library's functions."""
+"""Functions that compute in double precision on this processor: the compiler's helpers, and the C library's."""
 
 
 def in_double_precision(image: Path) -> list[str]:
@@ -85,7 +85,7 @@ def test_a_processor_that_is_the_controller_changes_nothing() -> None:
 
 @pytest.mark.parametrize("observer", slow_but(OBSERVERS, "linear"))
 def test_lockstep_on_the_same_inputs(observer: str) -> None:
-    """What the board is shown is rounded to single precision, and so are its numbers; nothing is in double."""
+    """The board's inputs are rounded to single precision, and so are its numbers; nothing is in double."""
     experiment = prepare(load_scenario("push_recovery", PUSH_SETTINGS if observer in ARE_PUSHED else SHORT, observer))
     host = Recorder(experiment)
     experiment.run_on(host)

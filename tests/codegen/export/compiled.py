@@ -60,7 +60,7 @@ class Compiled:
         self._loaded = ctypes.CDLL(str(self.library))
 
     def run(self, samples: np.ndarray) -> np.ndarray:
-        """What `update` makes of raw samples, (n, 4 + gimbals): the estimates and u, (n, 4 + extra signals)."""
+        """Call `update` with raw samples, (n, 4 + gimbals); return the estimates and u, (n, 4 + extra signals)."""
         controller = ctypes.create_string_buffer(8192)
         samples = np.ascontiguousarray(samples, self.type)
         results = np.full((len(samples), self.width + 1), np.nan, self.type)

@@ -1,4 +1,4 @@
-"""What is exported against Python, on the samples of a closed loop over 15 s."""
+"""Exported code against Python, on the samples of a closed loop over 15 s."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What cannot be exported is refused in one line, with its place; what is wrong is found by comparing."""
+"""Classes that cannot be exported are refused in one line, with the place; a comparison finds wrong results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every law must be: a value with pure, elementwise init and step, the same in one world and in many."""
+"""The contract of every law: a value with pure, elementwise init and step, the same in one world and in many."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ def test_the_closed_loops_poles_are_the_regulators_and_the_filters(dt: float, pa
 
 @cache
 def errors(worlds: int = 3000, seconds: float = 16.0) -> tuple[Lqg, np.ndarray]:
-    """Of what the law expects at a sample, on the linear rig with all its noises, (n_times * worlds, 4)."""
+    """Return the errors of the state that the law expects at a sample, on the linear rig with all its noises."""
     control_law = law()
     rng = np.random.default_rng(5)
     _, _, Q = estimator(control_law.dt, *noises(control_law))

@@ -1,4 +1,4 @@
-"""What mount makes: the file is the spec, joints are held, and the line on the floor is a hinge as far as it tilts."""
+"""The result of mount: the file is the spec, joints are held, and the line on the floor tilts like a hinge."""
 
 from __future__ import annotations
 

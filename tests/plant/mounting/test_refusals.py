@@ -1,4 +1,4 @@
-"""What mount refuses, in one line that says what, where and what would do."""
+"""The refusals of mount, in one line that says what, where and what would do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What robots' files have that is seldom: each is mounted as the plain one is, or refused in one line."""
+"""Rare elements of robots' files: each is mounted as the plain one is, or refused in one line."""
 
 from __future__ import annotations
 

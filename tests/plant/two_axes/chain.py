@@ -19,9 +19,9 @@ from cmg_mj.inputs.bundled import folder
 
 N = 11
 SIDE = 0.095
-"""Half of a cube's edge: the cubes' centres lie as far from the two middle planes [m]."""
+"""Half of a module's edge: the modules' centres lie as far from the two middle planes [m]."""
 HEIGHT = 0.134
-"""Of the cubes' centres above the joint [m]."""
+"""Height of the modules' centres above the joint [m]."""
 MODULES = {
     "roll/cube1": ((SIDE, SIDE), -math.pi / 2.0),
     "roll/cube2": ((-SIDE, -SIDE), -math.pi / 2.0),
@@ -30,7 +30,7 @@ MODULES = {
 }
 """Where each stands in the frame, and how it is turned."""
 FRAME_HEIGHT = 0.1
-"""Of the frame's own centre [m]."""
+"""Height of the frame's own centre [m]."""
 G = 9.81
 
 
@@ -126,7 +126,7 @@ class Chain:
         return -self._slopes(self.potential, q)
 
     def bias(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-        """What Lagrange's equations have besides M ddq: dM/dt dq - d(T - P)/dq, (..., 11) [N m]."""
+        """Return the terms of Lagrange's equations besides M ddq: dM/dt dq - d(T - P)/dq, (..., 11) [N m]."""
         derivative = np.imag(self.momenta(q + 1e-30j * dq, dq)) / 1e-30  # the derivative of M along the motion, exactly
         return derivative - self._slopes(
             lambda coordinates: self.kinetic(coordinates, dq) - self.potential(coordinates), q

@@ -1,4 +1,4 @@
-"""What the two-axis rig's motion must conserve and the work it must account for, by the derivation of `chain.py`.
+"""Conservation laws and the balance of work of the two-axis rig's motion, by the derivation of `chain.py`.
 
 The wheels spin with 54 J each, which would hide everything else: the energy watched is the platform's, T + P without
 1/2 J_d (axial absolute angular velocity)^2 of each wheel, P counted from the hanging position.

@@ -22,7 +22,7 @@ def plant(request: pytest.FixtureRequest) -> Plant:
 
 
 def unstable_poles(plant: Plant) -> np.ndarray:
-    """Of the full model, linearised at its keyframe: what grows [1/s]."""
+    """Return the growing poles of the full model, linearised at its keyframe [1/s]."""
     model = copy.copy(plant.model)
     model.opt.integrator, model.opt.timestep = int(mujoco.mjtIntegrator.mjINT_EULER), 1e-4  # RK4 is refused here
     data = mujoco.MjData(model)
@@ -79,7 +79,7 @@ def test_a_base_in_the_air_gives_way() -> None:
 
 
 def test_a_base_on_two_feet_gives_way_about_the_line_between_them() -> None:
-    """Of four feet in a square those along x hold a roll no more, and a pitch as before."""
+    """The feet along x, of four in a square, hold a roll no more, and a pitch as before."""
     plant = load_plant(model="two_axes_free_base.xml", equilibrium_bias_deg=0.0)
     model = copy.copy(plant.model)
     for foot, y in (("foot_nn", 0.0), ("foot_pn", 0.0), ("foot_np", None), ("foot_pp", None)):

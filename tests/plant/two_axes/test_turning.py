@@ -1,4 +1,4 @@
-"""What a turn about the vertical couples on the full model, and the gimbal rates that cancel it.
+"""The coupling by a turn about the vertical on the full model, and the gimbal rates that cancel it.
 
 The torques that the wheels' momentum asks of the joints are those of the rig whose wheels turn less those of the same
 rig whose wheels stand: MuJoCo's inverse dynamics at given rates, without accelerations.

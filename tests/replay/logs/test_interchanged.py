@@ -19,7 +19,7 @@ OUTER_FIRST: dict[str, str] = dict(zip(ACCELEROMETERS, ("b_x", "b_z", "a_x", "a_
 
 
 def readings(seed: int, swing: float, noise: float = 0.04, n: int = 2000) -> dict[str, np.ndarray]:
-    """Of a pendulum that swings at 0.7 and 1.9 Hz: specific forces r y'' - g sin y, g cos y - r y'^2 [m/s^2]."""
+    """Make readings of a pendulum that swings at 0.7 and 1.9 Hz: r y'' - g sin y, g cos y - r y'^2 [m/s^2]."""
     rng, t = np.random.default_rng(seed), DT * np.arange(n)
     y, rate, acceleration = np.zeros(n), np.zeros(n), np.zeros(n)
     for size, hertz in ((swing, 0.7), (0.3 * swing, 1.9)):

@@ -34,7 +34,7 @@ def study(points: int, worlds: int = 1) -> SweepStudy:
 
 @contextmanager
 def peak() -> Iterator[list[float]]:
-    """What Python takes meanwhile, at most [MB]."""
+    """Measure the most memory that Python takes meanwhile [MB]."""
     peaks: list[float] = []
     tracemalloc.start()
     try:

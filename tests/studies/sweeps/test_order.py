@@ -1,4 +1,4 @@
-"""How often a named order of observers holds."""
+"""The share of worlds in which a named order of observers holds."""
 
 from __future__ import annotations
 

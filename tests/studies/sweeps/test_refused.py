@@ -1,4 +1,4 @@
-"""What a sweep refuses before anything is computed, in one line, whoever asks: the command, a study file, Python."""
+"""Refusals of a sweep before anything is computed, in one line, for the command, a study file and Python."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def test_of_a_grid_a_point_has_a_row() -> None:
 
 @pytest.mark.parametrize("order", [(), ("ltv", "linear")])
 def test_the_terminal_says_why_there_are_no_indices(order: tuple[str, ...]) -> None:
-    """Of everything, or of one observer and its ratio alone."""
+    """For everything, or for one observer and its ratio alone."""
     names = ("linear", "ltv")
 
     def sobol(fallen_observers: tuple[str, ...]) -> str:

@@ -71,7 +71,7 @@ def test_the_noise_of_a_world_is_the_same_in_every_cell() -> None:
 
 @pytest.mark.slow
 def test_killed_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is there is not computed again, and the whole is the same as in one go."""
+    """Finished trials are not computed again, and the whole is the same as in one go."""
     monkeypatch.setattr(study_module, "CHUNK", 5)
     store = Store(tmp_path, small())
     assert store.open() == 0

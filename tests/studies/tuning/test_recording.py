@@ -1,4 +1,4 @@
-"""What is recorded to tune on."""
+"""Recordings to tune on."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ SIGHT = {
     "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
     "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
 }
-"""What is left of linear red, green, blue: Machado, Oliveira, Fernandes 2009, severity 1."""
+"""The rest of linear red, green, blue: Machado, Oliveira, Fernandes 2009, severity 1."""
 
 LMS = [[0.4122214708, 0.5363325363, 0.0514459929], [0.2119034982, 0.6806995451, 0.1073969566]]
 LMS += [[0.0883024619, 0.2817188376, 0.6299787005]]
@@ -38,7 +38,7 @@ def linear(colours: list[Colour]) -> np.ndarray:
 
 
 def least_distance(colours: list[Colour], sight: str) -> float:
-    """How far apart the two most alike are for one kind of sight."""
+    """Return the distance of the two most alike for one kind of sight."""
     response = np.clip(linear(colours) @ np.transpose(SIGHT[sight]), 0.0, 1.0)
     lab = np.cbrt(response @ np.transpose(LMS)) @ np.transpose(LAB)
     distances = np.linalg.norm(lab[:, None] - lab, axis=-1)

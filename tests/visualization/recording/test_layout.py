@@ -1,4 +1,4 @@
-"""How a recording opens, read from its blueprint: what is switched on, axes, order, and whether the rig is in view."""
+"""The layout of a recording, read from its blueprint: observers switched on, axes, order, and the rig in view."""
 
 from __future__ import annotations
 
@@ -226,7 +226,7 @@ def move(model: mujoco.MjModel, scale: float, shift: np.ndarray) -> mujoco.MjMod
 
 
 def corners(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
-    """Of all boxes around geoms of moving bodies, (n, 3) [m]."""
+    """Return the corners of all boxes around geoms of moving bodies, (n, 3) [m]."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)

@@ -1,4 +1,4 @@
-"""What a user changes while it runs: observer, law, noise, e, pushes by button and by mouse; and what goes wrong."""
+"""Changes by a user during a run: observer, law, noise, e, pushes by button and by mouse; and failures."""
 
 from __future__ import annotations
 
