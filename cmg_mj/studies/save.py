@@ -48,13 +48,13 @@ class RunReport:
     runs: Sequence[Run]
 
 
-def report_run(experiment: Experiment, result: Result, *, several_observers: bool = False) -> RunReport:
+def report_run(experiment: Experiment, result: Result, *, several: bool = False) -> RunReport:
     """Assemble the report of a result's first world.
 
     Args:
         experiment: The experiment.
         result: Its result, with the trajectory.
-        several_observers: Whether a recording has several observers: names of `runs` then begin with the observer.
+        several: Whether a recording has several observers: names of `runs` then begin with the observer.
 
     Returns:
         The report.
@@ -90,14 +90,8 @@ def report_run(experiment: Experiment, result: Result, *, several_observers: boo
     if trajectory.axes:
         common = {key: value for key, value in summary.items() if key not in (AXES, *OPEN_LOOP_SECTIONS)}
         runs = [
-            Run(
-                f"{observer}, {axis}" if several_observers else axis,
-                trajectory.along(axis),
-                {**common, **axis_summary},
-                outcome,
-                axis,
-            )
-            for axis, axis_summary in section(summary, AXES).items()
+            Run(f"{observer}, {axis}" if several else axis, trajectory.along(axis), {**common, **part}, outcome, axis)
+            for axis, part in section(summary, AXES).items()
         ]
     return RunReport(experiment, result.driver, world, outcome, summary, trajectory, runs)
 
@@ -174,7 +168,7 @@ def save_comparison(
     from cmg_mj.visualization.recording import write_recording
 
     several = len(observers) > 1
-    reports = [report_run(entry.experiment, entry.world_0, several_observers=several) for entry in observers]
+    reports = [report_run(entry.experiment, entry.world_0, several=several) for entry in observers]
     header = recording_header(reports[0].experiment, reports[0].driver, reports[0].world)
     writers = (
         *(report.trajectory.save for report in reports),

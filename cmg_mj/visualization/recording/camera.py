@@ -72,13 +72,11 @@ def enclosing_ball(plant: Plant, qpos: np.ndarray) -> Ball:
         mujoco.mj_comPos(model, data)
         return Ball(data.subtree_com[0].copy(), float(model.stat.extent))
     first_ball = _enclose(first)
-    near_corners = [
-        corners for corners in (_corners(model, data, i) for i in fixed_geoms) if _is_within(corners, first_ball)
-    ]
+    near_boxes = [box for box in (_corners(model, data, i) for i in fixed_geoms) if _is_within(box, first_ball)]
     poses = qpos[np.isfinite(qpos).all(axis=1)]
     poses = poses[np.unique(np.linspace(0, max(len(poses) - 1, 0), POSES).astype(int))] if len(poses) else poses
-    ball = _enclose([*first, *near_corners, *(corners for angles in poses for corners in corners_at(angles))])
-    return ball if ball.radius < FARTHEST * first_ball.radius else _enclose([*first, *near_corners])
+    ball = _enclose([*first, *near_boxes, *(corners for angles in poses for corners in corners_at(angles))])
+    return ball if ball.radius < FARTHEST * first_ball.radius else _enclose([*first, *near_boxes])
 
 
 def _corners(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:

@@ -37,13 +37,13 @@ class LogSeries:
         name: Name of the log, unique in a recording.
         series: The series, in the folders that `PLOTS` names: angles in degrees, rates in rad/s.
         observers: Names of all observers.
-        visible_observers: Names of the observers that are switched on at first.
+        best: Names of the observers that are switched on at first.
     """
 
     name: str
     series: Sequence[Series]
     observers: Sequence[str]
-    visible_observers: Sequence[str]
+    best: Sequence[str]
 
 
 def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping[str, str]) -> None:
@@ -80,9 +80,7 @@ def _board(branch: Lines, log: LogSeries, titles: Sequence[str]) -> rrb.Containe
         rows = [row for path, row in branch.series.items() if path.startswith(plot.entities)]
         if rows:
             observers = {row.observer for row in rows}
-            visible = [n for n in log.visible_observers if n in observers] or [
-                n for n in log.observers if n in observers
-            ]
+            visible = [n for n in log.best if n in observers] or [n for n in log.observers if n in observers]
             views[plot] = plot_view(plot, branch, Choice(visible, full_legend=True))
     left = [view for plot, view in views.items() if plot in MAIN]
     right = [view for plot, view in views.items() if plot not in MAIN]

@@ -55,10 +55,8 @@ class Choice:
 
     def visibility(self, name: str) -> list[Override]:
         """Return the overrides that switch the line of an observer or run on or off."""
-        is_visible = name in self.names
-        return [
-            rr.SeriesLines(visible_series=[is_visible]) if self.full_legend else rrb.EntityBehavior(visible=is_visible)
-        ]
+        visible = name in self.names
+        return [rr.SeriesLines(visible_series=[visible]) if self.full_legend else rrb.EntityBehavior(visible=visible)]
 
     def style_line(self, name: str, color: Colour, label: str) -> list[Override]:
         """Return the overrides that style the line of a run and switch it on or off."""
