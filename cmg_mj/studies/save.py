@@ -167,8 +167,7 @@ def save_comparison(
     from cmg_mj.studies.compare.plot import plot_worlds
     from cmg_mj.visualization.recording import write_recording
 
-    several = len(observers) > 1
-    reports = [report_run(entry.experiment, entry.world_0, several=several) for entry in observers]
+    reports = [report_run(entry.experiment, entry.world_0, several=len(observers) > 1) for entry in observers]
     header = recording_header(reports[0].experiment, reports[0].driver, reports[0].world)
     writers = (
         *(report.trajectory.save for report in reports),

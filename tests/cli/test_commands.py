@@ -127,7 +127,7 @@ def test_check_says_what_a_scenario_amounts_to(quick: str) -> None:
     for fragment in (
         "quick.toml: valid",
         "0.4 s, 80 physics steps of 0.005 s (RK4), seed 0",
-        "scissored_pair.xml, cubes: cube1, cube2",
+        "scissored_pair.xml, modules: cube1, cube2",
         "equilibrium bias 0.5 deg, initial tilt 1 deg",
         "K_e = [35, 4, -1, 0.3] at 200 Hz, at most 4.7 rad/s",
         "stable with the reduced model and its true state, slowest pole -0.203 1/s",

@@ -66,7 +66,7 @@ BODY = '<body name="more" pos="1 0 0">{}<inertial pos="0 0 0" mass="1" diaginert
         "the model has no keyframe 'equilibrium'; its keyframes: none",
     ),
     ("typo in keyframe", {"rig": ('"equilibrium"', '"equilibrum"')}, "'equilibrium'; did you mean 'equilibrum'?"),
-    ("cubes", {"rig": ('<frame name="cube..mount.*?</frame>', "")}, "the model has no joint 'cube1/gimbal'"),
+    ("modules", {"rig": ('<frame name="cube..mount.*?</frame>', "")}, "the model has no joint 'cube1/gimbal'"),
     ("the cube's file", {"rig": ('file="cube.xml"', 'file="cub.xml"')}, "not a model MuJoCo can read: ", "cub.xml"),
 )
 def test_a_model_that_lacks(wrong_input: dict[str, Any], fragments: list[str]) -> None:
@@ -232,7 +232,7 @@ def test_all_that_is_missing_and_wrong_is_said_at_once() -> None:
             "the model has no sensor 'fog'; did you mean 'fg'? its sensors: ",
             "the model has no keyframe 'equilibrium'; its keyframes: none",
             "<option gravity='0 0 9.81'>: must point straight down",
-            "a rig needs a joint or a site tilt, the joints CUBE/gimbal, CUBE/flywheel, the actuators ",
+            "a rig needs a joint or a site tilt, the joints MODULE/gimbal, MODULE/flywheel, the actuators ",
         ],
         cmg_mj("check", "rig.xml").complaint,
     )
