@@ -104,7 +104,7 @@ def test_a_users_own_loop_has_it_too() -> None:
     assert controller.gimbal_rate is None
 
 
-def test_observers_are_told_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_observers_get_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     setup = experiment("plant.gimbal_backlash_arcmin=60.0")
     commands: list[float] = []
     controller = setup.axis_controller()

@@ -322,7 +322,7 @@ def test_observer_gets_the_sample_and_the_command_held_since_the_last() -> None:
 
 @pytest.mark.parametrize("angles", ["measured", "estimated"])
 @pytest.mark.parametrize("feedback", ["observer", "fog", "truth"])
-def test_law_acts_on_the_signals_it_was_told_to(feedback: Any, angles: Any) -> None:
+def test_law_acts_on_the_signals_of_its_settings(feedback: Any, angles: Any) -> None:
     """(8) with y1, y2 or their estimates; the rate from the observer, the gyro (here off by 0.02) or the truth."""
     loop = controller(Script(ESTIMATES.__getitem__), feedback=feedback, angle_source=angles)
     loop.sensors = Sensors(

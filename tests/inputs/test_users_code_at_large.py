@@ -106,7 +106,7 @@ def test_an_open_loop_observer_cannot_change_what_others_see(open_loop_observer:
     assert np.isnan(result.trajectory[f"estimate/{kind(open_loop_observer)}/x2_rad_s"][-1]).all()
 
 
-def test_in_the_loop_it_is_told(quick: str) -> None:
+def test_in_the_loop_the_comparison_fails(quick: str) -> None:
     outcome = cmg_mj("compare", quick, "--observers", kind(ChangesTheTilt), "--worlds", 2)
     assert outcome.status == 2
     assert "read-only" in outcome.err

@@ -239,7 +239,7 @@ def test_a_known_bias_is_where_gravity_pulls() -> None:
     assert abs(plain_estimate.x2) > 0.05
 
 
-def test_friction_beyond_what_the_step_bears_is_refused() -> None:
+def test_friction_beyond_what_the_step_tolerates_is_refused() -> None:
     """c h = (friction/width + damping) h/(gimbals D) at most 2.5: up to 1.546 N m on one gimbal."""
     observer("homogeneous", friction_n_m=1.54)
     bad_arguments: list[dict[str, Any]] = [{"friction_n_m": 1.56}, {"damping_n_m_s": 31.5}, {"friction_n_m": 1e6}]

@@ -251,7 +251,7 @@ def test_a_bias_is_found_as_a_torque() -> None:
 
 
 @pytest.mark.parametrize("counts", [64, 4096])
-def test_is_told_the_scenarios_encoders(counts: int) -> None:
+def test_it_uses_the_noise_of_the_scenarios_encoders(counts: int) -> None:
     """y2 is the mean of two, each rounded to whole counts."""
     changes = [f"sensors.encoder.counts_per_revolution={counts}"]
     setup: Any = prepare(load_scenario("push_recovery", changes, "kalman")).design.observer()

@@ -241,7 +241,7 @@ class Silent:
         return None, Estimate(y.y1, 0.0, y.y2)
 
 
-def test_a_class_that_does_not_say_what_it_needs_is_told_how_to(tmp_path: Path) -> None:
+def test_a_class_that_does_not_say_what_it_needs_gets_a_hint(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"Silent needs a model .* does not say what it needs \(needs = \(\)\)"):
         replay_log(log(tmp_path), ["tests.replay.test_replayed:Silent"])
 

@@ -55,7 +55,7 @@ def test_most_of_the_ceiling_tilt_on_both_axes_at_once_is_recovered_and_more_nev
 
 
 @pytest.mark.slow
-def test_a_turn_is_borne_by_gimbals_that_turn_against_it_alone() -> None:
+def test_a_turn_is_tolerated_with_gimbals_that_turn_against_it_alone() -> None:
     assert two_axes("plant.turn_rate_rad_s=3").run().outcomes[0].kind == "done"
     uncompensated = two_axes("plant.turn_rate_rad_s=2", "controller.compensate_turning=false")
     assert uncompensated.run().outcomes[0].fell

@@ -138,7 +138,7 @@ def test_what_the_bench_gives_is_no_parameter() -> None:
         assert {"dt", "rate_limit"} <= arguments.keys() & inspect.signature(law_class(kind)).parameters.keys()
 
 
-def test_a_law_that_is_told_the_noise_keeps_worlds_of_other_noise_apart() -> None:
+def test_a_law_that_uses_the_noise_keeps_worlds_of_other_noise_apart() -> None:
     experiment = prepare(load_scenario("push_recovery", [*SHORT, "controller.kind=lqg"]))
     with pytest.raises(InputError, match="the noise that the law is told differs"):
         experiment.run_many(2, vary={"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]})

@@ -174,7 +174,7 @@ def test_its_noises_are_those_of_the_observer_kalman() -> None:
     assert noises(law()) == (0.03, 0.082, 0.017)
 
 
-def test_it_rests_where_gravity_bears_the_torque() -> None:
+def test_it_rests_where_gravity_balances_the_torque() -> None:
     """A torque on the rig, which both gimbals' shares of gravity hold: nothing to be done."""
     control_law, torque = law(), 0.1
     x1 = -torque / (2.0 * paper.gravity_torque)

@@ -74,7 +74,7 @@ def test_it_stands_thirty_seconds_with_a_push(mounting: tuple[Experiment, Prospe
 
 
 @pytest.mark.slow
-def test_it_bears_what_the_reduced_model_says(mounting: tuple[Experiment, Prospects, str]) -> None:
+def test_it_recovers_from_what_the_reduced_model_says(mounting: tuple[Experiment, Prospects, str]) -> None:
     """E is within 35 % of the simulation's: most stand 0.65 E and fall with E/0.65; all fall with 1.8 E."""
     experiment, outlook, _ = mounting
     assert not outlook.hints

@@ -158,7 +158,7 @@ def test_a_joint_is_held_already_by_what_holds_it(plain: Plant, equality: str, h
         ('<general name="s" joint="neck" biastype="affine" gainprm="1000" biasprm="20 -2000 -20"/>', 0.58, None),
     ],
 )
-def test_a_servo_is_told_what_holds_it_where_it_stands(
+def test_a_servo_gets_the_setpoint_that_holds_it_where_it_stands(
     servo: str, setpoint: float, state: float | None, hold: str
 ) -> None:
     """It exerts no force there; what it is told is not its joint's position, with a gear or an offset."""

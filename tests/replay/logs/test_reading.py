@@ -55,7 +55,7 @@ def test_units_by_their_names(heads: tuple, sizes: tuple, plain: Log, tmp_path: 
     assert_same(read_log(path, ReadOptions(dict(zip(COLUMNS, heads, strict=True)))), plain)
 
 
-def test_units_told(plain: Log, tmp_path: Path) -> None:
+def test_units_as_options(plain: Log, tmp_path: Path) -> None:
     t, y, w = sine().values()
     path = write_csv(tmp_path / "told.csv", {"a": t * 1e3, "b": np.degrees(y), "c": -np.degrees(w)})
     log = read_log(

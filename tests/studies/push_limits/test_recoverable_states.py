@@ -91,7 +91,7 @@ def fast(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
     [{}, {"controller.feedback": "truth"}, {"observer": {"kind": "gyro_free"}}],
     ids=["observer", "truth", "gyro"],
 )
-def test_no_controller_bears_more(fast: Experiment, feedback: dict[str, Any]) -> None:
+def test_no_controller_recovers_from_more(fast: Experiment, feedback: dict[str, Any]) -> None:
     """Nor does the one that is fed the true rate; it bears more than any blow that can be recovered from."""
     experiment = fast.with_settings(feedback)
     top = ceiling(experiment.plant.reduced, experiment.law.rate_limit)

@@ -52,7 +52,7 @@ def luminance(colours: list[Colour]) -> np.ndarray:
 @pytest.mark.parametrize(
     ("sight", "least"), [("all three cones", 0.13), ("protanopia", 0.1), ("deuteranopia", 0.1), ("tritanopia", 0.045)]
 )
-def test_the_bundled_observers_can_be_told_apart(sight: str, least: float) -> None:
+def test_the_bundled_observers_can_be_distinguished(sight: str, least: float) -> None:
     assert least_distance(list(COLOURS.values()), sight) > least
 
 
