@@ -45,7 +45,7 @@ def package_of(module: str) -> str:
     return module.split(".")[1] if "." in module else ""
 
 
-def of_package(package: str) -> list[str]:
+def modules_of(package: str) -> list[str]:
     return [name for name in modules() if package_of(name) == package]
 
 
@@ -64,7 +64,7 @@ def imports(module: str) -> list[tuple[int, str]]:
     return list(imported_names(ast.parse(modules()[module].read_text(encoding="utf-8")), module))
 
 
-def at_import(module: str) -> Iterator[str]:
+def import_time_names(module: str) -> Iterator[str]:
     """Modules of the package that a module imports when it is imported itself."""
     tree = ast.parse(modules()[module].read_text(encoding="utf-8"))
     outside = [node for node in tree.body if not _is_for_types(node)]
@@ -87,7 +87,7 @@ def _module_in(name: str) -> Iterator[str]:
         yield name
 
 
-def in_a_fresh_interpreter(code: str) -> list[str]:
+def run_in_a_fresh_interpreter(code: str) -> list[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
 
 
@@ -116,7 +116,7 @@ def test_imports_run_upward_only(package: str) -> None:
     depth = ORDER.index(package)
     downward_imports = [
         f"{module}:{line} imports {name}"
-        for module in of_package(package)
+        for module in modules_of(package)
         for line, name in imports(module)
         if name.startswith("cmg_mj.") and (other := package_of(name)) in ORDER and ORDER.index(other) > depth
     ]
@@ -126,7 +126,7 @@ def test_imports_run_upward_only(package: str) -> None:
 def test_a_downward_import_would_be_seen() -> None:
     """The order is not trivially held: the loop does use the controller, the command line the scenario."""
     dependencies = {
-        package: {package_of(name) for module in of_package(package) for _, name in imports(module)}
+        package: {package_of(name) for module in modules_of(package) for _, name in imports(module)}
         for package in ORDER
     }
     assert "controllers" in dependencies["simulation"]
@@ -136,7 +136,7 @@ def test_a_downward_import_would_be_seen() -> None:
 
 def test_no_circle_of_modules() -> None:
     """Among the imports that are made when a module is imported; those inside functions are made later."""
-    graph = {module: set(at_import(module)) - {module} for module in modules()}
+    graph = {module: set(import_time_names(module)) - {module} for module in modules()}
     finished: set[str] = set()
     while ready := {
         module
@@ -151,13 +151,13 @@ def test_no_circle_of_modules() -> None:
 def test_nothing_above_the_line_imports_mujoco() -> None:
     """One package after the other: the first that brings MuJoCo, or what is as heavy, is named."""
     code = "import importlib, sys\n"
-    light = [name for package in UPPER_PACKAGES for name in of_package(package) if not uses_casadi(name)]
+    light = [name for package in UPPER_PACKAGES for name in modules_of(package) if not uses_casadi(name)]
     for name in light:
         code += f"importlib.import_module({name!r})\n"
         for heavy in ("mujoco", "control", "pyarrow", *HEAVY):
             code += f"if {heavy!r} in sys.modules: print({name!r}, {heavy!r})\n"
     code += "print('done')"
-    assert in_a_fresh_interpreter(code) == ["done"]
+    assert run_in_a_fresh_interpreter(code) == ["done"]
 
 
 def uses_casadi(module: str) -> bool:
@@ -169,7 +169,7 @@ def test_upper_packages_do_not_name_mujoco(package: str) -> None:
     """Not even inside a function."""
     places = [
         f"{name}:{line}"
-        for name in of_package(package)
+        for name in modules_of(package)
         for line, import_name in imports(name)
         if import_name.startswith("mujoco")
     ]
@@ -188,7 +188,7 @@ for kind in OBSERVERS:
     observer.step(observer.init(Measurement(0.0, 0.0, 0.0)), Measurement(0.01, 0.0, 1.0), 0.0)
 print("mujoco" in sys.modules)
 """
-    assert in_a_fresh_interpreter(code) == ["False"]
+    assert run_in_a_fresh_interpreter(code) == ["False"]
 
 
 @pytest.mark.parametrize("library", sorted(HEAVY))
@@ -210,7 +210,7 @@ def test_heavy_libraries_are_imported_where_they_are_used() -> None:
         if not name.startswith(inner):
             code += f"importlib.import_module({name!r})\n"
     code += f"print(*[name for name in {sorted(HEAVY)} if name in sys.modules], 'done')"
-    assert in_a_fresh_interpreter(code) == ["done"]
+    assert run_in_a_fresh_interpreter(code) == ["done"]
 
 
 @pytest.mark.slow

@@ -42,7 +42,7 @@ def toy(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Py
     return pytester
 
 
-def passed(toy: pytest.Pytester, *arguments: str) -> list[str]:
+def run_toy(toy: pytest.Pytester, *arguments: str) -> list[str]:
     """Tests that were run."""
     result = toy.runpytest_inprocess("-p", "tests.tiers", "-v", "-p", "no:cacheprovider", *arguments)
     return re.findall(r"^(\S+) PASSED", result.stdout.str(), flags=re.MULTILINE)
@@ -65,19 +65,19 @@ def passed(toy: pytest.Pytester, *arguments: str) -> list[str]:
     ],
 )
 def test_which_tests_an_expression_runs(toy: pytest.Pytester, expression: str, tiers_run: list[str]) -> None:
-    assert sorted(passed(toy, "-m", expression)) == sorted(name for tier in tiers_run for name in TESTS[tier])
+    assert sorted(run_toy(toy, "-m", expression)) == sorted(name for tier in tiers_run for name in TESTS[tier])
 
 
 @pytest.mark.parametrize("name", [*TESTS["slow"], *TESTS["papers"]])
 def test_a_test_that_is_named_runs_whatever_its_tier(toy: pytest.Pytester, name: str) -> None:
-    assert passed(toy, name) == [name]
-    assert passed(toy, str(toy.path / name)) == [name]
+    assert run_toy(toy, name) == [name]
+    assert run_toy(toy, str(toy.path / name)) == [name]
 
 
 def test_a_file_that_is_named_runs_its_daily_tests(toy: pytest.Pytester) -> None:
-    assert sorted(passed(toy, "test_a.py")) == sorted(TESTS["daily"])
-    assert passed(toy, "papers") == []
-    assert passed(toy, "-m", "papers", "papers") == TESTS["papers"]
+    assert sorted(run_toy(toy, "test_a.py")) == sorted(TESTS["daily"])
+    assert run_toy(toy, "papers") == []
+    assert run_toy(toy, "-m", "papers", "papers") == TESTS["papers"]
 
 
 def test_a_test_of_the_papers_is_not_marked_slow(toy: pytest.Pytester) -> None:

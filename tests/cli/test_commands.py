@@ -317,7 +317,7 @@ def test_bench_of_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
 # --- terminals, pipes ----------------------------------------------------------------------------------------
 
 
-def on_a_terminal(*arguments: str) -> tuple[subprocess.CompletedProcess[str], str]:
+def run_on_a_terminal(*arguments: str) -> tuple[subprocess.CompletedProcess[str], str]:
     """Run with standard error on a terminal of 100 columns; what it showed."""
     master, terminal = pty.openpty()
     with subprocess.Popen(
@@ -341,7 +341,7 @@ def on_a_terminal(*arguments: str) -> tuple[subprocess.CompletedProcess[str], st
 @pytest.mark.slow
 def test_progress_is_shown_on_a_terminal_and_nowhere_else() -> None:
     Path("long.toml").write_text(tomli_w.dumps({"title": "[b]Long[/b]", "duration_s": 4.0}))
-    process, screen = on_a_terminal("run", "long.toml", "--json")
+    process, screen = run_on_a_terminal("run", "long.toml", "--json")
     assert process.returncode == 0
     assert json.loads(process.stdout)["outcome"] == "done"
     assert "[b]Long[/b]" in screen

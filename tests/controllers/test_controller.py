@@ -541,12 +541,12 @@ def test_another_observer_is_open_loop_first_and_takes_over() -> None:
 
 
 def test_it_takes_over_at_once_from_one_that_fails() -> None:
-    def failing(k: int) -> Estimate:
+    def fail_later(k: int) -> Estimate:
         if k > 4:
             raise KeyError("gone")
         return Estimate(0.0, 1.0, 0.0)
 
-    loop = controller(Script(failing))
+    loop = controller(Script(fail_later))
     rates = []
     for k in range(9):
         if k == 3:

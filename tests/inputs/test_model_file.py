@@ -16,7 +16,7 @@ from tests.command import CommandOutcome, cmg_mj
 from tests.inputs.complaints import assert_in_order, check, table
 
 
-def edited(rig: tuple[str, str] | None = None, cube: tuple[str, str] | None = None) -> CommandOutcome:
+def check_edited(rig: tuple[str, str] | None = None, cube: tuple[str, str] | None = None) -> CommandOutcome:
     """`check` on a copy of the bundled model, in which a pattern has been replaced."""
     for name, edit in (("scissored_pair.xml", rig), ("cube.xml", cube)):
         text = (folder("models") / name).read_text()
@@ -70,7 +70,7 @@ BODY = '<body name="more" pos="1 0 0">{}<inertial pos="0 0 0" mass="1" diaginert
     ("the cube's file", {"rig": ('file="cube.xml"', 'file="cub.xml"')}, "not a model MuJoCo can read: ", "cub.xml"),
 )
 def test_a_model_that_lacks(wrong_input: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**wrong_input).complaint)
+    assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
 
 
 @table(
@@ -125,21 +125,21 @@ def test_a_model_that_lacks(wrong_input: dict[str, Any], fragments: list[str]) -
     ("no mass", {"cube": ('mass="0.61"', 'mass="0"')}, "does not compile: mass and inertia", "'cube1/flywheel'"),
 )
 def test_a_model_that_has(wrong_input: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**wrong_input).complaint)
+    assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
 
 
 def test_the_unedited_copy_is_a_model() -> None:
-    assert edited().status == 0
+    assert check_edited().status == 0
 
 
 def test_a_lock_without_a_bearing() -> None:
-    edited(rig=('<joint name="yaw".*?/>', ""))
+    check_edited(rig=('<joint name="yaw".*?/>', ""))
     complaint = cmg_mj("run", "my.toml", "--set", "plant.lock_thrust_bearing=true").complaint
     assert "plant.lock_thrust_bearing = true: rig.xml has no joint 'yaw' to lock" in complaint
 
 
 def test_a_lock_where_the_keyframe_gives_no_rates() -> None:
-    edited(rig=('qvel="[^"]*"', ""))
+    check_edited(rig=('qvel="[^"]*"', ""))
     with pytest.raises(
         InputError, match=r"^rig\.xml: keyframe 'equilibrium' must start 'cube1/flywheel' at its motor's"
     ):
@@ -212,11 +212,11 @@ KEYFRAME_ANGLES = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966
     ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml is not UTF-8 text (at byte "),
 )
 def test_a_model_that_is_set_wrongly(wrong_input: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**wrong_input).complaint)
+    assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
 
 
 def test_all_that_is_missing_and_wrong_is_said_at_once() -> None:
-    edited()
+    check_edited()
     rig = Path("rig.xml").read_text()
     for edit in (
         ('name="fog" site', 'name="fg" site'),
@@ -239,7 +239,7 @@ def test_all_that_is_missing_and_wrong_is_said_at_once() -> None:
 
 
 def test_check_of_a_model_by_itself() -> None:
-    edited()
+    check_edited()
     outcome = cmg_mj("check", "rig.xml")
     assert (outcome.status, outcome.err) == (0, "")
     for fragment in ("rig.xml: a rig", "cube1, cube2", "J_d = 0.0011 kg m^2", "--set plant.model=rig.xml"):

@@ -175,7 +175,7 @@ def law_path(law: type) -> str:
     return f"{__name__}:{law.__name__}"
 
 
-def set_to(law: type) -> list[str]:
+def law_option(law: type) -> list[str]:
     return ["--set", f"controller.kind={law_path(law)}"]
 
 
@@ -203,7 +203,7 @@ def test_a_law_that_cannot_work(wrong_input: type, fragments: list[str], command
         outcome = cmg_mj("check", "mine.toml")
         Path("mine.toml").unlink()
     else:
-        outcome = cmg_mj(command, "push_recovery", *set_to(wrong_input))
+        outcome = cmg_mj(command, "push_recovery", *law_option(wrong_input))
     assert_in_order(fragments, outcome.complaint)
     assert list(Path().iterdir()) == []
 
@@ -297,8 +297,8 @@ def test_gains_reach_a_law_of_ones_own_that_takes_them() -> None:
     ),
 )
 def test_a_law_for_one_world_among_many(quick: str, wrong_input: type, fragments: list[str]) -> None:
-    assert cmg_mj("run", quick, *set_to(wrong_input)).status == 0
-    outcome = cmg_mj("compare", quick, *set_to(wrong_input), "--out", "compared")
+    assert cmg_mj("run", quick, *law_option(wrong_input)).status == 0
+    outcome = cmg_mj("compare", quick, *law_option(wrong_input), "--out", "compared")
     assert_in_order([f"controller.kind = '{law_path(wrong_input)}': ", *fragments], outcome.complaint)
     assert not Path("compared").exists()
 
@@ -320,7 +320,7 @@ def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_a_law_that_fails_in_a_run(wrong_input: type, fragments: list[str], driver: str) -> None:
     """The recording until then is kept."""
-    outcome = cmg_mj("run", "push_recovery", *set_to(wrong_input), "--driver", driver, "--out", "it")
+    outcome = cmg_mj("run", "push_recovery", *law_option(wrong_input), "--driver", driver, "--out", "it")
     assert outcome.status == 2
     assert "stopped at 0.15 s" in outcome.out
     note, complaint = outcome.err.splitlines()

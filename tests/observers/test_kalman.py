@@ -51,7 +51,7 @@ def jacobian(estimator: Kalman, x: np.ndarray, u: float) -> np.ndarray:
     return np.array([(slope(estimator, x + d, u) - slope(estimator, x - d, u)) / 2e-5 for d in steps]).T
 
 
-def added_noise(estimator: Kalman, A: np.ndarray) -> np.ndarray:
+def sample_noise(estimator: Kalman, A: np.ndarray) -> np.ndarray:
     """The covariance that a sample period adds, by quadrature, (4, 4)."""
     m = estimator.model
     per_torque, gyroscopic = 1.0 / (m.gimbals * m.J1), m.J_d * m.omega_d / m.J1
@@ -82,7 +82,7 @@ def matrix(P: Covariance) -> np.ndarray:
 def reference(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The textbook's extended Kalman filter: estimates (n - 1, 4), and the last covariance (4, 4)."""
     R = measured_noise(estimator)
-    Q = added_noise(estimator, jacobian(estimator, np.zeros(4), 0.0))
+    Q = sample_noise(estimator, jacobian(estimator, np.zeros(4), 0.0))
     x, P = (
         np.array([y1[0], 0.0, y2[0], 0.0]),
         np.diag([R[0, 0], estimator.rate_start**2, R[1, 1], estimator.torque_start**2]),
@@ -141,7 +141,7 @@ def test_settles_at_the_linear_filter() -> None:
     estimator = kalman()
     F, Q = (
         expm(jacobian(estimator, np.zeros(4), 0.0) * DT),
-        added_noise(estimator, jacobian(estimator, np.zeros(4), 0.0)),
+        sample_noise(estimator, jacobian(estimator, np.zeros(4), 0.0)),
     )
     R = measured_noise(estimator)
     prediction_covariance = solve_discrete_are(F.T, C.T, Q, R)

@@ -63,7 +63,7 @@ def closed_loop(duration_s: float) -> Trajectory:
 
 
 @cache
-def along_the_run(duration_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def run_and_reference(duration_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """H and the estimate at every tick but the first, ours and the reference's."""
     y1, y2, u = (closed_loop(duration_s)[name] for name in ("y1_rad", "y2_rad", "u_rad_s"))
     start = np.concatenate([[y1[0], 0.0, y2[0]], np.eye(3).ravel()])
@@ -75,7 +75,7 @@ def along_the_run(duration_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 @pytest.mark.parametrize("duration_s", DURATIONS_S)
 def test_riccati_matrix_is_the_reference_integrations(duration_s: float) -> None:
-    package_step, reference, _, _ = along_the_run(duration_s)
+    package_step, reference, _, _ = run_and_reference(duration_s)
     error = relative_errors(package_step, reference)
     condition = np.linalg.cond(package_step)
     print(f"largest relative error of H's entries {error:.1e}; condition number up to {condition.max():.3g}")
@@ -85,13 +85,13 @@ def test_riccati_matrix_is_the_reference_integrations(duration_s: float) -> None
 
 @pytest.mark.parametrize("duration_s", DURATIONS_S)
 def test_riccati_matrix_is_positive_definite_along_the_run(duration_s: float) -> None:
-    package_step, _, _, _ = along_the_run(duration_s)
+    package_step, _, _, _ = run_and_reference(duration_s)
     assert np.linalg.eigvalsh(package_step).min() > 0.5
 
 
 @pytest.mark.parametrize("duration_s", DURATIONS_S)
 def test_estimate_is_the_reference_integrations(duration_s: float) -> None:
-    _, _, estimates, reference = along_the_run(duration_s)
+    _, _, estimates, reference = run_and_reference(duration_s)
     error = np.abs(estimates - reference).max(axis=0)
     print(f"largest error of the estimate {error} (rate's rms {np.std(reference[:, 1]):.3f} rad/s)")
     np.testing.assert_array_less(error, [2e-6, 5e-5, 1e-12])
@@ -103,7 +103,7 @@ def test_estimate_recorded_in_the_loop_is_the_observers_alone(duration_s: float)
     loop_estimates = np.stack(
         [closed_loop(duration_s)[f"estimate/ltv/{name}"] for name in ("x1_rad", "x2_rad_s", "x3_rad")], axis=1
     )
-    _, _, estimates, _ = along_the_run(duration_s)
+    _, _, estimates, _ = run_and_reference(duration_s)
     np.testing.assert_allclose(loop_estimates[1:], estimates, rtol=0.0, atol=1e-9)
 
 

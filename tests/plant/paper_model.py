@@ -42,16 +42,16 @@ def R_BC(a: sp.Expr) -> sp.Matrix:
     return sp.Matrix([[1, 0, 0], [0, sp.cos(a), sp.sin(a)], [0, -sp.sin(a), sp.cos(a)]])
 
 
-def doubled_energy(inertia: Sequence[float], w: sp.Matrix) -> sp.Expr:
+def twice_body_energy(inertia: Sequence[float], w: sp.Matrix) -> sp.Expr:
     """w' diag(inertia) w, as T writes it."""
     return w.dot(sp.diag(*inertia) * w)
 
 
-def doubled_cube_energy(w_b: sp.Matrix, q: Sequence[sp.Expr], dq: Sequence[sp.Expr]) -> sp.Expr:
+def twice_module_energy(w_b: sp.Matrix, q: Sequence[sp.Expr], dq: Sequence[sp.Expr]) -> sp.Expr:
     """Gimbal's and flywheel's share of 2 T, by their angles and rates (c, d), in a frame turning with w_b."""
     w_c = sp.Matrix([dq[0], 0, 0]) + R_BC(q[0]) * w_b
     w_d = sp.Matrix([0, dq[1], 0]) + R_AB(q[1]) * w_c
-    return doubled_energy([I_d, J_d, K_d], w_d) + doubled_energy([I_c, J_c, K_c], w_c)
+    return twice_body_energy([I_d, J_d, K_d], w_d) + twice_body_energy([I_c, J_c, K_c], w_c)
 
 
 class Lagrangian:
@@ -130,10 +130,10 @@ def scissored_pair(K_a: float, *, yaw_term: bool = True) -> Lagrangian:
     w_a = sp.Matrix([0, 0, dq[0]])
     w_b = sp.Matrix([0, dq[1], 0]) + R_AB(q[1]) * w_a
     energy_twice = (
-        doubled_cube_energy(w_b, q[2:4], dq[2:4])
-        + doubled_cube_energy(w_b, q[4:6], dq[4:6])
-        + 2 * doubled_energy([I_b, J_b + m * l**2 / 2, K_b], w_b)
-        + doubled_energy([0, 0, K_a + m * l**2 / 2], w_a)
+        twice_module_energy(w_b, q[2:4], dq[2:4])
+        + twice_module_energy(w_b, q[4:6], dq[4:6])
+        + 2 * twice_body_energy([I_b, J_b + m * l**2 / 2, K_b], w_b)
+        + twice_body_energy([0, 0, K_a + m * l**2 / 2], w_a)
     )
     if yaw_term:
         energy_twice += m * l**2 * sp.sin(tilt) ** 2 * dq[0] ** 2
@@ -153,5 +153,5 @@ def single_gimbal() -> Lagrangian:
     """The three bodies of sokolov2019: T of the six with one cube and q_a = 0. Coordinates q_b, q_c, q_d."""
     q, dq = _coordinates("b", "c", "d")
     w_b = sp.Matrix([0, dq[0], 0])
-    energy_twice = doubled_energy([I_b, J_b + m * l_single**2, K_b], w_b) + doubled_cube_energy(w_b, q[1:], dq[1:])
+    energy_twice = twice_body_energy([I_b, J_b + m * l_single**2, K_b], w_b) + twice_module_energy(w_b, q[1:], dq[1:])
     return Lagrangian(q, dq, energy_twice / 2, m * g * l_single * sp.cos(q[0] + sp.pi / 4))

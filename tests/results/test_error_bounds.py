@@ -18,7 +18,7 @@ from tests.observers.reference import DT, NOISE, PAPER
 WHOLE = 2000
 
 
-def with_correlated_noise(noise: TiltNoise, h: float) -> float:
+def floor_with_correlated_noise(noise: TiltNoise, h: float) -> float:
     """The same floor in another form: of z = x2 - h/2 x1'', p = x1 - h^2/6 x1'', whose noises are correlated."""
     v, n, c = noise.tilt, noise.acceleration, noise.correlation * noise.tilt * noise.acceleration
     F, C = np.array([[1.0, h], [0.0, 1.0]]), np.array([[1.0, 0.0]])
@@ -38,7 +38,7 @@ def with_correlated_noise(noise: TiltNoise, h: float) -> float:
 @pytest.mark.parametrize("noise", [NOISE, TiltNoise(0.0032, 0.21, 0.2), TiltNoise(1e-4, 3.0, -0.7)])
 @pytest.mark.parametrize("dt", [0.001, 0.005, 0.05])
 def test_floor_with_acceleration_in_another_form(noise: TiltNoise, dt: float) -> None:
-    assert acceleration_floor(noise, dt) == pytest.approx(with_correlated_noise(noise, dt), rel=1e-6)
+    assert acceleration_floor(noise, dt) == pytest.approx(floor_with_correlated_noise(noise, dt), rel=1e-6)
 
 
 def test_no_noise_no_floor() -> None:

@@ -236,7 +236,7 @@ class Counted:
         return y.y1, Estimate(y.y1, 0.5 * (y.y1 - state) / self.dt, y.y2)
 
 
-def counting(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
+def count_steps(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
     setup = experiment((f"observer.kind={__name__}:Counted", *settings))
     controller = setup.axis_controller()
     observer: Any = controller.observer
@@ -248,7 +248,7 @@ def counting(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
 def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) -> None:
     """RK4 calls back four times a step, the others once."""
     settings = (f"plant.integrator={integrator}", f"controller.rate_hz={rate_hz}", "plant.timestep_s=0.001")
-    setup, controller, calls = counting(*settings)
+    setup, controller, calls = count_steps(*settings)
     plant, data = setup.plant, setup.plant.new_data()
     counts: Counter[str] = Counter()
     with control_callback(plant, controller) as callback:
@@ -265,7 +265,7 @@ def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) 
 
 def test_half_steps_of_the_user_advance_it_once_too() -> None:
     """mj_step1 and mj_step2, which step RK4 models by Euler's method."""
-    setup, controller, calls = counting("plant.timestep_s=0.001")
+    setup, controller, calls = count_steps("plant.timestep_s=0.001")
     plant, data = setup.plant, setup.plant.new_data()
     with control_callback(plant, controller):
         for _ in range(200):
@@ -282,7 +282,7 @@ def other_callback(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 @contextmanager
-def somebody_elses() -> Iterator[None]:
+def other_callback_function() -> Iterator[None]:
     mujoco.set_mjcb_control(other_callback)
     try:
         yield
@@ -300,7 +300,7 @@ def test_it_takes_itself_out() -> None:
 
 def test_it_restores_what_was_there() -> None:
     setup = experiment()
-    with somebody_elses():
+    with other_callback_function():
         with control_callback(setup.plant, setup.axis_controller()) as outer:
             with control_callback(setup.plant, setup.axis_controller()) as inner:
                 assert mujoco.get_mjcb_control() is inner
@@ -311,15 +311,15 @@ def test_it_restores_what_was_there() -> None:
 
 
 def test_a_rig_loads_while_a_callback_is_installed() -> None:
-    with somebody_elses():
+    with other_callback_function():
         load_plant()
 
 
 def test_an_exception_comes_out_of_mj_step_and_takes_the_callback_out() -> None:
-    setup, controller, calls = counting("observer.fail_at=7")
+    setup, controller, calls = count_steps("observer.fail_at=7")
     plant, data = setup.plant, setup.plant.new_data()
     message = r"Counted raised KeyError: 'lost' at t = 0\.035 s"
-    with somebody_elses():
+    with other_callback_function():
         with pytest.raises(RunStopped, match=message) as info, control_callback(plant, controller):
             mujoco.mj_step(plant.model, data, 400)
         assert mujoco.get_mjcb_control() is other_callback
@@ -329,7 +329,7 @@ def test_an_exception_comes_out_of_mj_step_and_takes_the_callback_out() -> None:
 
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_the_runner_keeps_what_was_recorded_until_an_exception(driver: Any) -> None:
-    setup, _, _ = counting("observer.fail_at=7")
+    setup, _, _ = count_steps("observer.fail_at=7")
     result = setup.run(driver=driver)
     (outcome,) = result.outcomes
     assert (outcome.kind, outcome.time_s) == ("stopped", pytest.approx(0.035))

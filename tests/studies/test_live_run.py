@@ -139,7 +139,7 @@ def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: 
         view.ended(report_run(experiment, result))
         save_run(RunFolder(Path("it"), []), report_run(experiment, result))
     assert view.failure == ""
-    until_it_is_still(Path("received.rrd"))
+    wait_until_it_is_still(Path("received.rrd"))
     assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
 
 
@@ -183,7 +183,7 @@ def rows(trajectory: Trajectory, first: int, end: int) -> Trajectory:
     return replace(trajectory, columns={name: values[first:end] for name, values in trajectory.columns.items()})
 
 
-def until_it_is_still(path: Path) -> None:
+def wait_until_it_is_still(path: Path) -> None:
     sizes = [-1, -2]
     while sizes[-1] != sizes[-2]:
         time.sleep(0.5)
@@ -239,7 +239,7 @@ def test_ctrl_c_keeps_what_was_recorded(receiver: Viewer, ctrl_c: None) -> None:
     assert run.returncode == 130
     assert err.splitlines()[-1].startswith("cmg-mj: interrupted at ")
     assert 0 < len(assert_whole("it")) < 2000  # the shapes come first and fill most of what was waited for
-    until_it_is_still(Path("received.rrd"))
+    wait_until_it_is_still(Path("received.rrd"))
     assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
 
 

@@ -53,7 +53,7 @@ def read_files() -> dict[str, str]:
     return {file.name: file.read_text() for file in Path("it").iterdir() if file.is_file()}
 
 
-def at_every_event(swap_folders: bool) -> None:
+def kill_at_every_event(swap_folders: bool) -> None:
     """Kill before every single change of a file; a result is never in parts, and the next run finds it tidy.
 
     Args:
@@ -98,7 +98,7 @@ def at_every_event(swap_folders: bool) -> None:
     print(f"{kills - 1} kills")
 
 
-def at_random(times: int) -> None:
+def kill_at_random(times: int) -> None:
     """Kill whole runs being saved over one another: every file is of one and the same run."""
     from cmg_mj import parse_scenario, prepare
     from cmg_mj.studies import save as runs
@@ -146,6 +146,8 @@ def seed_of(folder: Path) -> int:
 
 
 if __name__ == "__main__":
-    {"whole": lambda: at_every_event(True), "moved": lambda: at_every_event(False), "random": lambda: at_random(20)}[
-        sys.argv[1]
-    ]()
+    {
+        "whole": lambda: kill_at_every_event(True),
+        "moved": lambda: kill_at_every_event(False),
+        "random": lambda: kill_at_random(20),
+    }[sys.argv[1]]()

@@ -66,7 +66,7 @@ DOUBLE = re.compile(
 """Functions that compute in double precision on this processor: the compiler's helpers, and the C library's."""
 
 
-def in_double_precision(image: Path) -> list[str]:
+def double_precision_names(image: Path) -> list[str]:
     listing = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
     names = [line.split()[-1] for line in listing.splitlines()]
     assert "main" in names
@@ -91,7 +91,7 @@ def test_lockstep_on_the_same_inputs(observer: str) -> None:
     experiment.run_on(host)
     with exported(experiment.axis_controller()) as files:
         image = build(files.observer, files.folder).path
-        assert in_double_precision(image) == []
+        assert double_precision_names(image) == []
         board = Board(image)
     with board:
         board.start()
@@ -171,7 +171,7 @@ def test_what_the_board_cannot_do_is_refused() -> None:
     ["*u = (float)((double)e[0] * 0.1);", "extern double pow(double, double); *u = (float)pow((double)e[0], 0.5);"],
 )
 def test_what_is_would_be_seen(tmp_path: Path, update: str) -> None:
-    assert in_double_precision(toy(tmp_path, update=update + " return;"))
+    assert double_precision_names(toy(tmp_path, update=update + " return;"))
 
 
 @pytest.mark.slow

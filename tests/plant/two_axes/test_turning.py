@@ -34,7 +34,7 @@ def set_gimbals(data: mujoco.MjData, axis: Axis, angle: float, rate: float) -> N
         data.qvel[module.gimbal_dof] = module.direction * rate
 
 
-def asked_of(
+def gimbal_torques(
     plant: Plant, rates: dict[str, float], angles: list[float], u: list[float], off: float = 0.0
 ) -> np.ndarray:
     """The wheels' torques on yaw, roll and pitch [N m].
@@ -79,7 +79,7 @@ ANGLES = [[0.7, 0.2], [-0.4, 1.0], [0.0, -0.9], [0.5, 0.5]]
 @pytest.mark.parametrize("w", [1.0, -3.0])
 def test_the_swept_momentum_tilts_the_other_axis(plant: Plant, w: float, angles: list[float]) -> None:
     """Roll's momentum, swept round, tilts pitch with 2 H w sin(x3_R), pitch's roll with the opposite sign."""
-    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, [0.0, 0.0])
+    _, roll, pitch = gimbal_torques(plant, {"yaw": w}, angles, [0.0, 0.0])
     x3_roll, x3_pitch = angles
     assert pitch == pytest.approx(-2.0 * H * w * math.sin(x3_roll), abs=1e-12)  # asked to hold it: the opposite
     assert roll == pytest.approx(2.0 * H * w * math.sin(x3_pitch), abs=1e-12)
@@ -88,7 +88,7 @@ def test_the_swept_momentum_tilts_the_other_axis(plant: Plant, w: float, angles:
 @pytest.mark.parametrize("angles", ANGLES)
 @pytest.mark.parametrize("w", [1.0, -3.0])
 def test_gimbals_turned_against_it_leave_nothing(plant: Plant, w: float, angles: list[float]) -> None:
-    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, compensation(plant, w, angles))
+    _, roll, pitch = gimbal_torques(plant, {"yaw": w}, angles, compensation(plant, w, angles))
     assert max(abs(roll), abs(pitch)) < 1e-12
 
 
@@ -96,7 +96,7 @@ def test_the_tangent_of_the_other_angle_is_right_for_small_angles_alone(plant: P
     """u_P = -w tan(x3_R) leaves 2 H w sin(x3_R) (1 - cos(x3_P)/cos(x3_R)) of it, and nothing at equal angles."""
     w, (x3_roll, x3_pitch) = 2.0, (0.8, 0.2)
     u = [w * math.tan(x3_pitch), -w * math.tan(x3_roll)]
-    _, roll, pitch = asked_of(plant, {"yaw": w}, [x3_roll, x3_pitch], u)
+    _, roll, pitch = gimbal_torques(plant, {"yaw": w}, [x3_roll, x3_pitch], u)
     left = -2.0 * H * w * math.sin(x3_roll) * (1.0 - math.cos(x3_pitch) / math.cos(x3_roll))
     assert pitch == pytest.approx(left, abs=1e-12)
     assert abs(pitch) > 0.4 * 2.0 * H * w * math.sin(x3_roll)
@@ -105,8 +105,8 @@ def test_the_tangent_of_the_other_angle_is_right_for_small_angles_alone(plant: P
 
 def test_the_wrong_sign_doubles_it(plant: Plant) -> None:
     w, angles = 1.0, [0.6, 0.3]
-    none = asked_of(plant, {"yaw": w}, angles, [0.0, 0.0])
-    wrong = asked_of(plant, {"yaw": w}, angles, [-u for u in compensation(plant, w, angles)])
+    none = gimbal_torques(plant, {"yaw": w}, angles, [0.0, 0.0])
+    wrong = gimbal_torques(plant, {"yaw": w}, angles, [-u for u in compensation(plant, w, angles)])
     np.testing.assert_allclose(wrong[1:], 2.0 * none[1:], rtol=1e-9)
 
 
@@ -142,10 +142,10 @@ def test_other_wheels_have_other_signs_and_sizes(wheels: tuple[str, str], tmp_pa
     """And the rates they give cancel what these wheels ask for."""
     plant = rig_with(tmp_path, *zip(WHEELS, wheels, strict=True))
     w, angles = 1.5, [0.6, -0.4]
-    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, compensation(plant, w, angles))
+    _, roll, pitch = gimbal_torques(plant, {"yaw": w}, angles, compensation(plant, w, angles))
     assert max(abs(roll), abs(pitch)) < 1e-12
     u = [1.0, 1.0]  # a positive rate pushes about its axis, whichever way the wheels turn
-    assert np.all(asked_of(plant, {}, [0.0, 0.0], u)[1:] < -0.1)
+    assert np.all(gimbal_torques(plant, {}, [0.0, 0.0], u)[1:] < -0.1)
 
 
 # --- what else couples ------------------------------------------------------------------------------------------
@@ -154,7 +154,7 @@ def test_other_wheels_have_other_signs_and_sizes(wheels: tuple[str, str], tmp_pa
 def test_alike_wheels_couple_the_axes_through_the_vertical_alone() -> None:
     """The tilt of one axis sweeps the other's momentum round the vertical: the yaw servo holds 2 H sin(x3) x2."""
     plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)
-    yaw, roll, pitch = asked_of(plant, {"pitch": 0.5}, [0.6, 0.0], [0.0, 0.0])
+    yaw, roll, pitch = gimbal_torques(plant, {"pitch": 0.5}, [0.6, 0.0], [0.0, 0.0])
     assert yaw == pytest.approx(2.0 * H * math.sin(0.6) * 0.5, rel=1e-9)
     assert max(abs(roll), abs(pitch)) < 1e-12
 
@@ -167,11 +167,11 @@ def test_a_slow_wheel_couples_the_axes_directly(tmp_path: Path) -> None:
     """
     plant = rig_with(tmp_path, *zip(WHEELS, OTHER_WHEELS["a wheel of roll's slow"], strict=True))
     left = 0.1 * H
-    _, roll, _ = asked_of(plant, {"pitch": 0.5}, [0.0, 0.0], [0.0, 0.0])
+    _, roll, _ = gimbal_torques(plant, {"pitch": 0.5}, [0.0, 0.0], [0.0, 0.0])
     assert abs(roll) == pytest.approx(left * 0.5, rel=1e-9)
-    _, _, pitch = asked_of(plant, {"roll": 0.5}, [0.0, 0.0], [0.0, 0.0])
+    _, _, pitch = gimbal_torques(plant, {"roll": 0.5}, [0.0, 0.0], [0.0, 0.0])
     assert pitch == pytest.approx(-roll, rel=1e-9)
-    yaw, _, _ = asked_of(plant, {}, [0.6, 0.0], [2.0, 0.0])
+    yaw, _, _ = gimbal_torques(plant, {}, [0.6, 0.0], [2.0, 0.0])
     assert abs(yaw) == pytest.approx(left * math.sin(0.6) * 2.0, rel=1e-9)
     rates = left / (2.0 * plant.axes[1].reduced.J1)
     print(f"a wheel 10 % slow: each tilt rate of 1 rad/s accelerates the other axis by {rates:.3f} rad/s^2")
@@ -185,13 +185,13 @@ def test_a_gimbal_that_is_off_pushes_yaw_and_is_made_up_for_on_the_mean() -> Non
     plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)
     off = math.radians(5.0)
     zeros, gimbal_rates = [0.0, 0.0], [1.0, 0.0]
-    _, _, pitch = asked_of(plant, {"yaw": 1.0}, zeros, zeros, off)
+    _, _, pitch = gimbal_torques(plant, {"yaw": 1.0}, zeros, zeros, off)
     assert pitch == pytest.approx(-H * math.sin(off), rel=1e-9)
-    yaw, roll, _ = asked_of(plant, {}, zeros, gimbal_rates, off)
+    yaw, roll, _ = gimbal_torques(plant, {}, zeros, gimbal_rates, off)
     assert abs(yaw) == pytest.approx(H * math.sin(off), rel=1e-9)
     assert abs(roll) == pytest.approx(H * (1.0 + math.cos(off)), rel=1e-9)
     mean = compensation(plant, 1.0, [off / 2.0, 0.0])
-    _, _, left = asked_of(plant, {"yaw": 1.0}, zeros, mean, off)
+    _, _, left = gimbal_torques(plant, {"yaw": 1.0}, zeros, mean, off)
     assert abs(left) < 1e-3 * abs(pitch)
 
 
@@ -214,7 +214,7 @@ def test_a_tilt_that_is_swept_round_tilts_the_other_axis(plant: Plant) -> None:
         coupling = (tilt_torques(plant, both) - tilt_torques(plant, alone) - tilt_torques(plant, turn))[i]
         u = [0.0, 0.0]
         u[i] = w * plant.turning.inertia[i, j] * rate
-        push = asked_of(plant, {}, [0.0, 0.0], u)[1 + i]
+        push = gimbal_torques(plant, {}, [0.0, 0.0], u)[1 + i]
         assert abs(coupling) > 0.1
         assert push == pytest.approx(-coupling, rel=1e-3)
 

@@ -44,7 +44,7 @@ def entry(
     )
 
 
-def by_name(observers: Sequence[ComparedObserver]) -> dict[str, dict[str, Any]]:
+def rows_by_name(observers: Sequence[ComparedObserver]) -> dict[str, dict[str, Any]]:
     return {str(row["observer"]): row for row in standings(observers)}
 
 
@@ -55,7 +55,7 @@ def student(values: list[float]) -> list[float]:
 
 def test_means_have_students_intervals() -> None:
     errors = [0.1, 0.13, 0.12, 0.2]
-    row = by_name([entry("ltv", [*errors])])["ltv"]
+    row = rows_by_name([entry("ltv", [*errors])])["ltv"]
     assert row[ERROR] == pytest.approx(np.mean(errors))
     assert row["intervals"][ERROR] == pytest.approx(student(errors))
     assert row["minus_best"] == {}  # it is the best itself, in every figure
@@ -64,7 +64,7 @@ def test_means_have_students_intervals() -> None:
 def test_differences_are_taken_world_by_world() -> None:
     """The worlds differ far more than the observers."""
     first, second = [0.1, 0.5, 0.9], [0.11, 0.52, 0.90]
-    rows = by_name([entry("ltv", [*second]), entry("linear", [*first])])
+    rows = rows_by_name([entry("ltv", [*second]), entry("linear", [*first])])
     less = rows["ltv"]["minus_best"][ERROR]
     assert (less["best"], less["worlds"]) == ("linear", 3)
     assert less["mean"] == pytest.approx(0.01)
@@ -73,7 +73,7 @@ def test_differences_are_taken_world_by_world() -> None:
 
 
 def test_fallen_worlds_are_in_no_mean_and_no_difference() -> None:
-    rows = by_name([entry("ltv", [0.1, 0.2, 0.3, 0.4]), entry("linear", [0.2, 9.0, 0.4, 0.6], fallen_worlds=(1,))])
+    rows = rows_by_name([entry("ltv", [0.1, 0.2, 0.3, 0.4]), entry("linear", [0.2, 9.0, 0.4, 0.6], fallen_worlds=(1,))])
     assert rows["linear"][ERROR] == pytest.approx(0.4)
     assert rows["linear"]["fell_fraction"] == 0.25
     less = rows["linear"]["minus_best"][ERROR]
@@ -91,7 +91,7 @@ def test_the_best_is_sought_among_those_that_stood_most_often() -> None:
 def test_more_of_a_fit_is_better() -> None:
     good, bad = entry("ltv", [0.1, 0.1], figures={FIT: 0.7}), entry("linear", [0.1, 0.1], figures={FIT: -0.3})
     assert best_observer([bad, good], FIT) is good
-    assert by_name([bad, good])["linear"]["minus_best"][FIT]["mean"] == pytest.approx(-1.0)
+    assert rows_by_name([bad, good])["linear"]["minus_best"][FIT]["mean"] == pytest.approx(-1.0)
 
 
 def test_a_plot_of_fits_shows_the_best() -> None:
@@ -111,18 +111,18 @@ def test_references_are_open_loop_in_the_run_of_the_best_in_the_push_window() ->
     """And with the best over the whole run, where there is no push."""
     slow = entry("ltv", [0.1, 0.1], figures={PUSH_ERROR: 0.4})
     quick = entry("linear", [0.2, 0.2], figures={PUSH_ERROR: 0.3})
-    rows = by_name([slow, quick])
+    rows = rows_by_name([slow, quick])
     assert list(rows) == ["ltv", "linear", *REFERENCES]
     assert {rows[name]["in_loop_of"] for name in REFERENCES} == {"linear"}
     assert "in_loop_of" not in rows["linear"]
-    calm = by_name([entry("ltv", [0.1, 0.1]), entry("linear", [0.2, 0.2])])
+    calm = rows_by_name([entry("ltv", [0.1, 0.1]), entry("linear", [0.2, 0.2])])
     assert calm["zero"]["in_loop_of"] == "ltv"
     assert calm["zero"][ERROR] == 0.2
     assert calm["mems_gyro"]["minus_best"][ERROR]["mean"] == pytest.approx(-0.09)
 
 
 def test_a_reference_has_no_loop_of_its_own() -> None:
-    zero = by_name([entry("ltv", [0.1, 0.1])])["zero"]
+    zero = rows_by_name([entry("ltv", [0.1, 0.1])])["zero"]
     for key in ("fell", "fell_fraction", "settle_time_s", "tilt_rms_deg"):
         assert zero[key] is None
     assert (zero["seed"], zero["worlds"]) == (7, 2)
@@ -130,7 +130,7 @@ def test_a_reference_has_no_loop_of_its_own() -> None:
 
 @pytest.mark.slow
 def test_one_world_has_no_intervals() -> None:
-    row = by_name([entry("ltv", [0.1]), entry("linear", [0.3])])["linear"]
+    row = rows_by_name([entry("ltv", [0.1]), entry("linear", [0.3])])["linear"]
     assert row["intervals"][ERROR] is None
     assert row["minus_best"][ERROR]["interval"] is None
     example = [dataclasses.replace(compare_two()[0], result=compare_two()[0].world_0)]
@@ -142,9 +142,9 @@ def test_a_figure_that_is_missing_in_a_world() -> None:
     """One that did not settle: it counts neither in the mean nor in a difference."""
     linear = entry("linear", [0.2, 0.2, 0.2])
     linear.result.summaries[1]["settle_time_s"] = None
-    less = by_name([entry("ltv", [0.1, 0.1, 0.1], figures={"settle_time_s": 0.5}), linear])["linear"]["minus_best"][
-        "settle_time_s"
-    ]
+    less = rows_by_name([entry("ltv", [0.1, 0.1, 0.1], figures={"settle_time_s": 0.5}), linear])["linear"][
+        "minus_best"
+    ]["settle_time_s"]
     assert (less["worlds"], less["mean"]) == (2, 0.5)
 
 
@@ -172,7 +172,7 @@ def test_the_table_has_every_world_of_every_row() -> None:
 def test_what_stood_averages_to_what_is_printed() -> None:
     """And the figures of those that fell are there, marked."""
     table = worlds_table(compare_two())
-    for observer, row in by_name(compare_two()).items():
+    for observer, row in rows_by_name(compare_two()).items():
         survivors = table.filter((pc.field("observer") == observer) & pc.field("stood"))
         for key in row["intervals"]:
             values = [value for value in survivors[key].to_pylist() if value is not None]

@@ -52,7 +52,7 @@ def sweep(cwd: Path, out: str, *arguments: str) -> CommandOutcome:
     return cmg_mj_process(*SWEEP, "--out", out, *arguments, cwd=cwd)
 
 
-def living(group: int) -> list[str]:
+def live_processes(group: int) -> list[str]:
     """The processes of a group, but for those that have ended and nobody has asked about."""
     process_list = subprocess.run(["ps", "-eo", "pgid=,stat=,args="], capture_output=True, text=True, check=True).stdout
     parts = [line.split(maxsplit=2) for line in process_list.splitlines()]
@@ -135,7 +135,7 @@ def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> 
     assert names
     assert all(name.endswith(".parquet") for name in names)
     deadline = time.monotonic() + 20.0
-    while alive := living(process.pid):
+    while alive := live_processes(process.pid):
         assert time.monotonic() < deadline, alive
         time.sleep(0.1)
 

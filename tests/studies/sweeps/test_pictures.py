@@ -30,7 +30,7 @@ def error(point: dict[str, Any], name: str, world: int) -> float | None:
     return 1e-3 * (noise - better + 10.0 * chance)
 
 
-def on_a_grid() -> Trials:
+def make_grid_trials() -> Trials:
     """The values of the second field fall: the map's rise."""
     return make_trials({BIAS: "0,1,2", NOISE: "400,200,100"}, OBSERVERS, 4, error)
 
@@ -42,7 +42,7 @@ def the_map(picture: Picture) -> Map:
 
 
 def test_a_map_has_the_best_of_every_cell() -> None:
-    velocity, fall_picture = pictures_of(on_a_grid())
+    velocity, fall_picture = pictures_of(make_grid_trials())
     error_map = the_map(velocity)
     assert error_map.x.tolist() == [0.0, 1.0, 2.0]
     assert error_map.y.tolist() == [100.0, 200.0, 400.0]
@@ -64,7 +64,7 @@ def test_a_map_has_the_best_of_every_cell() -> None:
 
 def test_a_stop_is_no_share_of_falls() -> None:
     """A world that stopped neither fell nor stood: the share is that of the others, and of none there is none."""
-    trials = on_a_grid()
+    trials = make_grid_trials()
     trials.outcome[0, 0, :] = "stopped"
     trials.outcome[3, 1, 0] = "stopped"  # one of the three of four that fell at 1 degree and 400
     trials.stood = trials.outcome == "done"

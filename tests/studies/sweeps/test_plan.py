@@ -18,21 +18,21 @@ BIAS, TORQUE = "plant.equilibrium_bias_deg", "plant.initial_tilt_deg"
 
 
 def test_ctrl_c_before_the_first_tick(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: Any) -> None:
+    def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plan, "compute", interrupted)
+    monkeypatch.setattr(plan, "compute", interrupt)
     outcome = cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run")
     assert (outcome.status, outcome.out, outcome.err) == (130, "", "cmg-mj: interrupted\n")
 
 
 def test_ctrl_c_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(study: SweepStudy, piece: Chunk, tick: Callable[[float], None]) -> None:
+    def interrupt(study: SweepStudy, piece: Chunk, tick: Callable[[float], None]) -> None:
         tick(0.1)
         tick(0.2)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plan, "compute", interrupted)
+    monkeypatch.setattr(plan, "compute", interrupt)
     assert cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run").status == 130
 
 

@@ -21,7 +21,9 @@ from tests.observers.reference import DT
 from tests.studies.tuning.user_observer import USER_OBSERVER
 
 
-def planted(kind: str, parameters: Mapping[str, Any], seed: int, gyro_noise: float, worlds: int = 4) -> Recorded:
+def plant_parameters(
+    kind: str, parameters: Mapping[str, Any], seed: int, gyro_noise: float, worlds: int = 4
+) -> Recorded:
     """A recording whose gyro is an observer's estimate: the loss of those parameters is zero."""
     rng = np.random.default_rng(seed)
     t = np.arange(150) * DT
@@ -43,7 +45,7 @@ def recorder(
     """Recordings with parameters that depend on the noise and on whether the worlds are held out."""
 
     def record_planted(scenario: Scenario, worlds: range, *, noise_ug_rthz: float, warm_up_s: float) -> Recorded:
-        return planted(kind, truth(noise_ug_rthz, worlds.start > 0), worlds.start, gyro_noise)
+        return plant_parameters(kind, truth(noise_ug_rthz, worlds.start > 0), worlds.start, gyro_noise)
 
     return record_planted
 

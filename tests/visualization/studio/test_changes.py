@@ -18,7 +18,7 @@ from cmg_mj.observers import OBSERVERS, Estimate
 from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws
 from tests.visualization.studio.session import Session, session
-from tests.visualization.studio.test_session import of_runner, same
+from tests.visualization.studio.test_session import runner_rows, same
 
 TIME, RATE, U, PUSH = 0, 1, 5, 7
 
@@ -32,7 +32,7 @@ def test_a_push_by_button_is_a_push_of_the_scenario() -> None:
         studio.send(PushRequest(-0.8, 0.2))
         studio.run(2.0)
         settings = ("duration_s=3.0", "push.0.start_s=1.0", "push.0.duration_s=0.2", "push.0.torque_n_m=-0.8")
-        expected = of_runner(*settings)
+        expected = runner_rows(*settings)
         same(studio.rows, expected)
         assert np.count_nonzero(studio.rows[:, PUSH]) == 40
 
@@ -83,7 +83,7 @@ def test_every_observer_takes_over_without_a_bump() -> None:
     with session("push.0.start_s=0.5") as studio:
         studio.run(0.62)
         assert abs(studio.rows[-1, RATE]) > 0.3
-        undisturbed = of_runner("push.0.start_s=0.5")
+        undisturbed = runner_rows("push.0.start_s=0.5")
         for i, kind in enumerate(OBSERVERS):
             studio.send(messages.LoadModelEvent())
             studio.stepping.rows.clear()
@@ -115,7 +115,7 @@ def test_gains_and_feedback() -> None:
         state = studio.session_state()
         assert state.settings is not None
         assert (state.law, state.settings[FEEDBACK]) == ("LQR", "truth")
-        same(studio.rows, of_runner("controller.lqr.state_cost=[1,1,1,1]", "controller.feedback=truth"))
+        same(studio.rows, runner_rows("controller.lqr.state_cost=[1,1,1,1]", "controller.feedback=truth"))
         studio.send(ChangeSettings(laws["Table 2"]))
         assert studio.session_state().gains == (35.0, 4.0, -1.0, 0.3)
         studio.run(4.0)
@@ -159,7 +159,7 @@ def test_what_is_refused_changes_nothing_and_is_said() -> None:
             studio.send(ChangeSettings(values))
             assert complaint in studio.session_state().note
         studio.run(1.0)
-        same(studio.rows, of_runner("duration_s=2.5"))
+        same(studio.rows, runner_rows("duration_s=2.5"))
 
 
 def test_studios_physics_settings_cannot_change_the_step() -> None:
@@ -262,7 +262,7 @@ def test_a_fall_is_said_and_reset_stands_up_again() -> None:
         studio.send(messages.ResetEvent(key=-1))
         studio.stepping.rows.clear()
         studio.run(1.0)
-        same(studio.rows, of_runner("push.0.start_s=0.5"))
+        same(studio.rows, runner_rows("push.0.start_s=0.5"))
 
 
 def test_physics_that_diverges_is_paused() -> None:
@@ -279,7 +279,7 @@ def test_physics_that_diverges_is_paused() -> None:
         studio.pause(False)
         studio.stepping.rows.clear()
         studio.run(1.0)
-        same(studio.rows, of_runner("duration_s=2.5"))
+        same(studio.rows, runner_rows("duration_s=2.5"))
 
 
 # --- other rigs --------------------------------------------------------------------------------------------
@@ -302,9 +302,9 @@ def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> N
         studio.stepping.rows.clear()
         studio.send(messages.LoadModelEvent(path=str(other)))
         studio.run(3.0)
-        expected = of_runner(f"plant.model={other}")
+        expected = runner_rows(f"plant.model={other}")
         same(studio.rows, expected)
-        assert not np.array_equal(expected, of_runner())
+        assert not np.array_equal(expected, runner_rows())
         other.write_text("<mujoco/>", encoding="utf-8")
         studio.send(messages.LoadModelEvent(path=str(other)))
         assert "joint" in studio.session_state().note

@@ -52,17 +52,17 @@ def screen() -> Iterator[Screen]:
 
 
 @pytest.fixture(scope="module")
-def standing() -> SessionState:
+def state_of_balance() -> SessionState:
     with session() as studio:
         studio.run(3.0)
         return studio.session_state()
 
 
-def pressed(label: str) -> Callable[..., bool]:
+def press(label: str) -> Callable[..., bool]:
     return lambda text, *_: text == label
 
 
-def picked(label: str, choice: str) -> Callable[..., tuple[bool, int]]:
+def pick(label: str, choice: str) -> Callable[..., tuple[bool, int]]:
     def combo(text: str, place: int, options: list[str]) -> tuple[bool, int]:
         return (True, options.index(choice)) if text == label else (False, place)
 
@@ -70,13 +70,13 @@ def picked(label: str, choice: str) -> Callable[..., tuple[bool, int]]:
 
 
 def test_it_is_drawn_from_the_first_frame_on(
-    screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch
+    screen: Screen, state_of_balance: SessionState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines: dict[str, int] = {}
     monkeypatch.setattr(module.implot, "PlotLine", lambda label, xs, ys: lines.update({label: len(xs)}))
     screen.frame()
     assert lines == {}
-    screen.panel.on_state(standing)
+    screen.panel.on_state(state_of_balance)
     for _ in range(3):
         screen.frame()
     assert not screen.panel._broken
@@ -87,29 +87,31 @@ def test_it_is_drawn_from_the_first_frame_on(
 @pytest.mark.parametrize(
     ("widget", "action", "message"),
     [
-        ("Button", pressed("Push +"), PushRequest(1.0, 0.1)),
-        ("Button", pressed("Push -"), PushRequest(-1.0, 0.1)),
-        ("Combo", picked("observer", "adaptive"), ChangeSettings({OBSERVER: "adaptive"})),
-        ("Combo", picked("rate fed back", "the gyro's"), ChangeSettings({FEEDBACK: "fog"})),
-        ("Combo", picked("law", "LQG"), ChangeSettings({LAW: LQG})),
+        ("Button", press("Push +"), PushRequest(1.0, 0.1)),
+        ("Button", press("Push -"), PushRequest(-1.0, 0.1)),
+        ("Combo", pick("observer", "adaptive"), ChangeSettings({OBSERVER: "adaptive"})),
+        ("Combo", pick("rate fed back", "the gyro's"), ChangeSettings({FEEDBACK: "fog"})),
+        ("Combo", pick("law", "LQG"), ChangeSettings({LAW: LQG})),
     ],
 )
 def test_what_is_pressed_is_sent(
     screen: Screen,
-    standing: SessionState,
+    state_of_balance: SessionState,
     monkeypatch: pytest.MonkeyPatch,
     widget: str,
     action: Any,
     message: messages.Message,
 ) -> None:
-    screen.panel.on_state(standing)
+    screen.panel.on_state(state_of_balance)
     screen.frame()
     monkeypatch.setattr(module.imgui, widget, action)
     screen.frame()
     assert screen.sent == [message]
 
 
-def test_of_several_axes_one_is_chosen(screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_several_axes_one_is_chosen(
+    screen: Screen, state_of_balance: SessionState, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lists: list[str] = []
     combo = module.imgui.Combo
 
@@ -118,7 +120,7 @@ def test_of_several_axes_one_is_chosen(screen: Screen, standing: SessionState, m
         return combo(label, place, options)
 
     monkeypatch.setattr(module.imgui, "Combo", record_list)
-    screen.panel.on_state(standing)
+    screen.panel.on_state(state_of_balance)
     screen.frame()
     assert lists == ["observer", "law", "rate fed back"]
     with session(scenario="two_axes") as studio:
@@ -126,16 +128,16 @@ def test_of_several_axes_one_is_chosen(screen: Screen, standing: SessionState, m
         screen.panel.on_state(studio.session_state())
     screen.frame()
     assert lists[3:] == ["axis shown and pushed", *lists[:3]]
-    monkeypatch.setattr(module.imgui, "Combo", picked("axis shown and pushed", "pitch"))
+    monkeypatch.setattr(module.imgui, "Combo", pick("axis shown and pushed", "pitch"))
     screen.frame()
     assert screen.sent == [ShowAxis("pitch")]
     assert not screen.panel._broken
 
 
 def test_a_number_counts_once_it_is_typed_to_the_end(
-    screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch
+    screen: Screen, state_of_balance: SessionState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    screen.panel.on_state(standing)
+    screen.panel.on_state(state_of_balance)
     edit = {"now": False}
     values = iter([1.0, 1.2, 1.25])
     current = {"label": ""}
@@ -161,7 +163,7 @@ def test_a_number_counts_once_it_is_typed_to_the_end(
 def test_a_stopped_controller_is_said_and_can_be_started(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
     texts: list[str] = []
     monkeypatch.setattr(module.imgui, "TextWrapped", texts.append)
-    monkeypatch.setattr(module.imgui, "Button", pressed("Start it again"))
+    monkeypatch.setattr(module.imgui, "Button", press("Start it again"))
     screen.panel.on_state(SessionState(title="x", stopped="observer Mine raised KeyError: 'gone' at t = 2 s"))
     screen.frame()
     assert "The controller has stopped: observer Mine raised KeyError: 'gone' at t = 2 s" in texts
@@ -169,11 +171,11 @@ def test_a_stopped_controller_is_said_and_can_be_started(screen: Screen, monkeyp
 
 
 def test_what_goes_wrong_in_the_panel_ends_the_panel_alone(
-    screen: Screen, standing: SessionState, caplog: pytest.LogCaptureFixture
+    screen: Screen, state_of_balance: SessionState, caplog: pytest.LogCaptureFixture
 ) -> None:
     incomplete: Any = {"observer.kind": "linear"}
     screen.panel.on_state(SessionState(settings=incomplete))
     screen.frame()
     assert "the panel has failed and is gone" in caplog.text
-    screen.panel.on_state(standing)
+    screen.panel.on_state(state_of_balance)
     screen.frame()

@@ -11,7 +11,7 @@ from cmg_mj.observers import Estimate
 from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, ShowAxis
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws, current_law
 from tests.visualization.studio.session import SIGNALS, Session, as_rows, session
-from tests.visualization.studio.test_session import of_runner, same
+from tests.visualization.studio.test_session import runner_rows, same
 
 ROLL, PITCH = 0, len(SIGNALS)
 RATE, PUSH = 1, 7
@@ -24,7 +24,7 @@ SWING = (
 
 
 def runner(*settings: str) -> np.ndarray:
-    return of_runner(*settings, scenario="two_axes")
+    return runner_rows(*settings, scenario="two_axes")
 
 
 @pytest.mark.parametrize(
