@@ -135,8 +135,8 @@ def scenario(rng: np.random.Generator) -> bytes:
 def corrupt(text: bytes, rng: np.random.Generator) -> bytes:
     """The text with some bytes taken out, put in, changed, or said again."""
     for _ in range(rng.integers(1, 4)):
-        start = int(rng.integers(len(text) + 1))
-        end = min(len(text), start + int(rng.integers(1, 30)))
+        begin = int(rng.integers(len(text) + 1))
+        end = min(len(text), begin + int(rng.integers(1, 30)))
         junk = [
             b"\0",
             b"\xff",
@@ -153,10 +153,10 @@ def corrupt(text: bytes, rng: np.random.Generator) -> bytes:
         insertions = [
             b"",
             junk[rng.integers(len(junk))],
-            text[start:end] * 2,
+            text[begin:end] * 2,
             bytes(rng.integers(0, 256, 5, dtype=np.uint8)),
         ]
-        text = text[:start] + insertions[rng.integers(4)] + text[end:]
+        text = text[:begin] + insertions[rng.integers(4)] + text[end:]
     return text
 
 

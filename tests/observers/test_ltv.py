@@ -69,15 +69,15 @@ def run_and_reference(duration_s: float) -> tuple[np.ndarray, np.ndarray, np.nda
     start = np.concatenate([[y1[0], 0.0, y2[0]], np.eye(3).ravel()])
     reference = integrate(ltv_slope(), start, y1, y2, u)
     estimates, states = run(observer("ltv"), y1, y2, u)
-    package_step = np.array([riccati_matrix(state) for state in states[1:]])
-    return package_step, reference[:, 3:].reshape(-1, 3, 3), estimates, reference[:, :3]
+    matrices = np.array([riccati_matrix(state) for state in states[1:]])
+    return matrices, reference[:, 3:].reshape(-1, 3, 3), estimates, reference[:, :3]
 
 
 @pytest.mark.parametrize("duration_s", DURATIONS_S)
 def test_riccati_matrix_is_the_reference_integrations(duration_s: float) -> None:
-    package_step, reference, _, _ = run_and_reference(duration_s)
-    error = relative_errors(package_step, reference)
-    condition = np.linalg.cond(package_step)
+    matrices, reference, _, _ = run_and_reference(duration_s)
+    error = relative_errors(matrices, reference)
+    condition = np.linalg.cond(matrices)
     print(f"largest relative error of H's entries {error:.1e}; condition number up to {condition.max():.3g}")
     assert error < 1e-6
     assert np.abs(reference[:, [0, 1, 2, 2], [2, 2, 0, 1]]).max() < 1e-9  # the third state decouples
@@ -85,8 +85,8 @@ def test_riccati_matrix_is_the_reference_integrations(duration_s: float) -> None
 
 @pytest.mark.parametrize("duration_s", DURATIONS_S)
 def test_riccati_matrix_is_positive_definite_along_the_run(duration_s: float) -> None:
-    package_step, _, _, _ = run_and_reference(duration_s)
-    assert np.linalg.eigvalsh(package_step).min() > 0.5
+    matrices, _, _, _ = run_and_reference(duration_s)
+    assert np.linalg.eigvalsh(matrices).min() > 0.5
 
 
 @pytest.mark.parametrize("duration_s", DURATIONS_S)

@@ -44,9 +44,9 @@ def peak() -> Iterator[list[float]]:
         tracemalloc.stop()
 
 
-def make_rows(study: SweepStudy, chunk: Chunk, *_: Any) -> list[dict[str, Any]]:
+def make_rows(sweep: SweepStudy, chunk: Chunk, *_: Any) -> list[dict[str, Any]]:
     return [
-        {"point": number, **study.points[number], "observer": "linear", "world": world, "seed": 0, "outcome": "done"}
+        {"point": number, **sweep.points[number], "observer": "linear", "world": world, "seed": 0, "outcome": "done"}
         | {VELOCITY: 1e-6 * number + world}
         for number, world in chunk.trials
     ]

@@ -87,8 +87,8 @@ def views(path: Path) -> list[View]:
     return list(result.values())
 
 
-def select(views: Sequence[View], name: str) -> list[View]:
-    return [view for view in views if view.name == name]
+def select(layout: Sequence[View], name: str) -> list[View]:
+    return [view for view in layout if view.name == name]
 
 
 def record(experiment: Experiment) -> Run:

@@ -342,8 +342,8 @@ def test_the_torque_as_steps() -> None:
 
 def test_times_are_rounded_to_the_nanosecond() -> None:
     milliseconds = np.arange(20_000)
-    column = time_column(milliseconds * 0.001).as_arrow_array().to_numpy(zero_copy_only=False)
-    assert np.array_equal(column.astype(np.int64), milliseconds * 1_000_000)
+    times = time_column(milliseconds * 0.001).as_arrow_array().to_numpy(zero_copy_only=False)
+    assert np.array_equal(times.astype(np.int64), milliseconds * 1_000_000)
     assert instant(0.001 * 4.35e3) == np.timedelta64(4_350, "ms")
 
 
