@@ -115,7 +115,7 @@ def test_everything_promised_is_there(path: Path, experiment: Experiment) -> Non
         *("phase", "tilt/true", "tilt/measured", "tilt/settle_band", "rate/true", "rate/gyro"),
         *(f"{kind}/{name}" for kind in ("rate_estimate", "rate_error") for name in ("1_homogeneous", "2_linear")),
         *("command/u", "command/limit", "integrator/x_e", "rig/frame/push"),
-        *(f"{kind}/{cube}" for kind in ("gimbal", "flywheel") for cube in ("cube1", "cube2")),
+        *(f"{kind}/{module}" for kind in ("gimbal", "flywheel") for module in ("cube1", "cube2")),
         *(f"rig/{body}" for body in ("thrust_bearing", "frame", "cube1.gimbal", "cube2.flywheel")),
         *("rig/world/floor", "rig/frame/site/fog", "rig/frame/cube1/servo", "rig/cube1.gimbal/cube1/ring"),
         "rig/cube2.flywheel/slowed/cube2/disc",
