@@ -65,7 +65,7 @@ def calibration_loop() -> float:
 
 
 def slowness() -> float:
-    """How many times longer than the reference's this machine takes now; at least 1."""
+    """Return the ratio of this machine's time to the reference's, at least 1."""
     return max(1.0, statistics.median(calibration_loop() for _ in range(7)) / REFERENCE_S)
 
 
@@ -112,11 +112,11 @@ class CpuLimit:
         """Fail at the teardown a test that took too long."""
         report = yield
         if call.when == "teardown" and report.passed and tier(item) == "daily":
-            used = processor_seconds() - self.start
-            if used > NOISE * self.limit and used > NOISE * self.limit * (slower := slowness()):
+            seconds = processor_seconds() - self.start
+            if seconds > NOISE * self.limit and seconds > NOISE * self.limit * (slower := slowness()):
                 report.outcome = "failed"
                 report.longrepr = (
-                    f"{item.nodeid}: {used:.2f} s of processor time with its set-up and its children, on a machine "
+                    f"{item.nodeid}: {seconds:.2f} s of processor time with its set-up and its children, on a machine "
                     f"{slower:.2f} times slower than the reference's; a test without the mark `slow` may take "
                     f"{self.limit:g} s: shorten it, share what it makes, or mark it"
                 )

@@ -102,8 +102,8 @@ def run(
             place = runs.save_run(folder, report, plot=plot)
         finally:
             show(report.summary, tables.summary_table(report.summary), arguments.as_json)
-    if live_view is not None and live_view.lost:
-        note(f"the viewer missed a part: {live_view.lost}; the run and its files are complete")
+    if live_view is not None and live_view.failure:
+        note(f"the viewer missed a part: {live_view.failure}; the run and its files are complete")
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", arguments.as_json)
     outcome = result.outcomes[0]
     if outcome.kind == "stopped":

@@ -29,10 +29,10 @@ OBSERVERS = {
 """Name a user types -> dotted path of the class."""
 
 BENCH_PARAMETERS = ("dt", "model", "noise")
-"""What the bench gives every observer whose constructor takes it; all else is the user's choice."""
+"""Arguments that the bench gives to every constructor that takes them; the user chooses all others."""
 
 OF_OBSERVERS = UserClassKind("observer", "observer", OBSERVERS, BENCH_PARAMETERS, {"init": "y", "step": "state, y, u"})
-"""How an observer is found, checked and made."""
+"""The rules by which an observer is found, checked and made."""
 
 
 def observer_class(kind: str) -> type:

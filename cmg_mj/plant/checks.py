@@ -1,4 +1,4 @@
-"""What of a compiled model is set wrongly for a rig: all of it, not the first."""
+"""Finds all settings of a compiled model that are wrong for a rig, not only the first."""
 
 from __future__ import annotations
 

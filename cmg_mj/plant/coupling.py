@@ -1,4 +1,4 @@
-"""What a turn about the vertical couples: the momenta of one axis, its wheels' and its tilt's, are swept round."""
+"""Coupling of the axes by a turn about the vertical, which sweeps the momenta of an axis' wheels and tilt round."""
 
 from __future__ import annotations
 

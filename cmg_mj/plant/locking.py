@@ -16,7 +16,7 @@ from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
 _QPOS_SIZES = {0: 7, 1: 4, 2: 1, 3: 1}
 _QVEL_SIZES = {0: 6, 1: 3, 2: 1, 3: 1}
-"""Of a free joint, a ball, a slide and a hinge, by MuJoCo's mjtJoint."""
+"""Numbers in qpos and in qvel of a free joint, a ball, a slide and a hinge, by MuJoCo's mjtJoint."""
 YAW = "yaw"
 
 

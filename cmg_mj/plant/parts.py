@@ -1,4 +1,4 @@
-"""What a rig consists of, by name and kind, and what a model lacks of it: all of it, not the first."""
+"""The parts of a rig, by name and kind; finds all parts that a model lacks, not only the first."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ TILT_ELEMENT = "tilt"
 """The hinge that a rig tilts about, or the site whose y axis lies along a line that it tilts about."""
 SENSORS = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
 REQUIRED_PARTS = (
-    "a rig needs a joint or a site tilt, the joints CUBE/gimbal, CUBE/flywheel, the actuators CUBE/gimbal_servo, "
-    f"CUBE/flywheel_motor, the sensors CUBE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe {EQUILIBRIUM_KEY}, "
-    "for one CUBE or more; of several axes each has its name before these, as roll/tilt and roll/CUBE/gimbal"
+    "a rig needs a joint or a site tilt, the joints MODULE/gimbal, MODULE/flywheel, the actuators MODULE/gimbal_servo, "
+    f"MODULE/flywheel_motor, the sensors MODULE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe "
+    f"{EQUILIBRIUM_KEY}, for one MODULE or more; of several axes each has its name before these, as roll/tilt and "
+    "roll/MODULE/gimbal"
 )
 _OF_A_MODULE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
 

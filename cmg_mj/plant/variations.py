@@ -1,4 +1,4 @@
-"""How a rig differs from its model file: integrator and step, friction, servos, wheels, the equilibrium bias."""
+"""Differences of a rig from its model file: integrator and step, friction, servos, wheels, the equilibrium bias."""
 
 from __future__ import annotations
 
@@ -228,8 +228,8 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
     if model.body_mass[frame] <= 0.0:
         raise InputError(
             f"plant.equilibrium_bias_deg: {path}: the body {model.body(frame).name!r}, which tilts, needs a mass of "
-            "its own to move (give the model's compiler fusestatic=\"true\", so that the cubes' halves become part of "
-            "it)"
+            "its own to move (give the model's compiler fusestatic=\"true\", so that the modules' halves become part "
+            "of it)"
         )
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))

@@ -1,4 +1,4 @@
-"""What a scenario file may say: its sections and fields, their types, limits and defaults; and how it is checked."""
+"""The schema of scenario files: sections and fields, their types, limits, defaults and checks."""
 
 from __future__ import annotations
 

@@ -18,9 +18,9 @@ FINEST_S = 1e-4
 SWING_SHARE = 10.0
 """A swinging torque has at least so many samples a period."""
 MOST_TICKS = 2_000_000
-"""Of a run; one takes about 1.5 kB of memory until the recording is written."""
+"""Most ticks of a run; a tick takes about 1.5 kB of memory until the recording is written."""
 MOST_STEPS = 1_000_000_000
-"""Of a run; so many take hours."""
+"""Most physics steps of a run; so many take hours."""
 _LARGEST_DENOMINATOR = 10**9  # 1/3 s as a float is the fraction 1/3
 
 

@@ -24,7 +24,7 @@ from cmg_mj.sensors.noise_streams import NoiseStream, normals
 from cmg_mj.sensors.timing import steps_until, whole_steps
 
 Reading = TypeVar("Reading")
-"""What a sensor delivers: a number, one a gimbal, or the forces of the accelerometers."""
+"""A sensor's reading: a number, a number for each gimbal, or the forces of the accelerometers."""
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -20,7 +20,7 @@ from cmg_mj.simulation.experiment import Experiment, batch_inputs, once, run_bat
 from cmg_mj.simulation.simulate import SimulationOptions
 
 MOST_WORLDS = 1024
-"""Of one batch: beyond, Python's share of a world no longer falls and memory grows."""
+"""Most worlds of one batch: beyond, Python's share of a world no longer falls and memory grows."""
 
 
 class BatchJob(NamedTuple):

@@ -31,7 +31,7 @@ except ModuleNotFoundError as error:
 
 ID = "cmg_mj/ScissoredPair-v0"
 READINGS = ("mems_gyro", "acceleration", "fog")
-"""What can be observed beside y1 and y2."""
+"""Readings that can be observed beside y1 and y2."""
 STATE_COST = (100.0, 1.0, 1.0)
 """Weights of x1, x2, x3 in the reward; that of u is 1."""
 MOST = 1e6

@@ -95,9 +95,9 @@ class LiveRun:
         self._view = ViewerStream(url, shown_before(experiment, driver, world))
 
     @property
-    def lost(self) -> str:
+    def failure(self) -> str:
         """The reason why the viewer has not got every tick, in words; empty if it has."""
-        return self._view.lost
+        return self._view.failure
 
     def __enter__(self) -> LiveRun:
         self._view.__enter__()

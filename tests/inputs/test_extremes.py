@@ -78,10 +78,10 @@ def test_extreme_numbers(field: str, size: str) -> None:
     ),
 )
 def test_what_is_no_scenario(wrong_input: str, fragments: list[str]) -> None:
-    began = time.monotonic()
+    start = time.monotonic()
     assert_in_order(["my.toml: ", *fragments], check(wrong_input).complaint)
     assert_in_order(["my.toml: ", *fragments], cmg_mj("run", "my.toml").complaint)
-    assert time.monotonic() - began < 5.0
+    assert time.monotonic() - start < 5.0
 
 
 @table(

@@ -1,4 +1,4 @@
-"""What the motion must conserve and the work it must account for, in terms of the paper's own T and P.
+"""Conservation laws and the balance of work of the motion, in terms of the paper's own T and P.
 
 The flywheels spin with 54 J each, which would hide everything else, so the energy watched is the platform's:
 T + P without 1/2 J_d (axial absolute angular velocity)^2 of each flywheel. P is counted from the hanging
@@ -46,8 +46,8 @@ def initial_states(seed: int) -> tuple[np.ndarray, np.ndarray]:
 def energy(run: Motion, plant: Plant, *, gravity: bool = True) -> np.ndarray:
     """T + P, (n_worlds, n_samples) [J]."""
     exact = paper.scissored_pair(float(plant.model.body("thrust_bearing").inertia[2]))
-    hanging = math.sqrt(2.0) * paper.m * paper.g * paper.l
-    return exact.kinetic(run.qpos, run.qvel) + gravity * (exact.potential(run.qpos) + hanging)
+    lowest_energy = math.sqrt(2.0) * paper.m * paper.g * paper.l
+    return exact.kinetic(run.qpos, run.qvel) + gravity * (exact.potential(run.qpos) + lowest_energy)
 
 
 def drifts(run: Motion, plant: Plant, *, gravity: bool) -> np.ndarray:
@@ -127,10 +127,10 @@ def actuator_torques(model: mujoco.MjModel, run: Motion, command: np.ndarray) ->
     for actuator in range(model.nu):
         joint = model.actuator_trnid[actuator, 0]
         setpoint = model.actuator_actadr[actuator]
-        wanted = command[..., actuator] if setpoint < 0 else run.act[..., setpoint]
-        _, per_angle, per_rate = model.actuator_biasprm[actuator, :3]
-        torque = model.actuator_gainprm[actuator, 0] * wanted
-        torque = torque + per_angle * run.qpos[..., joint] + per_rate * run.qvel[..., joint]
+        setpoints = command[..., actuator] if setpoint < 0 else run.act[..., setpoint]
+        _, stiffness, damping = model.actuator_biasprm[actuator, :3]
+        torque = model.actuator_gainprm[actuator, 0] * setpoints
+        torque = torque + stiffness * run.qpos[..., joint] + damping * run.qvel[..., joint]
         torques[..., joint] = np.clip(torque, *model.actuator_forcerange[actuator])
     return torques
 
@@ -162,20 +162,20 @@ def work_balance(settings: PlantSettings, duration_s: float, seed: int) -> Balan
     run = motion(model, qpos, qvel, n_periods * STEPS, np.repeat(command, STEPS, axis=1))
 
     samples = STEPS * np.arange(n_periods)[:, None] + np.arange(STEPS + 1)
-    inside = Motion(*(field[:, samples] for field in run))  # (n_worlds, n_periods, 6, ...)
-    driving = actuator_torques(model, inside, command[:, :, None])
-    braking = -model.dof_damping * inside.qvel - model.dof_frictionloss * np.sign(inside.qvel)
+    segments = Motion(*(field[:, samples] for field in run))  # (n_worlds, n_periods, 6, ...)
+    driving = actuator_torques(model, segments, command[:, :, None])
+    braking = -model.dof_damping * segments.qvel - model.dof_frictionloss * np.sign(segments.qvel)
     weights = CONTROL_PERIOD_S * NEWTON_COTES
 
     def integral(power: np.ndarray) -> np.ndarray:
         return np.sum(power, axis=-1) @ weights
 
     change = np.diff(energy(run, plant)[:, ::STEPS], axis=1)
-    residual = np.cumsum(change - integral((driving + braking) * inside.qvel), axis=1)
-    turnover = np.sum(integral((np.abs(driving) + np.abs(braking)) * np.abs(inside.qvel)), axis=1)
-    lost = np.sum(integral(driving * inside.qvel) - change, axis=1)
-    used = np.abs(driving)[..., model.actuator_trnid[:, 0]] / model.actuator_forcerange[:, 1]
-    return Balance(float((np.abs(residual).max(axis=1) / turnover).max()), float(lost.min()), float(used.max()))
+    residual = np.cumsum(change - integral((driving + braking) * segments.qvel), axis=1)
+    turnover = np.sum(integral((np.abs(driving) + np.abs(braking)) * np.abs(segments.qvel)), axis=1)
+    loss = np.sum(integral(driving * segments.qvel) - change, axis=1)
+    torque_share = np.abs(driving)[..., model.actuator_trnid[:, 0]] / model.actuator_forcerange[:, 1]
+    return Balance(float((np.abs(residual).max(axis=1) / turnover).max()), float(loss.min()), float(torque_share.max()))
 
 
 def test_energy_changes_by_the_work_of_motors_and_viscous_friction() -> None:

@@ -40,12 +40,12 @@ def test_the_bundled_scenarios_give_no_hint(name: str) -> None:
 
 
 def test_without_sampling_and_delay_the_poles_are_those_of_the_law() -> None:
-    sampled = loop("controller.rate_hz=2000", "sensors.accelerometer.rate_hz=2000", "sensors.encoder.rate_hz=2000")
+    fast_loop = loop("controller.rate_hz=2000", "sensors.accelerometer.rate_hz=2000", "sensors.encoder.rate_hz=2000")
     model, gains = load_plant().reduced, (35.0, 4.0, -1.0, 0.3)
     np.testing.assert_allclose(
-        np.sort(np.real(sampled.poles))[1:], np.sort(np.real(closed_loop_poles(model, gains))), rtol=5e-3
+        np.sort(np.real(fast_loop.poles))[1:], np.sort(np.real(closed_loop_poles(model, gains))), rtol=5e-3
     )
-    assert sampled.distance == pytest.approx(1.0, abs=0.01)  # Table 2's gains are an LQR's, as good as
+    assert fast_loop.distance == pytest.approx(1.0, abs=0.01)  # Table 2's gains are an LQR's, as good as
 
 
 def test_an_lqr_keeps_its_distance() -> None:
@@ -64,8 +64,8 @@ def test_stable_is_what_the_loop_step_by_step_is(latency: float) -> None:
         if k % period == 0:
             u = -K @ x[max(k - late, 0)]
         x[k + 1] = x[k] + h * (model.A_e @ x[k] + model.B_e[:, 0] * u)
-    fades = abs(x[-1, 0]) < 0.01
-    assert (outcome.words == "stable") == fades == (latency < 0.05)
+    is_stable = abs(x[-1, 0]) < 0.01
+    assert (outcome.words == "stable") == is_stable == (latency < 0.05)
 
 
 @pytest.mark.parametrize(
@@ -96,8 +96,8 @@ def test_half_the_flywheel_is_hinted_at_and_solved_for(half: str) -> None:
     outcome = cmg_mj("run", "push_recovery", "--set", half, "--set", "duration_s=4", "--out", "it", "--json")
     assert "cmg-mj: hint: controller: the closed loop has little margin" in outcome.err
     assert '"outcome": "fell"' in outcome.out
-    solved = ["--set", "controller.lqr.state_cost=[1, 1, 1, 1]", "--set", "duration_s=4"]
-    outcome = cmg_mj("run", "push_recovery", "--set", half, *solved, "--out", "it", "--json")
+    lqr_options = ["--set", "controller.lqr.state_cost=[1, 1, 1, 1]", "--set", "duration_s=4"]
+    outcome = cmg_mj("run", "push_recovery", "--set", half, *lqr_options, "--out", "it", "--json")
     assert (outcome.err, '"outcome": "done"' in outcome.out) == ("", True)
     assert "hint" in cmg_mj("check", "half.xml").out
 

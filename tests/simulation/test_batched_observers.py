@@ -35,11 +35,11 @@ class Batches:
         self.sizes: list[int] = []
         run = Experiment.simulate
 
-        def counted(self_: Experiment, plants: list, *args: object, **options: object) -> Result:
+        def count_batches(self_: Experiment, plants: list, *args: object, **options: object) -> Result:
             self.sizes.append(len(plants))
             return run(self_, plants, *args, **options)  # type: ignore[arg-type]
 
-        monkeypatch.setattr(Experiment, "simulate", counted)
+        monkeypatch.setattr(Experiment, "simulate", count_batches)
 
 
 @pytest.mark.slow

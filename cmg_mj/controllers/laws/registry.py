@@ -17,10 +17,10 @@ LAWS = {
 """Name a user types -> dotted path of the class."""
 
 BENCH_PARAMETERS = ("dt", "model", "noise", "rate_limit")
-"""What the bench gives: dt and the limit to every law, the others to those that take them."""
+"""Arguments that the bench gives: dt and the limit to every law, the others to laws that take them."""
 
 OF_LAWS = UserClassKind("law", "controller", LAWS, BENCH_PARAMETERS, {"init": "y", "step": "state, y, x, u"})
-"""How a law is found, checked and made."""
+"""The rules by which a law is found, checked and made."""
 
 
 def law_class(kind: str) -> type:

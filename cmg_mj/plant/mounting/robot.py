@@ -18,7 +18,7 @@ BAD_CONNECTIONS = {
     int(mujoco.mjtEq.mjEQ_WELD): "weld",
 }
 UNNAMED = "MuJoCo Model"
-"""What MuJoCo calls a model that has no name."""
+"""The name that MuJoCo gives to a model without one."""
 NEEDED = {
     "mjDSBL_CONSTRAINT": "constraint",
     "mjDSBL_EQUALITY": "equality",
@@ -26,7 +26,7 @@ NEEDED = {
     "mjDSBL_ACTUATION": "actuation",
     "mjDSBL_SENSOR": "sensor",
 }
-"""What must not be switched off, and what MJCF's <flag> calls it."""
+"""Flags that must not be switched off: MuJoCo's name -> the name in MJCF's <flag>."""
 LARGEST_STEP_S = 0.005
 """Largest physics step; the gimbals' servos need it [s]."""
 ITERATIONS, TOLERANCE = 100, 1e-8

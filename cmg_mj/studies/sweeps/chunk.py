@@ -21,7 +21,7 @@ REFUSED = "refused"
 """Outcome of a trial whose values do not fit each other: it never begins."""
 
 BatchId = tuple[BatchKey, PlantStructure]
-"""What worlds of one batch have in common."""
+"""Properties that the worlds of one batch have in common."""
 
 
 def compute(

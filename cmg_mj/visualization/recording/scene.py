@@ -46,14 +46,14 @@ def log_poses(rec: rr.RecordingStream, branch: str, plant: Plant, time: np.ndarr
         qpos: Joint angles, (n, n_joints) [rad].
     """
     positions, quaternions = body_poses(plant, qpos)
-    at = time_column(time)
+    times = time_column(time)
     for body in range(1, plant.model.nbody):
         poses = rr.Transform3D.columns(translation=positions[:, body], quaternion=quaternions[:, body])
-        rec.send_columns(body_path(branch, plant, body), [at], poses)
+        rec.send_columns(body_path(branch, plant, body), [times], poses)
     for module in plant.modules:
-        translation, quaternion = _turned_back(plant, module, qpos)
+        translation, quaternion = _turn_back(plant, module, qpos)
         poses = rr.Transform3D.columns(translation=translation, quaternion=quaternion)
-        rec.send_columns(_slowed_path(branch, plant, module), [at], poses)
+        rec.send_columns(_slowed_path(branch, plant, module), [times], poses)
 
 
 def body_path(branch: str, plant: Plant, body: int) -> str:
@@ -83,16 +83,16 @@ def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return positions, np.roll(quaternions, -1, axis=-1)
 
 
-def _turned_back(plant: Plant, module: Module, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _turn_back(plant: Plant, module: Module, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute the motion, in the flywheel's frame, from its true angle to the slowed one: translation, quaternion."""
     model = plant.model
     joint = int(model.dof_jntid[module.flywheel_dof])
     axis, anchor = model.jnt_axis[joint], model.jnt_pos[joint]
     turn = (qpos[:, module.flywheel] * (1.0 / FLYWHEEL_SLOWDOWN - 1.0))[:, None]
     quaternion = np.concatenate([np.sin(turn / 2.0) * axis, np.cos(turn / 2.0)], axis=1)
-    along = axis * (axis @ anchor)
-    turned = along + np.cos(turn) * (anchor - along) + np.sin(turn) * np.cross(axis, anchor)
-    return anchor - turned, quaternion
+    axis_part = axis * (axis @ anchor)
+    rotated_anchor = axis_part + np.cos(turn) * (anchor - axis_part) + np.sin(turn) * np.cross(axis, anchor)
+    return anchor - rotated_anchor, quaternion
 
 
 def _slowed_path(branch: str, plant: Plant, module: Module) -> str:
@@ -136,8 +136,8 @@ def log_torques(
             rec.log(path, rr.Clear(recursive=False))
             continue
         force = direction * (PUSH_LENGTH * radius * torque / largest)
-        looks = {"radii": [PUSH_RADIUS * radius], "colors": [PUSH_COLOR], "labels": [f"push {torque:+.3g} N m"]}
-        rec.log(path, rr.Arrows3D(vectors=[force], origins=[tip - force], **looks))
+        style = {"radii": [PUSH_RADIUS * radius], "colors": [PUSH_COLOR], "labels": [f"push {torque:+.3g} N m"]}
+        rec.log(path, rr.Arrows3D(vectors=[force], origins=[tip - force], **style))
     rec.reset_time()
 
 

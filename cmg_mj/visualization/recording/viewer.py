@@ -23,7 +23,7 @@ STARTS_WITHIN_S, STAYS_S = 30.0, 1.0
 """Time in which a viewer starts to listen, and time after which a listening viewer has found its screen."""
 ANSWERS_WITHIN_S = 2.0
 
-_started: list[Viewer] = []
+_viewers: list[Viewer] = []
 """References to the viewers: a viewer outlives the run, and nobody waits for its end."""
 
 
@@ -141,13 +141,13 @@ def _start(port: int, options: Sequence[str]) -> Viewer:
         start_new_session=True,  # Ctrl-C is for the run
     )
     viewer = Viewer(port, process, errors)
-    _started.append(viewer)
+    _viewers.append(viewer)
     return viewer
 
 
 def _starts_listening(viewer: Viewer) -> bool:
-    until = time.monotonic() + STARTS_WITHIN_S
-    while time.monotonic() < until and viewer.process.poll() is None:
+    deadline = time.monotonic() + STARTS_WITHIN_S
+    while time.monotonic() < deadline and viewer.process.poll() is None:
         if _is_taken(viewer.port):
             return True
         time.sleep(0.05)

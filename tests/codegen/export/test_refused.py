@@ -1,4 +1,4 @@
-"""What cannot be exported is refused in one line, with its place; what is wrong is found by comparing."""
+"""Classes that cannot be exported are refused in one line, with the place; a comparison finds wrong results."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.codegen.export import own
 from tests.codegen.export.compiled import controller
 
 VALUE, NUMBER = "a branch on a value", "a plain number is asked for"
-TWICE, COMPARED = "not twice the same", "traced, it is not what Python runs: on random signals x2_rad_s is off by"
+TWICE, DIFFERENCE = "not twice the same", "traced, it is not what Python runs: on random signals x2_rad_s is off by"
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ TWICE, COMPARED = "not twice the same", "traced, it is not what Python runs: on 
 def test_what_has_no_place_in_a_formula_is_named_with_its_place(name: str, words: str, tmp_path: Path) -> None:
     lines, first = inspect.getsourcelines(getattr(own, name))
     (line,) = [i for i, text in enumerate(lines, first) if text.rstrip().endswith("# here")]
-    complaint = refused(name, tmp_path)
+    complaint = refusal(name, tmp_path)
     assert words in complaint
     assert f"own.py, line {line}: {lines[line - first].strip()})" in complaint
 
@@ -43,8 +43,8 @@ def test_what_has_no_place_in_a_formula_is_named_with_its_place(name: str, words
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("LooksAtTypes", COMPARED),
-        ("Counts", COMPARED),
+        ("LooksAtTypes", DIFFERENCE),
+        ("Counts", DIFFERENCE),
         ("DrawsLots", TWICE),
         ("Remembers", "remembers something outside of its state"),
         ("Grows", "made otherwise than the one of init"),
@@ -56,14 +56,14 @@ def test_what_has_no_place_in_a_formula_is_named_with_its_place(name: str, words
     ],
 )
 def test_what_would_not_be_the_same_in_c_is_refused(name: str, words: str, tmp_path: Path) -> None:
-    assert words in refused(name, tmp_path)
+    assert words in refusal(name, tmp_path)
 
 
-def refused(name: str, folder: Path) -> str:
+def refusal(name: str, folder: Path) -> str:
     """The complaint; and nothing is left."""
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError) as info:
         export(controller(f"tests.codegen.export.own:{name}"), folder / "export")
-    complaint = str(caught.value)
+    complaint = str(info.value)
     assert "\n" not in complaint
     assert complaint.startswith(f"tests.codegen.export.own:{name} cannot be exported: ")
     assert not (folder / "export").exists()

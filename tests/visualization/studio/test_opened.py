@@ -15,7 +15,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.visualization.studio import viewers
 from tests.command import COMMAND, cmg_mj, cmg_mj_process
 
-REFUSED = [
+BAD_ARGUMENTS = [
     (["no_such"], "'no_such': no such file, nor a bundled one"),
     (["push_recovery", "--set", "plant.no_such=1"], "plant.no_such"),
     (["push_recovery", "--observer", "homogenous"], "did you mean 'homogeneous'"),
@@ -23,54 +23,54 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "said"), REFUSED)
-def test_a_bad_scenario_is_one_line(arguments: list[str], said: str, elsewhere: None) -> None:
-    assert said in cmg_mj("studio", *arguments).complaint
+@pytest.mark.parametrize(("arguments", "message"), BAD_ARGUMENTS)
+def test_a_bad_scenario_is_one_line(arguments: list[str], message: str, elsewhere: None) -> None:
+    assert message in cmg_mj("studio", *arguments).complaint
 
 
 def test_graphics_that_cannot_be_had_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a screen a window would end the process; Python 3.11 has no windows at all."""
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    said = cmg_mj("studio", "push_recovery", "--viewer", "native").complaint
-    assert said.startswith("--viewer native: MuJoCo Studio")
-    assert said.endswith("; take --viewer web")
+    complaint = cmg_mj("studio", "push_recovery", "--viewer", "native").complaint
+    assert complaint.startswith("--viewer native: MuJoCo Studio")
+    assert complaint.endswith("; take --viewer web")
 
 
 @pytest.mark.parametrize(
-    ("returned", "said"),
+    ("status_and_error", "message"),
     [
         ((1, "x\nValueError: Target not found: out\nbye"), "(ValueError: Target not found: out)"),
         ((134, ""), "(a window ends the process, status 134)"),
     ],
 )
 def test_graphics_are_tried_in_a_process_of_their_own(
-    monkeypatch: pytest.MonkeyPatch, returned: tuple[int, str], said: str
+    monkeypatch: pytest.MonkeyPatch, status_and_error: tuple[int, str], message: str
 ) -> None:
     monkeypatch.setattr(sys, "version_info", (3, 12, 0))
-    tried = subprocess.CompletedProcess([], returned[0], "", returned[1])
-    monkeypatch.setattr(viewers.subprocess, "run", lambda *_, **__: tried)
+    process = subprocess.CompletedProcess([], status_and_error[0], "", status_and_error[1])
+    monkeypatch.setattr(viewers.subprocess, "run", lambda *_, **__: process)
     with pytest.raises(InputError, match="take --viewer web") as error:
         viewers.check_graphics("vulkan")
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 def free_port() -> int:
     """Not one that another test, in another process, might look for at the same time."""
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
+    with socket.socket() as result:
+        result.bind(("127.0.0.1", 0))
+        return result.getsockname()[1]
 
 
 @pytest.mark.slow
 def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
     """In a process of its own: Studio hooks into Python's log, warnings and exceptions for as long as one lasts."""
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        said = cmg_mj_process("studio", "push_recovery", "--port", port, cwd=tmp_path)
-    assert f"Port {port} is already in use" in said.complaint
+    with socket.socket() as other_socket:
+        other_socket.bind(("127.0.0.1", 0))
+        other_socket.listen()
+        port = other_socket.getsockname()[1]
+        outcome = cmg_mj_process("studio", "push_recovery", "--port", port, cwd=tmp_path)
+    assert f"Port {port} is already in use" in outcome.complaint
 
 
 BOTH_THREADS = """
@@ -96,10 +96,10 @@ assert not handle.is_running()
 @pytest.mark.slow
 def test_both_threads_and_nobody_looking() -> None:
     """The viewer in its thread: the simulation keeps the clock's pace, and the viewer ends when it is told."""
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", BOTH_THREADS, str(free_port())], capture_output=True, text=True, timeout=120
     )
-    assert done.returncode == 0, done.stderr
+    assert process.returncode == 0, process.stderr
 
 
 @pytest.mark.slow
@@ -114,14 +114,14 @@ def test_the_command_listens_on_loopback_alone_and_ends_with_ctrl_c(tmp_path: Pa
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     try:
-        said = []
+        output = []
         assert process.stdout is not None
         for line in process.stdout:
-            said.append(line)
+            output.append(line)
             if "Model changed" in line:
                 break
-        assert any("http://localhost:" in line for line in said)
-        assert set(listening(process.pid)) == {"127.0.0.1"}
+        assert any("http://localhost:" in line for line in output)
+        assert set(listening_addresses(process.pid)) == {"127.0.0.1"}
         process.send_signal(signal.SIGINT)
         rest, _ = process.communicate(timeout=30)
         assert process.returncode == 0
@@ -130,15 +130,15 @@ def test_the_command_listens_on_loopback_alone_and_ends_with_ctrl_c(tmp_path: Pa
         process.kill()
 
 
-def listening(pid: int) -> list[str]:
+def listening_addresses(pid: int) -> list[str]:
     """The addresses at which a process listens."""
     sockets = {os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir() if entry.is_symlink()}
-    found = []
+    addresses = []
     for table in ("tcp", "tcp6"):
         path = Path(f"/proc/{pid}/net/{table}")
         for line in path.read_text().splitlines()[1:] if path.exists() else []:
             fields = line.split()
             if fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets:
                 address = bytes.fromhex(fields[1].split(":")[0])
-                found.append(socket.inet_ntop(socket.AF_INET, address[::-1]) if table == "tcp" else address.hex())
-    return found
+                addresses.append(socket.inet_ntop(socket.AF_INET, address[::-1]) if table == "tcp" else address.hex())
+    return addresses

@@ -12,7 +12,7 @@ from cmg_mj.visualization.studio.settings import FEEDBACK, NOISE, OBSERVER
 from tests.visualization.studio.session import as_rows, session
 
 
-def of_runner(*settings: str, scenario: str = "push_recovery") -> np.ndarray:
+def runner_rows(*settings: str, scenario: str = "push_recovery") -> np.ndarray:
     trajectory = prepare(load_scenario(scenario, list(settings))).run().trajectory
     assert trajectory is not None
     return as_rows(trajectory)
@@ -39,7 +39,7 @@ def test_untouched_it_is_the_runners_trajectory(settings: tuple[str, ...]) -> No
         studio.run(5.0)
         assert (studio.live.stopped, studio.live.note) == ("", "")
         assert len(studio.rows) == 1000
-        same(studio.rows, of_runner(*settings))
+        same(studio.rows, runner_rows(*settings))
 
 
 def test_whatever_the_clock_does() -> None:
@@ -48,7 +48,7 @@ def test_whatever_the_clock_does() -> None:
         for every in (0.0007, 0.05, 0.09, 0.004):
             studio.run(1.0, every)
             studio.handle.sync()
-        same(studio.rows, of_runner("duration_s=4.0"))
+        same(studio.rows, runner_rows("duration_s=4.0"))
 
 
 def test_it_keeps_the_clocks_pace() -> None:
@@ -62,8 +62,8 @@ def test_it_keeps_the_clocks_pace() -> None:
             studio.now += 0.01
             studio.handle.sync()
         assert studio.data.time == pytest.approx(1.1, abs=0.006)
-        (said,) = studio.heard(messages.StepControlSnapshot)
-        assert said.speed_measured == pytest.approx(10.0, abs=5.0)
+        (remark,) = studio.receive(messages.StepControlSnapshot)
+        assert remark.speed_measured == pytest.approx(10.0, abs=5.0)
         studio.now += 60.0  # a machine that sleeps for a minute does not run it to catch up
         studio.handle.sync()
         assert studio.data.time < 1.5
@@ -73,17 +73,17 @@ def test_pause_and_single_steps_change_nothing() -> None:
     with session() as studio:
         studio.run(1.0)
         studio.pause()
-        here = studio.data.time
+        pause_time = studio.data.time
         studio.now += 5.0
         studio.handle.sync()
-        assert studio.data.time == here
+        assert studio.data.time == pause_time
         for _ in range(3):
             studio.send(messages.SingleStepEvent())
             studio.handle.sync()
-        assert studio.data.time == pytest.approx(here + 3 * studio.live.timestep)
+        assert studio.data.time == pytest.approx(pause_time + 3 * studio.live.timestep)
         studio.pause(False)
         studio.run(2.0)
-        same(studio.rows, of_runner("duration_s=4.0"))
+        same(studio.rows, runner_rows("duration_s=4.0"))
 
 
 @pytest.mark.parametrize("key", [-1, None])
@@ -96,7 +96,7 @@ def test_reset_is_the_scenarios_start_with_the_wheels_at_speed(key: int | None) 
         for module in studio.live.plant.modules:
             assert studio.data.qvel[module.flywheel] == module.speed != 0.0
         studio.run(3.0)
-        same(studio.rows, of_runner("duration_s=4.0"))
+        same(studio.rows, runner_rows("duration_s=4.0"))
 
 
 def test_reset_to_a_keyframe_is_that_keyframe() -> None:
@@ -117,7 +117,7 @@ def test_reload_begins_as_the_file_is_now() -> None:
         studio.stepping.rows.clear()
         studio.send(messages.LoadModelEvent(path=""))
         studio.run(3.0)
-        same(studio.rows, of_runner("duration_s=3.0", *settings))
+        same(studio.rows, runner_rows("duration_s=3.0", *settings))
         settings[0] = "observer.kind=no_such"
         studio.send(messages.LoadModelEvent(path=""))
         assert "no such observer" in studio.session_state().note
@@ -140,7 +140,7 @@ def test_history_brings_the_controller_back(back: int) -> None:
         del studio.stepping.rows[rows:]
         studio.run(2.0)
         assert studio.live.note == ""
-        same(studio.rows, of_runner("duration_s=6.0", "push.0.start_s=2.0"))
+        same(studio.rows, runner_rows("duration_s=6.0", "push.0.start_s=2.0"))
 
 
 def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
@@ -156,7 +156,7 @@ def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
             studio.stepping.rows[:] = [row for row in studio.stepping.rows if row[0] < time - 1e-9]
             studio.pause(False)
             studio.run(seconds, every_s=0.004)
-        same(studio.rows, of_runner("push=[]"))
+        same(studio.rows, runner_rows("push=[]"))
         assert len(studio.rows) == pytest.approx(500, abs=3)
 
 
@@ -186,10 +186,10 @@ def test_history_brings_back_what_was_chosen() -> None:
         studio.pause(False)
         studio.run(0.2)
         assert not np.array_equal(studio.live.model.body_ipos, ipos)
-        again = studio.rows
-        then = rows[(rows[:, 0] > time - 1e-9) & (rows[:, 0] < 2.0 - 1e-9)]
-        assert len(again) > 30
-        np.testing.assert_array_equal(again[: len(then)], then[: len(again)])
+        rerun = studio.rows
+        first_rows = rows[(rows[:, 0] > time - 1e-9) & (rows[:, 0] < 2.0 - 1e-9)]
+        assert len(rerun) > 30
+        np.testing.assert_array_equal(rerun[: len(first_rows)], first_rows[: len(rerun)])
 
 
 def test_what_is_no_longer_remembered_starts_afresh_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
