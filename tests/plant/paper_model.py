@@ -31,6 +31,9 @@ gravity_torque = m * g * l / math.sqrt(2.0)
 
 Function = Callable[..., np.ndarray]
 
+STEP = 1e-30
+"""Imaginary step of a coordinate [rad]: its square vanishes beside one."""
+
 
 def R_AB(a: sp.Expr) -> sp.Matrix:
     """Passive rotation about y. R_CD is the same."""
@@ -89,10 +92,20 @@ class Lagrangian:
 
     @cached_property
     def bias(self) -> Function:
-        """What the Euler-Lagrange equations (1) have besides M ddq: tau = M ddq + bias(q, dq) [N m]."""
-        dL_dq = sp.Matrix([self.T - self.P]).jacobian(self.q).T
-        bias = _compiled(self._dT_ddq.jacobian(self.q) * self.dq - dL_dq, self.q, self.dq)
-        return lambda q, dq: bias(q, dq)[..., 0]
+        """What the Euler-Lagrange equations (1) have besides M ddq: tau = M ddq + bias(q, dq) [N m].
+
+        By complex steps, which are exact to rounding: sympy takes a second for these derivatives.
+        """
+        momenta, kinetic, potential = self.momenta, self.kinetic, self.potential
+        steps = 1j * STEP * np.eye(len(self.q))
+
+        def bias(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+            turning = momenta(q + 1j * STEP * dq, dq).imag / STEP
+            stepped = q[..., None, :] + steps
+            lagrangian = kinetic(stepped, np.broadcast_to(dq[..., None, :], stepped.shape)) - potential(stepped)
+            return turning - lagrangian.imag / STEP
+
+        return bias
 
     def accelerations(self, q: np.ndarray, dq: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """ddq of the Euler-Lagrange equations (1) under the generalised torques tau [rad/s^2]."""
