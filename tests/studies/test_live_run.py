@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -261,12 +262,32 @@ def test_a_run_ends_and_its_viewer_stays(monkeypatch: pytest.MonkeyPatch) -> Non
         end(started, signal.SIGKILL)
 
 
-@pytest.mark.slow
-def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+@pytest.fixture
+def _without_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in viewer.SCREENS:
         monkeypatch.delenv(name, raising=False)
-    said = cmg_mj("run", "push_recovery", "--live", "--out=it")
-    assert said.complaint.startswith("--live: no viewer could be started: neither WAYLAND_DISPLAY nor ")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no environment variable names the screen")
+@pytest.mark.usefixtures("_without_screen")
+def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No viewer is started to find that out."""
+    monkeypatch.setattr(viewer, "_start", pytest.fail)
+    message = cmg_mj("run", "push_recovery", "--live", "--out=it").complaint
+    unset = "neither WAYLAND_DISPLAY nor WAYLAND_SOCKET nor DISPLAY is set"
+    assert message.startswith(f"--live: no viewer could be started: {unset}. Where there is no screen: start rerun ")
+    assert not Path("it").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no environment variable names the screen")
+@pytest.mark.usefixtures("_without_screen")
+def test_a_viewer_that_finds_no_screen_is_not_taken_for_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It listens, and ends: on a busy machine seconds later."""
+    monkeypatch.setenv("DISPLAY", "nowhere:77")
+    monkeypatch.setattr(viewer, "STAYS_S", 60.0)
+    message = cmg_mj("run", "push_recovery", "--live", "--out=it").complaint
+    assert message.startswith("--live: no viewer could be started: ")
     assert not Path("it").exists()
 
 
