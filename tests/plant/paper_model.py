@@ -87,8 +87,14 @@ class Lagrangian:
 
     @cached_property
     def mass_matrix(self) -> Function:
-        """M(q), (..., n, n) [kg m^2]."""
-        return _compiled(self._dT_ddq.jacobian(self.dq), self.q)
+        """M(q), (..., n, n) [kg m^2]: the momenta M dq, of which T is the quadratic form, at unit rates."""
+        momenta, units = self.momenta, np.eye(len(self.q))
+
+        def mass_matrix(q: np.ndarray) -> np.ndarray:
+            each = np.broadcast_to(q[..., None, :], (*q.shape, q.shape[-1]))
+            return momenta(each, np.broadcast_to(units, each.shape)).swapaxes(-1, -2)
+
+        return mass_matrix
 
     @cached_property
     def bias(self) -> Function:

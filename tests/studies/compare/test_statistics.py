@@ -151,7 +151,7 @@ def test_a_figure_that_is_missing_in_a_world() -> None:
 @cache
 def compared() -> tuple[ComparedObserver, ...]:
     """Two observers, of which one falls in all worlds within the time."""
-    scenario = load_scenario("push_recovery", ["duration_s=4.0", "push.0.start_s=0.5", "seed=3"])
+    scenario = load_scenario("push_recovery", ["duration_s=2.2", "push.0.start_s=0.5", "seed=3"])
     return tuple(compare(prepare_comparison(scenario, ["ltv", "luenberger"]), 3))
 
 
@@ -177,7 +177,7 @@ def test_what_stood_averages_to_what_is_printed() -> None:
             assert not known or statistics.fmean(known) == pytest.approx(row[key], rel=1e-12), key
     fell = table.filter(pc.field("observer") == "luenberger")
     assert not any(fell["stood"].to_pylist())
-    assert all(0.5 < end < 4.0 for end in fell["end_time_s"].to_pylist())
+    assert all(0.5 < end < 2.2 for end in fell["end_time_s"].to_pylist())
     assert all(math.isfinite(value) for value in fell[ERROR].to_pylist())
     assert set(fell["settle_time_s"].to_pylist()) == {None}
 

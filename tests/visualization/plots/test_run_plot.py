@@ -24,7 +24,7 @@ BAND, LIMIT = 1.0, 4.7
 @pytest.fixture(scope="module")
 def all_observers() -> tuple[Trajectory, dict[str, Any]]:
     """A short run with every observer."""
-    short = ("duration_s=0.6", "push.0.start_s=0.2")
+    short = ("duration_s=0.4", "push.0.start_s=0.2")
     result = prepare(load_scenario("observer_tuning", short)).run()
     assert result.trajectory is not None
     return result.trajectory, result.summaries[0]
