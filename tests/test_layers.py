@@ -59,15 +59,19 @@ def imported_names(tree: ast.AST, place: str) -> Iterator[tuple[int, str]]:
 
 
 @cache
+def syntax_tree(module: str) -> ast.Module:
+    return ast.parse(modules()[module].read_text(encoding="utf-8"))
+
+
+@cache
 def imports(module: str) -> list[tuple[int, str]]:
     """Line and full name of everything that a module imports, inside functions too."""
-    return list(imported_names(ast.parse(modules()[module].read_text(encoding="utf-8")), module))
+    return list(imported_names(syntax_tree(module), module))
 
 
 def import_time_names(module: str) -> Iterator[str]:
     """Modules of the package that a module imports when it is imported itself."""
-    tree = ast.parse(modules()[module].read_text(encoding="utf-8"))
-    outside = [node for node in tree.body if not _is_for_types(node)]
+    outside = [node for node in syntax_tree(module).body if not _is_for_types(node)]
     for _, name in imported_names(ast.Module([node for node in outside if not _defines(node)], []), module):
         yield from _module_in(name)
 
@@ -222,8 +226,8 @@ def test_public_names_are_what_they_say() -> None:
 
 
 def test_type_checkers_know_the_public_names() -> None:
-    """`cmg_mj/__init__.py` hands out the names that it imports for type checkers."""
-    tree = ast.parse(modules()["cmg_mj"].read_text(encoding="utf-8"))
+    """What `cmg_mj/__init__.py` imports for type checkers is what it hands out."""
+    tree = syntax_tree("cmg_mj")
     imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
     names = {
         (f"{node.module}".removeprefix("cmg_mj."), alias.asname)

@@ -34,7 +34,7 @@ def toy(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Py
     """Tests of each tier."""
     monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
     monkeypatch.setattr(tiers, "PAPERS", pytester.path / "papers")
-    monkeypatch.setattr(cpu_limit, "IMPORTED_LATE", ())
+    monkeypatch.setattr(cpu_limit, "warm_up", lambda: None)
     monkeypatch.setattr(footprint, "ROOT", pytester.path)
     pytester.makeini("[pytest]\nmarkers =\n  daily\n  slow\n  papers\n")
     pytester.mkpydir("papers")
@@ -105,27 +105,30 @@ def test_every_test_is_in_one_tier() -> None:
     assert tests_of["daily"] == collect("not papers") == collect("")
 
 
-BURN = "import time\ndef burn():\n    end = time.process_time() + 0.25\n    while time.process_time() < end: pass\n"
+BURN = "import time\ndef burn():\n    end = time.process_time() + 0.12\n    while time.process_time() < end: pass\n"
 
 
 @pytest.mark.parametrize(
     ("code", "is_failure"),
     [
         ("def test_it(): pass", False),
-        ("def test_it(): time.sleep(0.25)", False),
+        ("def test_it(): time.sleep(0.12)", False),
         ("def test_it(): burn()", True),
         ("@pytest.mark.slow\ndef test_it(): burn()", False),
         ("@pytest.fixture(scope='module')\ndef made(): burn()\ndef test_it(made): pass", True),
         ("@pytest.fixture\ndef made():\n    yield\n    burn()\ndef test_it(made): pass", True),
         (
             "import subprocess, sys\n"
-            "def test_it(): subprocess.run([sys.executable, '-c', 'sum(range(20_000_000))'], check=True)",
+            "def test_it(): subprocess.run([sys.executable, '-c', 'sum(range(8_000_000))'], check=True)",
             True,
         ),
     ],
     ids=["quick", "waiting", "computing", "slow", "set-up", "teardown", "a child"],
 )
-def test_processor_time_is_limited(toy: pytest.Pytester, code: str, is_failure: bool) -> None:
+def test_processor_time_is_limited(
+    toy: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, code: str, fails: bool
+) -> None:
+    monkeypatch.setattr(cpu_limit, "calibration_loop", lambda: cpu_limit.REFERENCE_S)
     toy.makepyfile(test_c=f"import pytest\n{BURN}{code}\n")
     result = toy.runpytest_inprocess(
         "-p", "tests.tiers", "-p", "tests.cpu_limit", "--cpu-limit=0.05", "test_c.py::test_it"
@@ -135,7 +138,7 @@ def test_processor_time_is_limited(toy: pytest.Pytester, code: str, is_failure: 
 
 
 def test_a_slow_machine_has_a_higher_limit(toy: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cpu_limit, "slowness", lambda: 20.0)
+    monkeypatch.setattr(cpu_limit, "calibration_loop", lambda: 4.0 * cpu_limit.REFERENCE_S)
     toy.makepyfile(test_c=f"{BURN}def test_it(): burn()\n")
     toy.runpytest_inprocess(
         "-p", "tests.tiers", "-p", "tests.cpu_limit", "--cpu-limit=0.05", "test_c.py"

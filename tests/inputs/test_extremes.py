@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 
 import pytest
@@ -78,10 +77,9 @@ def test_extreme_numbers(field: str, size: str) -> None:
     ),
 )
 def test_what_is_no_scenario(wrong_input: str, fragments: list[str]) -> None:
-    start = time.monotonic()
+    """None takes long, or it would fail by the limit of processor time."""
     assert_in_order(["my.toml: ", *fragments], check(wrong_input).complaint)
     assert_in_order(["my.toml: ", *fragments], cmg_mj("run", "my.toml").complaint)
-    assert time.monotonic() - start < 5.0
 
 
 @table(

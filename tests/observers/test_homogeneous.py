@@ -68,7 +68,7 @@ def test_one_sample_is_the_printed_equation(parameters: dict, model: ReducedMode
 @pytest.mark.parametrize(("parameters", "model"), CASES)
 def test_follows_the_continuous_observer_at_200_hz(parameters: dict, model: ReducedModel) -> None:
     """On a restless rig, the estimate crossing e = 0 all the time."""
-    y1, y2, u = rough_signals(200)
+    y1, y2, u = rough_signals(60)
     expected = integrate(homogeneous_slope(model, **parameters), [y1[0], 0.0], y1, y2, u)
     estimates, _ = run(observer("homogeneous", model=model, **parameters), y1, y2, u)
     error = np.sqrt(np.mean((estimates[:, 1] - expected[:, 1]) ** 2))

@@ -31,6 +31,9 @@ gravity_torque = m * g * l / math.sqrt(2.0)
 
 Function = Callable[..., np.ndarray]
 
+STEP = 1e-30
+"""Imaginary step of a coordinate [rad]: its square vanishes beside one."""
+
 
 def R_AB(a: sp.Expr) -> sp.Matrix:
     """Passive rotation about y. R_CD is the same."""
@@ -84,15 +87,31 @@ class Lagrangian:
 
     @cached_property
     def mass_matrix(self) -> Function:
-        """M(q), (..., n, n) [kg m^2]."""
-        return _compile(self._dT_ddq.jacobian(self.dq), self.q)
+        """M(q), (..., n, n) [kg m^2]: the momenta M dq, of which T is the quadratic form, at unit rates."""
+        momenta, units = self.momenta, np.eye(len(self.q))
+
+        def mass_matrix(q: np.ndarray) -> np.ndarray:
+            each = np.broadcast_to(q[..., None, :], (*q.shape, q.shape[-1]))
+            return momenta(each, np.broadcast_to(units, each.shape)).swapaxes(-1, -2)
+
+        return mass_matrix
 
     @cached_property
     def bias(self) -> Function:
-        """The terms of the Euler-Lagrange equations (1) besides M ddq: tau = M ddq + bias(q, dq) [N m]."""
-        dL_dq = sp.Matrix([self.T - self.P]).jacobian(self.q).T
-        bias = _compile(self._dT_ddq.jacobian(self.q) * self.dq - dL_dq, self.q, self.dq)
-        return lambda q, dq: bias(q, dq)[..., 0]
+        """What the Euler-Lagrange equations (1) have besides M ddq: tau = M ddq + bias(q, dq) [N m].
+
+        By complex steps, which are exact to rounding: sympy takes a second for these derivatives.
+        """
+        momenta, kinetic, potential = self.momenta, self.kinetic, self.potential
+        steps = 1j * STEP * np.eye(len(self.q))
+
+        def bias(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+            turning = momenta(q + 1j * STEP * dq, dq).imag / STEP
+            stepped = q[..., None, :] + steps
+            lagrangian = kinetic(stepped, np.broadcast_to(dq[..., None, :], stepped.shape)) - potential(stepped)
+            return turning - lagrangian.imag / STEP
+
+        return bias
 
     def accelerations(self, q: np.ndarray, dq: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """ddq of the Euler-Lagrange equations (1) under the generalised torques tau [rad/s^2]."""

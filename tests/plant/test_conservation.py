@@ -178,14 +178,15 @@ def work_balance(settings: PlantSettings, duration_s: float, seed: int) -> Balan
     return Balance(float((np.abs(residual).max(axis=1) / turnover).max()), float(loss.min()), float(torque_share.max()))
 
 
-def test_energy_changes_by_the_work_of_motors_and_viscous_friction() -> None:
+@pytest.mark.parametrize("duration_s", slow_but([2.5, 5.0], 2.5))
+def test_energy_changes_by_the_work_of_motors_and_viscous_friction(duration_s: float) -> None:
     viscous = PlantSettings(
         equilibrium_bias_deg=0.0, timestep_s=1e-3, tilt_damping_n_m_s=0.05, gimbal_damping_n_m_s=0.02
     )
-    balance = work_balance(viscous, duration_s=5.0, seed=0)
+    balance = work_balance(viscous, duration_s=duration_s, seed=0)
     print(f"viscous friction: {balance}")
     assert balance.torque_used < 1.0  # no kinks from saturation, and a quadrature of full order
-    assert balance.lost_j > 0.5
+    assert balance.lost_j > 0.1 * duration_s
     assert balance.residual < 1e-6
 
 

@@ -68,6 +68,7 @@ def test_what_it_writes() -> None:
 def test_its_recording() -> None:
     from rerun.chunk import RrdReader
 
+    write_csv("sine.csv", {name: values[:1000] for name, values in sine().items()})
     replay("sine.csv", "--columns", PLAIN, "--out", "it", "--observers", "linear")
     entities = {str(chunk.entity_path) for chunk in RrdReader("it/recording.rrd").stream()}
     assert {"/sine/tilt/measured", "/sine/rate/true", "/sine/rate_estimate/linear", "/summary", "/settings"} <= entities

@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -138,9 +139,8 @@ def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: 
         result = experiment.run(**view.options())
         view.ended(report_run(experiment, result))
         save_run(RunFolder(Path("it"), []), report_run(experiment, result))
-    assert view.failure == ""
-    wait_until_it_is_still(Path("received.rrd"))
-    assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
+    assert view.lost == ""
+    assert_received(Path("received.rrd"))
 
 
 @pytest.mark.parametrize("ticks", slow_but([1, 2, 3, 64], 64))
@@ -183,11 +183,17 @@ def rows(trajectory: Trajectory, first: int, end: int) -> Trajectory:
     return replace(trajectory, columns={name: values[first:end] for name, values in trajectory.columns.items()})
 
 
-def wait_until_it_is_still(path: Path) -> None:
-    sizes = [-1, -2]
-    while sizes[-1] != sizes[-2]:
-        time.sleep(0.5)
-        sizes.append(path.stat().st_size)
+def assert_received(path: Path) -> None:
+    """The viewer has written all: it has been sent that, but writes when it comes to it."""
+    size = -1
+    while True:
+        try:
+            return assert_alike(path, Path("it/recording.rrd"))
+        except Exception:  # half a file may be no recording at all
+            if path.stat().st_size == size:
+                raise
+            size = path.stat().st_size
+            time.sleep(1.0)
 
 
 def column(path: Path) -> dict[str, list[float]]:
@@ -208,24 +214,21 @@ def test_the_figures_are_those_of_a_run_that_nobody_looks_at(receiver: Viewer, d
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("signal_number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
-def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, signal_number: signal.Signals) -> None:
-    """Killed, or standing still, half a second after the run began: it takes no longer than it must."""
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
+def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, how: signal.Signals) -> None:
+    """Killed, or standing still, while the run goes on, which ends all the same."""
     arguments = ["run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--out=it", "--json"]
     command = [*COMMAND, *arguments, "--connect", str(receiver.port), "--pace=2"]
     with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
         while Path("received.rrd").stat().st_size < 100_000:
             time.sleep(0.05)
-        start = time.monotonic()
-        os.killpg(receiver.process.pid, signal_number)
+        os.killpg(receiver.process.pid, how)
         out, err = run.communicate(timeout=HANGS_AFTER_S)
-        duration_s = time.monotonic() - start
     assert run.returncode == 0, err
     reason = {signal.SIGKILL: GONE, signal.SIGSTOP: STUCK}[signal_number]
     assert err == f"cmg-mj: the viewer missed a part: {reason}; the run and its files are complete\n"
     assert json.loads(out)["outcome"] == "done"
     assert len(assert_whole("it")) == 600
-    assert duration_s < 30.0
 
 
 @pytest.mark.slow
@@ -239,8 +242,7 @@ def test_ctrl_c_keeps_what_was_recorded(receiver: Viewer, ctrl_c: None) -> None:
     assert run.returncode == 130
     assert err.splitlines()[-1].startswith("cmg-mj: interrupted at ")
     assert 0 < len(assert_whole("it")) < 2000  # the shapes come first and fill most of what was waited for
-    wait_until_it_is_still(Path("received.rrd"))
-    assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
+    assert_received(Path("received.rrd"))
 
 
 def test_a_viewer_is_heard_on_this_machine_alone(receiver: Viewer) -> None:
@@ -263,12 +265,32 @@ def test_a_run_ends_and_its_viewer_stays(monkeypatch: pytest.MonkeyPatch) -> Non
         end(own_viewer, signal.SIGKILL)
 
 
-@pytest.mark.slow
-def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+@pytest.fixture
+def _without_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in viewer.SCREENS:
         monkeypatch.delenv(name, raising=False)
-    outcome = cmg_mj("run", "push_recovery", "--live", "--out=it")
-    assert outcome.complaint.startswith("--live: no viewer could be started: neither WAYLAND_DISPLAY nor ")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no environment variable names the screen")
+@pytest.mark.usefixtures("_without_screen")
+def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No viewer is started to find that out."""
+    monkeypatch.setattr(viewer, "_start", pytest.fail)
+    message = cmg_mj("run", "push_recovery", "--live", "--out=it").complaint
+    unset = "neither WAYLAND_DISPLAY nor WAYLAND_SOCKET nor DISPLAY is set"
+    assert message.startswith(f"--live: no viewer could be started: {unset}. Where there is no screen: start rerun ")
+    assert not Path("it").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no environment variable names the screen")
+@pytest.mark.usefixtures("_without_screen")
+def test_a_viewer_that_finds_no_screen_is_not_taken_for_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It listens, and ends: on a busy machine seconds later."""
+    monkeypatch.setenv("DISPLAY", "nowhere:77")
+    monkeypatch.setattr(viewer, "STAYS_S", 60.0)
+    message = cmg_mj("run", "push_recovery", "--live", "--out=it").complaint
+    assert message.startswith("--live: no viewer could be started: ")
     assert not Path("it").exists()
 
 

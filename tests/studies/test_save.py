@@ -58,8 +58,9 @@ def own_model() -> list[str]:
     return [write("duration_s = 0.4\n[plant]\nmodel = '../rigs/scissored_pair.xml'", "scenarios/my.toml")]
 
 
+PUSHED = ("--set", "duration_s=0.5", "--set", "push.0.start_s=0.3")
 KINDS: dict[str, Callable[[], list[str]]] = {
-    "a bundled scenario": lambda: ["push_recovery", "--seed", "3", "--set", "duration_s=2.05", "--observer", "ltv"],
+    "a bundled scenario": lambda: ["push_recovery", "--seed", "3", *PUSHED, "--observer", "ltv"],
     "a user's model": own_model,
     "a user's observer": lambda: [write(f"duration_s = 0.4\n[observer]\nkind = '{__name__}:Mine'\ngain = 0.4")],
     "lqr": lambda: [write("duration_s = 0.4\n[controller]\nlqr.state_cost = [30, 1, 0.5, 0.1]\nlqr.input_cost = 0.3")],

@@ -22,6 +22,8 @@ LOOPBACK, PORT = "127.0.0.1", 9876
 STARTS_WITHIN_S, STAYS_S = 30.0, 1.0
 """Time in which a viewer starts to listen, and time after which a listening viewer has found its screen."""
 ANSWERS_WITHIN_S = 2.0
+SCREENS = ("WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY")
+"""Environment variables of which one names the screen, on Linux."""
 
 _viewers: list[Viewer] = []
 """References to the viewers: a viewer outlives the run, and nobody waits for its end."""
@@ -105,7 +107,7 @@ def start_viewer(options: Sequence[str] = ()) -> Viewer:
     """Start a viewer that listens on this machine alone and outlives this process.
 
     Args:
-        options: More options of `rerun`.
+        options: More options of `rerun`, which make a viewer without a window.
 
     Returns:
         The viewer, which listens.
@@ -113,6 +115,9 @@ def start_viewer(options: Sequence[str] = ()) -> Viewer:
     Raises:
         InputError: The viewer does not start, for instance because there is no screen.
     """
+    # A viewer listens before it looks for its screen: a busy machine may take longer over that than `STAYS_S`.
+    if not options and sys.platform == "linux" and not any(os.environ.get(name) for name in SCREENS):
+        raise _no_viewer(f"neither {' nor '.join(SCREENS)} is set")
     for port in (PORT, 0, 0):
         viewer = _start(_free_port(port), options)
         with viewer.errors:  # the viewer has an end of its own
@@ -124,7 +129,11 @@ def start_viewer(options: Sequence[str] = ()) -> Viewer:
             complaint = viewer.complaint()
         if status != 0:  # 0: another viewer has been quicker to take the port
             break
-    raise InputError(
+    raise _no_viewer(complaint)
+
+
+def _no_viewer(complaint: str) -> InputError:
+    return InputError(
         f"--live: no viewer could be started: {complaint}. Where there is no screen: "
         "start rerun where there is one and name its address with --connect, or leave --live out"
     )

@@ -29,6 +29,13 @@ from tests.tiers import slow_but
 
 pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
 
+
+@pytest.fixture(autouse=True)
+def few_signals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On which an export compares C with Python, before it goes to the board: see the tests of the export."""
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
+
+
 NO_COUNTS = ("sensors.accelerometer.counts_per_g=0", "sensors.encoder.counts_per_revolution=0")
 ARE_PUSHED = ("homogeneous", "kalman", "gyro_free")
 """In lockstep; the others stand there for half a second."""

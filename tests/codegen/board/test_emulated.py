@@ -14,7 +14,7 @@ import pytest
 from cmg_mj.codegen.board.qemu import Board
 from cmg_mj.errors import InputError, RunStopped
 from tests.codegen.board.toy import needs_board, toy
-from tests.command import environment
+from tests.command import HANGS_AFTER_S, environment
 
 pytestmark = needs_board
 
@@ -96,7 +96,7 @@ def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
         process = int(user.stdout.readline())
         assert is_running(process)
         user.send_signal(signal.SIGKILL)
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + HANGS_AFTER_S
     while is_running(process) and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not is_running(process)

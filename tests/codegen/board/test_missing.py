@@ -59,6 +59,7 @@ def test_a_program_that_is_none(tmp_path: Path, program: str, monkeypatch: pytes
     broken = tmp_path / program
     broken.write_bytes(b"\x7fELF")
     broken.chmod(0o755)
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
     monkeypatch.setattr("cmg_mj.codegen.board.tools.missing", list)
     monkeypatch.setattr("cmg_mj.codegen.board.image.COMPILER", str(broken) if program == COMPILER else COMPILER)
     monkeypatch.setattr("cmg_mj.codegen.board.qemu.EMULATOR", str(broken) if program == EMULATOR else EMULATOR)

@@ -29,10 +29,12 @@ def test_double_precision_is_bit_for_bit(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["linear", "adaptive"])
-def test_two_seconds_are_bit_for_bit(kind: str, tmp_path: Path) -> None:
-    settings = ("duration_s=2.0", "push.0.start_s=0.5")
-    loop, export = record(kind, *settings), Compiled(kind, "double", tmp_path, *settings)
-    np.testing.assert_array_equal(export.run(loop.samples), loop.results)
+def test_a_second_is_bit_for_bit(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Besides, the export itself compares on few signals here."""
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
+    settings = ("duration_s=1.0", "push.0.start_s=0.25")
+    loop, compiled = recorded(kind, *settings), Compiled(kind, "double", tmp_path, *settings)
+    np.testing.assert_array_equal(compiled.run(loop.samples), loop.results)
 
 
 @pytest.mark.slow

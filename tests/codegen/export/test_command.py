@@ -25,7 +25,13 @@ FILES = ["linear.c", "linear.h", "linear_example.c", "linear_test_vector.h"]
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
-def files(folder: str) -> list[str]:
+@pytest.fixture(autouse=True)
+def few_signals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On which an export compares C with Python; the other tests of the export have all."""
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 100)
+
+
+def written(folder: str) -> list[str]:
     return sorted(path.name for path in Path(folder).iterdir() if path.name != ".cmg-mj")
 
 

@@ -55,7 +55,8 @@ def test_numpys_numbers_and_arrays_on_the_left() -> None:
 
 
 @pytest.mark.parametrize("name", ["Elaborate", "Branches"])
-def test_casadi_is_left_as_it_was(name: str) -> None:
+def test_casadi_is_left_as_it_was(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
     for before in (True, False):
         casadi.GlobalOptions.setSimplificationOnTheFly(before)
         try:

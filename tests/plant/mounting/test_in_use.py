@@ -20,7 +20,7 @@ from tests.simulation.test_gymnasium_env import act
 from tests.visualization.studio.session import Session, as_rows
 from tests.visualization.studio.test_session import same
 
-PUSH_SETTINGS = ["duration_s=2.0", "plant.initial_tilt_deg=0.2", "push=[{start_s=0.5,torque_n_m=1.0}]"]
+PUSHED = ["duration_s=1.0", "plant.initial_tilt_deg=0.2", "push=[{start_s=0.25,torque_n_m=1.0}]"]
 
 PUSH = 7
 """Column of a session's rows."""
@@ -44,7 +44,7 @@ def open_experiment(scenario: str) -> Experiment:
 def test_the_callback_and_a_batch_give_the_runners_trajectory(scenario: str) -> None:
     experiment = open_experiment(scenario)
     native, callback = (experiment.run(driver) for driver in ("native", "callback"))
-    many = experiment.run_many(3)
+    many = experiment.run_many(2)
     assert native.trajectory is not None
     assert callback.trajectory is not None
     assert many.trajectory is not None
@@ -57,14 +57,14 @@ def test_the_callback_and_a_batch_give_the_runners_trajectory(scenario: str) -> 
 def test_studio_gives_it_too(scenario: str) -> None:
     studio = Session(lambda _: open_experiment(scenario))
     try:
-        studio.run(2.0)
+        studio.run(1.0)
         assert (studio.live.stopped, studio.live.note) == ("", "")
         rows = studio.rows
     finally:
         studio.handle.close()
     trajectory = open_experiment(scenario).run().trajectory
     assert trajectory is not None
-    assert len(rows) == 400
+    assert len(rows) == 200
     rows[:, PUSH] = rows[:, PUSH].round(12)  # put together again from a free joint's three torques
     same(rows, as_rows(trajectory))
 
@@ -74,7 +74,7 @@ def test_the_environment_gives_it_too(scenario: str) -> None:
     ticks, infos, _ = act(env, 0)
     trajectory = open_experiment(scenario).run().trajectory
     assert trajectory is not None
-    assert len(ticks) == 400
+    assert len(ticks) == 200
     for name in ("x1_rad", "x2_rad_s", "x3_rad"):
         np.testing.assert_array_equal([info[name] for info in infos[:-1]], trajectory[name])
 

@@ -104,7 +104,12 @@ def test_the_document_has_the_commands_of_its_robots() -> None:
     assert "\n".join(robot.command for robot in ROBOTS.values()) in text
 
 
-def test_a_command_of_the_document() -> None:
+def test_a_command_of_the_document(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In two worlds of eight pushes: how large a push they recover from is of no account here."""
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.WORLDS", 2)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.LEVELS", 8)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.BEFORE_S", 0.1)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.AFTER_TIME_CONSTANTS", 3.0)
     words = shlex.split(ROBOTS["bicycle"].command)
     assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml").status == 0
     result = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options).save("b.xml")

@@ -15,6 +15,7 @@ from cmg_mj.plant.plant import Plant, load_plant
 from tests.plant.full_model import Motion, motion, passive
 from tests.plant.test_conservation import CONTROL_PERIOD_S, NEWTON_COTES, STEPS
 from tests.plant.two_axes.chain import Chain, G, N
+from tests.tiers import slow_but
 
 N_WORLDS = 6
 WHEELS = [4, 6, 8, 10]
@@ -68,9 +69,10 @@ def free_motion(duration_s: float, timestep_s: float, *, gravity: bool, seed: in
     return drifts(Motion(*(samples[:, ::stride] for samples in run)), gravity=gravity)
 
 
+@pytest.mark.parametrize("duration_s", slow_but([2.5, 5.0], 2.5))
 @pytest.mark.parametrize(("gravity", "momentum_bound"), [(False, 1e-7), (True, 1e-5)])
-def test_free_motion_conserves_energy_and_momenta(gravity: bool, momentum_bound: float) -> None:
-    worst = np.abs(free_motion(5.0, 1e-3, gravity=gravity, seed=0, every_s=5e-3)).max(axis=(1, 2))
+def test_free_motion_conserves_energy_and_momenta(gravity: bool, momentum_bound: float, duration_s: float) -> None:
+    worst = np.abs(free_motion(duration_s, 1e-3, gravity=gravity, seed=0, every_s=5e-3)).max(axis=(1, 2))
     print(f"gravity {gravity}:", ", ".join(f"{name} {d:.1e}" for name, d in zip(NAMES, worst, strict=True)))
     assert worst[0] < 1e-6
     assert np.all(worst[1:] < momentum_bound)
@@ -87,10 +89,11 @@ def test_drifts_shrink_with_the_fourth_power_of_the_step(gravity: bool) -> None:
     assert np.all(orders > 3.9)
 
 
-def test_energy_changes_by_the_work_of_servos_and_motors() -> None:
+@pytest.mark.parametrize("n_periods", slow_but([200, 400], 200))
+def test_energy_changes_by_the_work_of_servos_and_motors(n_periods: int) -> None:
     """Gimbals, wheels and yaw are driven, the tilts have friction; every control period is integrated by itself."""
     plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0, timestep_s=5e-4, tilt_damping_n_m_s=0.05)
-    model, n_periods = plant.model, 400
+    model = plant.model
     command = _sinusoidal(plant, n_periods)
     qpos, qvel = initial_states(2)
     qvel[:, WHEELS] = np.array([1.0, -1.0, 1.0, -1.0]) * SPEED  # no motor at its limit, which would be a kink

@@ -21,6 +21,7 @@ from tests.command import COMMAND, ROOT, cmg_mj
 BIAS = "plant.equilibrium_bias_deg"
 SMALL = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--observers", "linear,gyro_free", "--worlds", "3"]
 SHORT = ["--set", "duration_s=0.5", "--set", "push=[]"]
+NOISES = ["--vary", "sensors.accelerometer.noise_density_ug_rthz=100:400:10"]
 
 
 @pytest.mark.slow
@@ -201,7 +202,7 @@ def test_a_plan_runs_nothing(tmp_path: Path) -> None:
         ([], "nothing is varied"),
         (["--vary", "observer.k1=10,20", "--observers", "homogeneous,linear"], "observer.k1"),
         (["--vary", "observer.k1=10,-20"], "observer.k1"),
-        (["--vary", f"{BIAS}=0:1:101", "--worlds", "10000"], "1010000 trials; beyond 1000000 say --yes"),
+        (["--vary", f"{BIAS}=0:1:11", *NOISES, "--worlds", "10000"], "1100000 trials; beyond 1000000 say --yes"),
         (["--vary", f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200: must be a power of two, such as 256"),
         (["--vary", f"{BIAS}=0:1", "--sobol", "2", "--sample", "3"], "--sample and --sobol: one of them"),
         (["--vary", f"{BIAS}=0,1", "--order", "linear,ltv"], "--order linear,ltv: linear does not run here"),

@@ -86,13 +86,13 @@ def test_a_folder_that_may_not_be_written(tmp_path: Path) -> None:
         tmp_path.chmod(0o700)
 
 
-def test_two_sweeps_in_one_folder(tmp_path: Path, trials_bytes: bytes) -> None:
+def test_two_sweeps_in_one_folder(tmp_path: Path) -> None:
     assert cmg_mj(*SWEEP, tmp_path).status == 0
-    before = times(tmp_path)
+    before, trials = times(tmp_path), (tmp_path / "trials.parquet").read_bytes()
     with RunFolder(tmp_path):
         assert cmg_mj(*SWEEP, tmp_path).complaint == f"--out {tmp_path}: another run is writing to it"
     assert times(tmp_path) == before
-    assert (tmp_path / "trials.parquet").read_bytes() == trials_bytes
+    assert (tmp_path / "trials.parquet").read_bytes() == trials
 
 
 @pytest.mark.slow

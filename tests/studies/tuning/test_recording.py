@@ -74,7 +74,9 @@ def test_worlds_that_fell_are_left_out_and_too_many_are_refused() -> None:
 
 
 def test_noise_is_that_of_the_level() -> None:
-    quiet, loud = (record(load_scenario("observer_tuning"), range(2), noise_ug_rthz=n) for n in (100.0, 800.0))
+    quiet, loud = (
+        record(load_scenario("observer_tuning", ["duration_s=2.5"]), range(2), noise_ug_rthz=n) for n in (100.0, 800.0)
+    )
     spread = [np.diff(r.trajectory["y1_rad"][:300], axis=0).std() for r in (quiet, loud)]
     assert 4.0 < spread[1] / spread[0] < 9.0
 

@@ -24,7 +24,7 @@ BAND, LIMIT = 1.0, 4.7
 @pytest.fixture(scope="module")
 def all_observers() -> tuple[Trajectory, dict[str, Any]]:
     """A short run with every observer."""
-    short = ("duration_s=0.6", "push.0.start_s=0.2")
+    short = ("duration_s=0.4", "push.0.start_s=0.2")
     result = prepare(load_scenario("observer_tuning", short)).run()
     assert result.trajectory is not None
     return result.trajectory, result.summaries[0]
@@ -84,7 +84,10 @@ def test_eleven_lines_on_one_page(
 
 
 def test_an_estimate_that_goes_astray_takes_no_axis(
-    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+    all_observers: tuple[Trajectory, dict[str, Any]],
+    tmp_path: Path,
+    figures: list[matplotlib.figure.Figure],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     trajectory, summary = all_observers
     columns = dict(trajectory.columns)
@@ -97,7 +100,8 @@ def test_an_estimate_that_goes_astray_takes_no_axis(
     )
     few = replace(trajectory, columns=columns, layout=layout)
     true = trajectory["x2_rad_s"]
-    for axes in plot(tmp_path, few, summary, figures).axes[1:3]:
+    monkeypatch.setattr(matplotlib.figure.Figure, "get_layout_engine", lambda figure: None)  # takes as long as drawing
+    for axes in plotted(tmp_path, few, summary, figures).axes[1:3]:
         low, high = axes.get_ylim()
         assert low <= true.min()
         assert true.max() <= high
@@ -105,8 +109,18 @@ def test_an_estimate_that_goes_astray_takes_no_axis(
 
 
 def test_long_names_do_not_narrow_the_panels(
-    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The layout alone is computed: drawing takes as long again."""
+
+    figures: list[matplotlib.figure.Figure] = []
+
+    def lay_out(figure: matplotlib.figure.Figure, path: Path, **_: Any) -> None:
+        figures.append(figure)
+        figure.draw_without_rendering()
+        path.touch()
+
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lay_out)
     trajectory, summary = all_observers
     longest = sorted(OBSERVERS, key=len)[-3:]
     figures_of = summary["open_loop_observers"] | {"homogeneous": summary}
@@ -114,7 +128,9 @@ def test_long_names_do_not_narrow_the_panels(
     signals = tuple(trajectory.extra_signals(name) for name in longest)
     layout = replace(trajectory.layout, observers=tuple(longest), extra_signals=signals)
     few = replace(trajectory, layout=layout)
-    figure = plot(tmp_path, few, {**figures_of[longest[0]], "open_loop_observers": open_loop_observers}, figures)
+    summary = {**figures_of[longest[0]], "open_loop_observers": open_loop_observers}
+    plot_run(tmp_path / "plot.png", few, "A title", summary, settle_band_deg=BAND, rate_limit_rad_s=LIMIT)
+    (figure,) = figures
     assert figure.axes[0].get_position().x0 < 0.15
 
 

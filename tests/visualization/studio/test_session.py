@@ -27,28 +27,30 @@ def same(rows: np.ndarray, expected: np.ndarray) -> None:
 @pytest.mark.parametrize(
     "settings",
     [
-        ("duration_s=5.0",),
-        ("duration_s=5.0", "observer.kind=adaptive", "plant.gimbal_friction_n_m=0.05", "seed=3"),
-        ("duration_s=5.0", "plant.flywheel_imbalance_kg_m=1e-5", "plant.equilibrium_bias_deg=1.0"),
-        ("duration_s=5.0", "sensors.accelerometer.latency_s=0.003", "controller.feedback=fog"),
-        ("duration_s=5.0", "sensors.accelerometer.bandwidth_hz=94", "plant.lock_thrust_bearing=true"),
+        (),
+        ("observer.kind=adaptive", "plant.gimbal_friction_n_m=0.05", "seed=3"),
+        ("plant.flywheel_imbalance_kg_m=1e-5", "plant.equilibrium_bias_deg=1.0"),
+        ("sensors.accelerometer.latency_s=0.003", "controller.feedback=fog"),
+        ("sensors.accelerometer.bandwidth_hz=94", "plant.lock_thrust_bearing=true"),
     ],
 )
 def test_untouched_it_is_the_runners_trajectory(settings: tuple[str, ...]) -> None:
+    settings = ("duration_s=2.0", "push.0.start_s=0.5", *settings)
     with session(*settings) as studio:
-        studio.run(5.0)
+        studio.run(2.0)
         assert (studio.live.stopped, studio.live.note) == ("", "")
-        assert len(studio.rows) == 1000
-        same(studio.rows, runner_rows(*settings))
+        assert len(studio.rows) == 400
+        same(studio.rows, of_runner(*settings))
 
 
 def test_whatever_the_clock_does() -> None:
     """Large and small pieces of time, and a time in which nothing is due."""
-    with session() as studio:
+    pushed = "push.0.start_s=0.8"
+    with session(pushed) as studio:
         for every in (0.0007, 0.05, 0.09, 0.004):
-            studio.run(1.0, every)
+            studio.run(0.5, every)
             studio.handle.sync()
-        same(studio.rows, runner_rows("duration_s=4.0"))
+        same(studio.rows, of_runner("duration_s=2.0", pushed))
 
 
 def test_it_keeps_the_clocks_pace() -> None:
@@ -129,18 +131,18 @@ def test_reload_begins_as_the_file_is_now() -> None:
 @pytest.mark.parametrize("back", [-1, -40, -161, -10_000])
 def test_history_brings_the_controller_back(back: int) -> None:
     """A push has come and gone since; what happens again is what happened, bit for bit."""
-    with session("push.0.start_s=2.0") as studio:
-        studio.run(3.0, every_s=0.004)
+    with session("push.0.start_s=1.0") as studio:
+        studio.run(2.0, every_s=0.004)
         studio.scrub(back)
         time = studio.data.time
-        assert time == pytest.approx(max(0.01, 3.0 + 0.01 * back), abs=0.011)  # one step in two is kept
+        assert time == pytest.approx(max(0.01, 2.0 + 0.01 * back), abs=0.011)  # one step in two is kept
         assert len(studio.session_state().ticks) == round(time / 0.005)
         studio.pause(False)
         rows = len([row for row in studio.rows if row[0] < time - 1e-9])
         del studio.stepping.rows[rows:]
-        studio.run(2.0)
+        studio.run(1.0)
         assert studio.live.note == ""
-        same(studio.rows, runner_rows("duration_s=6.0", "push.0.start_s=2.0"))
+        same(studio.rows, of_runner("duration_s=3.0", "push.0.start_s=1.0"))
 
 
 def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
@@ -156,7 +158,7 @@ def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
             studio.stepping.rows[:] = [row for row in studio.stepping.rows if row[0] < time - 1e-9]
             studio.pause(False)
             studio.run(seconds, every_s=0.004)
-        same(studio.rows, runner_rows("push=[]"))
+        same(studio.rows, of_runner("duration_s=2.6", "push=[]"))
         assert len(studio.rows) == pytest.approx(500, abs=3)
 
 
