@@ -126,7 +126,7 @@ class CpuLimit:
             if used > self.limit and used > self.limit * (slower := slowness()):
                 report.outcome = "failed"
                 report.longrepr = (
-                    f"{item.nodeid}: {seconds:.2f} s of processor time with its set-up and its children, on a machine "
+                    f"{item.nodeid}: {used:.2f} s of processor time with its set-up and its children, on a machine "
                     f"{slower:.2f} times slower than the reference's; a test without the mark `slow` may take "
                     f"{self.limit:g} s: shorten it, share what it makes, or mark it"
                 )

@@ -126,7 +126,7 @@ BURN = "import time\ndef burn():\n    end = time.process_time() + 0.12\n    whil
     ids=["quick", "waiting", "computing", "slow", "set-up", "teardown", "a child"],
 )
 def test_processor_time_is_limited(
-    toy: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, code: str, fails: bool
+    toy: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, code: str, is_failure: bool
 ) -> None:
     monkeypatch.setattr(cpu_limit, "calibration_loop", lambda: cpu_limit.REFERENCE_S)
     toy.makepyfile(test_c=f"import pytest\n{BURN}{code}\n")

@@ -264,7 +264,7 @@ def test_the_drift_is_the_same_for_a_part_that_filters() -> None:
 
     def density(bandwidth_hz: float) -> float:
         sensor = Accelerometer(bias_instability_ug=36.0, bandwidth_hz=bandwidth_hz, **QUIET)
-        noise = delivered(sensor, 2000, lambda _: np.zeros((4, 8)), worlds=list(range(8)))
+        noise = deliver(sensor, 2000, lambda _: np.zeros((4, 8)), worlds=list(range(8)))
         frequency, result = welch(noise, 200.0, nperseg=400, axis=0)
         return float(result[(frequency > 20.0) & (frequency < 40.0)].mean())
 

@@ -214,15 +214,15 @@ def test_the_figures_are_those_of_a_run_that_nobody_looks_at(receiver: Viewer, d
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
-def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, how: signal.Signals) -> None:
+@pytest.mark.parametrize("signal_number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
+def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, signal_number: signal.Signals) -> None:
     """Killed, or standing still, while the run goes on, which ends all the same."""
     arguments = ["run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--out=it", "--json"]
     command = [*COMMAND, *arguments, "--connect", str(receiver.port), "--pace=2"]
     with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
         while Path("received.rrd").stat().st_size < 100_000:
             time.sleep(0.05)
-        os.killpg(receiver.process.pid, how)
+        os.killpg(receiver.process.pid, signal_number)
         out, err = run.communicate(timeout=HANGS_AFTER_S)
     assert run.returncode == 0, err
     reason = {signal.SIGKILL: GONE, signal.SIGSTOP: STUCK}[signal_number]

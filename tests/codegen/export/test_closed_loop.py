@@ -33,7 +33,7 @@ def test_a_second_is_bit_for_bit(kind: str, tmp_path: Path, monkeypatch: pytest.
     """Besides, the export itself compares on few signals here."""
     monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
     settings = ("duration_s=1.0", "push.0.start_s=0.25")
-    loop, compiled = recorded(kind, *settings), Compiled(kind, "double", tmp_path, *settings)
+    loop, compiled = record(kind, *settings), Compiled(kind, "double", tmp_path, *settings)
     np.testing.assert_array_equal(compiled.run(loop.samples), loop.results)
 
 

@@ -31,7 +31,7 @@ def few_signals(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 100)
 
 
-def written(folder: str) -> list[str]:
+def files(folder: str) -> list[str]:
     return sorted(path.name for path in Path(folder).iterdir() if path.name != ".cmg-mj")
 
 

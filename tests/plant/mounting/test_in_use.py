@@ -20,7 +20,7 @@ from tests.simulation.test_gymnasium_env import act
 from tests.visualization.studio.session import Session, as_rows
 from tests.visualization.studio.test_session import same
 
-PUSHED = ["duration_s=1.0", "plant.initial_tilt_deg=0.2", "push=[{start_s=0.25,torque_n_m=1.0}]"]
+PUSH_SETTINGS = ["duration_s=1.0", "plant.initial_tilt_deg=0.2", "push=[{start_s=0.25,torque_n_m=1.0}]"]
 
 PUSH = 7
 """Column of a session's rows."""

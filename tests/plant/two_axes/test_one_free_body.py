@@ -72,7 +72,7 @@ def test_a_push_about_either_axis_is_felt_there(model: Path, axis: str, other: s
 
 
 def test_in_studio_too(model: Path) -> None:
-    experiment = push(model, roll=5.0, pitch=3.0)
+    experiment = pushed(model, roll=5.0, pitch=3.0)
     studio = Session(lambda _: experiment)
     with studio.handle:
         studio.run(0.35)

@@ -175,7 +175,7 @@ def test_what_stood_averages_to_what_is_printed() -> None:
     for observer, row in rows_by_name(compare_two()).items():
         survivors = table.filter((pc.field("observer") == observer) & pc.field("stood"))
         for key in row["intervals"]:
-            known = [value for value in stood[key].to_pylist() if value is not None]
+            known = [value for value in survivors[key].to_pylist() if value is not None]
             assert (row[key] is None) == (not known), key
             assert not known or statistics.fmean(known) == pytest.approx(row[key], rel=1e-12), key
     fell = table.filter(pc.field("observer") == "luenberger")

@@ -91,12 +91,12 @@ def fast(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
     [{}, {"controller.feedback": "truth"}, {"observer": {"kind": "gyro_free"}}],
     ids=["observer", "truth", "gyro"],
 )
-def test_no_controller_bears_more(fast: Experiment, fed: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_controller_bears_more(fast: Experiment, feedback: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does the one that is fed the true rate; it bears more than any blow that can be recovered from."""
     monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.WORLDS", 4)
     monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.LEVELS", 16)
     monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.BEFORE_S", 0.3)
-    experiment = fast.with_settings(fed)
+    experiment = fast.with_settings(feedback)
     top = ceiling(experiment.plant.reduced, experiment.law.rate_limit)
     assert top.pole == pytest.approx(7.85, rel=0.01)
     impulse = push_margin(experiment.scenario, experiment.design).median_impulse

@@ -23,7 +23,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.dask_worker import compute_part, part_of
 from cmg_mj.studies.sweeps.study import SweepStudy
-from tests.command import COMMAND, HANGS_AFTER_S, ROOT, Said, cmg_mj, cmg_mj_process, environment
+from tests.command import COMMAND, HANGS_AFTER_S, ROOT, CommandOutcome, cmg_mj, cmg_mj_process, environment
 
 needs_distributed = pytest.mark.skipif(
     find_spec("distributed") is None,

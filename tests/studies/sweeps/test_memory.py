@@ -55,14 +55,14 @@ def make_rows(sweep: SweepStudy, chunk: Chunk, *_: Any) -> list[dict[str, Any]]:
 @pytest.mark.parametrize(("points", "worlds"), [(10_000, 1), (100, 100)])
 def test_points_and_chunks_are_made_when_asked_for(points: int, worlds: int) -> None:
     """A list of 10,000 points takes 3 MB, and one of their trials 1.5 MB."""
-    of = study(points, worlds)
+    sweep = study(points, worlds)
     assert study(2).points[0]  # what it imports is there
     with peak() as peaks:
         trials = sum(len(chunk.trials) for chunk in sweep.chunks)
         biases = (float(str(point[BIAS])) for point in sweep.points)
         assert sum(bias < 0.0 for bias in biases) == points / 2
     assert trials == 10_000
-    assert taken[0] < 1.5
+    assert peaks[0] < 1.5
 
 
 @pytest.mark.slow

@@ -101,7 +101,7 @@ def test_an_estimate_that_goes_astray_takes_no_axis(
     few = replace(trajectory, columns=columns, layout=layout)
     true = trajectory["x2_rad_s"]
     monkeypatch.setattr(matplotlib.figure.Figure, "get_layout_engine", lambda figure: None)  # takes as long as drawing
-    for axes in plotted(tmp_path, few, summary, figures).axes[1:3]:
+    for axes in plot(tmp_path, few, summary, figures).axes[1:3]:
         low, high = axes.get_ylim()
         assert low <= true.min()
         assert true.max() <= high

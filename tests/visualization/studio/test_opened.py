@@ -128,7 +128,7 @@ assert not handle.is_running()
 @pytest.mark.slow
 def test_both_threads_and_nobody_looking() -> None:
     """The viewer in its thread: the simulation is not ahead of the clock, and the viewer ends when it is told."""
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", BOTH_THREADS, str(free_port())], capture_output=True, text=True, timeout=HANGS_AFTER_S
     )
     assert process.returncode == 0, process.stderr

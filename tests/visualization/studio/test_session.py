@@ -40,7 +40,7 @@ def test_untouched_it_is_the_runners_trajectory(settings: tuple[str, ...]) -> No
         studio.run(2.0)
         assert (studio.live.stopped, studio.live.note) == ("", "")
         assert len(studio.rows) == 400
-        same(studio.rows, of_runner(*settings))
+        same(studio.rows, runner_rows(*settings))
 
 
 def test_whatever_the_clock_does() -> None:
@@ -50,7 +50,7 @@ def test_whatever_the_clock_does() -> None:
         for every in (0.0007, 0.05, 0.09, 0.004):
             studio.run(0.5, every)
             studio.handle.sync()
-        same(studio.rows, of_runner("duration_s=2.0", pushed))
+        same(studio.rows, runner_rows("duration_s=2.0", pushed))
 
 
 def test_it_keeps_the_clocks_pace() -> None:
@@ -142,7 +142,7 @@ def test_history_brings_the_controller_back(back: int) -> None:
         del studio.stepping.rows[rows:]
         studio.run(1.0)
         assert studio.live.note == ""
-        same(studio.rows, of_runner("duration_s=3.0", "push.0.start_s=1.0"))
+        same(studio.rows, runner_rows("duration_s=3.0", "push.0.start_s=1.0"))
 
 
 def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
@@ -158,7 +158,7 @@ def test_going_back_forgets_what_came_later_and_can_be_done_again() -> None:
             studio.stepping.rows[:] = [row for row in studio.stepping.rows if row[0] < time - 1e-9]
             studio.pause(False)
             studio.run(seconds, every_s=0.004)
-        same(studio.rows, of_runner("duration_s=2.6", "push=[]"))
+        same(studio.rows, runner_rows("duration_s=2.6", "push=[]"))
         assert len(studio.rows) == pytest.approx(500, abs=3)
 
 
