@@ -9,6 +9,7 @@ from cmg_mj.controllers.controller import Controller, ControllerOptions, PlantIn
 from cmg_mj.controllers.laws.protocol import Law
 from cmg_mj.controllers.multi_axis import MultiAxisController, YawCoupling
 from cmg_mj.controllers.processor import Processor, ProcessorController
+from cmg_mj.errors import InputError, nearest
 from cmg_mj.observers.protocol import Observer
 from cmg_mj.sensors.mems_gyro import MemsGyro
 from cmg_mj.sensors.sampled import Sensors
@@ -38,8 +39,13 @@ def make_controller(
         The controller.
 
     Raises:
-        InputError: A rate does not fit the physics step, or an option does not fit the observer or the law.
+        InputError: A rate does not fit the physics step, or an option is unknown or does not fit the observer or the
+            law.
     """
+    known = ControllerOptions.__annotations__
+    for name in options:
+        if name not in known:
+            raise InputError(f"controller: {name!r}: no such option; {nearest(name, known)}")
     if processor is None:
         return Controller(observer, law, sensors, plant, **options)
     return ProcessorController(processor, observer, law, sensors, plant, **options)

@@ -401,3 +401,13 @@ def test_a_start_between_two_samples_of_a_slow_sensor() -> None:
     data = plant.new_data()
     data.time = 0.005
     assert control(plant, controller, data)
+
+
+def test_an_option_that_no_controller_has_is_named_with_those_it_has() -> None:
+    wrong: Any = {"seed": 1, "feedbck": "fog"}
+    with pytest.raises(InputError) as caught:
+        load_plant().controller("linear", **wrong)
+    assert str(caught.value) == (
+        "controller: 'feedbck': no such option; did you mean 'feedback'? "
+        "allowed: angle_source, axis, bias_trim_s, feedback, open_loop_observers, seed, worlds"
+    )
