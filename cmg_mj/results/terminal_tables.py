@@ -11,10 +11,10 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from cmg_mj.controllers.laws.registry import OF_LAWS
+from cmg_mj.controllers.laws.registry import LAW_CLASSES
 from cmg_mj.inputs.bundled import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
-from cmg_mj.observers.registry import OF_OBSERVERS
+from cmg_mj.observers.registry import OBSERVER_CLASSES
 from cmg_mj.results import markdown
 from cmg_mj.results.summary_keys import (
     AXES,
@@ -193,12 +193,12 @@ def scenario_list() -> str:
 
 def observer_list() -> str:
     """List every observer, the defaults of its parameters, and its description."""
-    return _class_list(OF_OBSERVERS)
+    return _class_list(OBSERVER_CLASSES)
 
 
 def law_list() -> str:
     """List every control law, the defaults of its parameters, and its description."""
-    return _class_list(OF_LAWS)
+    return _class_list(LAW_CLASSES)
 
 
 def _class_list(kind: UserClassKind) -> str:

@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.controllers.controller import AngleSource, Feedback
 from cmg_mj.controllers.laws import LAWS, Law, lqr_gains, make_law, scaled_gains
-from cmg_mj.controllers.laws.registry import OF_LAWS
+from cmg_mj.controllers.laws.registry import LAW_CLASSES
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.field_types import (
     STRICT,
@@ -345,7 +345,7 @@ def _unknown_to_bench_law(fields: Mapping[str, Any]) -> list[str]:
         return []
     kind = section.get("kind", ControllerSettings().kind)
     is_bench_law = isinstance(kind, str) and kind in LAWS
-    return OF_LAWS.unknown(kind, section, ControllerSettings.model_fields) if is_bench_law else []
+    return LAW_CLASSES.unknown(kind, section, ControllerSettings.model_fields) if is_bench_law else []
 
 
 def _merged(common: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,13 +10,12 @@ from typing import Any, Literal, NamedTuple, TypedDict
 
 import numpy as np
 
-from cmg_mj.controllers.laws import Law, law_class
-from cmg_mj.controllers.laws.registry import OF_LAWS
+from cmg_mj.controllers.laws import LAW_CLASSES, Law
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.field_types import Batched, NoEffect
 from cmg_mj.inputs.marks import marked_fields
-from cmg_mj.observers.registry import takes_noise
+from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push
@@ -114,9 +113,9 @@ def _key_parts(scenario: Scenario, design: Design, axis: str) -> Iterator[tuple[
     _, model, noise = design.constructor_arguments
     yield KeyPart("reduced model", axis=axis), model
     for observer in (scenario.observer.kind, *scenario.open_loop_names()):
-        if takes_noise(observer):
+        if "noise" in OBSERVER_CLASSES.takes(observer):
             yield KeyPart("noise of observer", observer, axis), noise
-    if "noise" in OF_LAWS.takes(law):
+    if "noise" in LAW_CLASSES.takes(law):
         yield KeyPart("noise of law", axis=axis), noise
 
 
@@ -144,7 +143,9 @@ def can_vary_in_batch(field: str, law: str) -> bool:
     parts = [part for part in field.split(".") if not part.isdecimal()]
     names = [".".join(parts[: i + 1]) for i in range(len(parts))]
     mark = next((BATCHED_FIELDS[name] for name in names if name in BATCHED_FIELDS), None)
-    return mark is not None and (mark.law_field is None or mark.law_field in getattr(law_class(law), "arrays", ()))
+    if mark is None or mark.law_field is None:
+        return mark is not None
+    return mark.law_field in getattr(LAW_CLASSES.find(law), "arrays", ())
 
 
 def varied_settings(vary: Mapping[str, Sequence[Any] | np.ndarray], scenario: Scenario) -> list[dict[str, Any]]:
