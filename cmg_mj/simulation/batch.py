@@ -6,12 +6,12 @@ import copy
 import dataclasses
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypedDict
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from cmg_mj.controllers.controller import PlantInterface
 from cmg_mj.controllers.laws import LAW_CLASSES, Law
-from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.field_types import Batched, NoEffect
 from cmg_mj.inputs.marks import marked_fields
@@ -21,7 +21,6 @@ from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.batch_values import batch_values
 
 BATCHED_FIELDS = marked_fields(Scenario, Batched)
@@ -81,14 +80,6 @@ class PlantStructure(NamedTuple):
     integrator: int
     joints: tuple[str, ...]
     joint_kinds: tuple[str, ...]
-
-
-class PlantOptions(TypedDict):
-    """Options of a controller of many worlds that come from an axis of their plants."""
-
-    tilt: RadialTilt
-    backlash: Scalar
-    axis: int
 
 
 class AxisPart(NamedTuple):
@@ -173,10 +164,16 @@ def plant_structure(plant: Plant) -> PlantStructure:
     return PlantStructure(options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds)
 
 
-def plant_options(plants: Sequence[Plant], axis: int) -> PlantOptions:
-    """Find what a controller of many worlds has of an axis of their plants."""
-    tilt = batch_values([plant.axes[axis].radial_tilt for plant in plants])
-    return {"tilt": tilt, "backlash": batch_values([plant.backlash for plant in plants]), "axis": axis}
+def batched_interface(plant: Plant, plants: Sequence[Plant], axis: int) -> PlantInterface:
+    """Combine the properties that a controller of many worlds knows of an axis.
+
+    Args:
+        plant: The plant with that axis alone.
+        plants: The plant of each world.
+        axis: The number of the axis.
+    """
+    tilt = batch_values([world_plant.axes[axis].radial_tilt for world_plant in plants])
+    return plant.interface._replace(tilt=tilt, backlash=batch_values([world_plant.backlash for world_plant in plants]))
 
 
 def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant: Plant | None = None) -> None:

@@ -15,7 +15,6 @@ from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
 from cmg_mj.controllers.make_controller import AnyController, join_axes
 from cmg_mj.controllers.processor import Processor
-from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
@@ -29,15 +28,13 @@ from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.stability_check import hints
 from cmg_mj.scenario.time_grid import time_grid
-from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.batch import (
     AxisPart,
     BatchKey,
     batch_key,
     batched,
+    batched_interface,
     hashable,
-    plant_options,
     require_same_structure,
     varied_settings,
 )
@@ -94,31 +91,19 @@ class Experiment:
         Returns:
             The controller; of several axes a `MultiAxisController`.
         """
-        return self.of_axes([part.axis_controller(worlds, axis=i) for i, part in enumerate(self.parts)])
+        return self.of_axes(
+            [part.design.controller(part.plant.interface, worlds=worlds, axis=i) for i, part in enumerate(self.parts)]
+        )
 
     def axis_controller(
-        self,
-        worlds: int | Sequence[int] = 0,
-        processor: Processor | None = None,
-        *,
-        observer: Observer | None = None,
-        law: Law | None = None,
-        sensors: Sensors | None = None,
-        tilt: RadialTilt | None = None,
-        backlash: Scalar | None = None,
-        axis: int = 0,
+        self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, observer: Observer | None = None
     ) -> Controller:
         """Make a fresh controller of the only axis.
 
         Args:
             worlds: The number of one world, or the numbers of many.
             processor: Takes the decisions in the host's place.
-            observer: Instead of the scenario's, as are the next four.
-            law: The control law.
-            sensors: The sensors.
-            tilt: The tilt estimate.
-            backlash: Between the servos' motors and the gimbals [rad].
-            axis: The number of the axis, on which the noise depends.
+            observer: Instead of the scenario's.
 
         Returns:
             The controller.
@@ -128,12 +113,7 @@ class Experiment:
         """
         self.require_single_axis("one controller")
         (part,) = self.parts
-        plant = part.plant.interface
-        plant = plant if tilt is None else plant._replace(tilt=tilt)
-        plant = plant if backlash is None else plant._replace(backlash=backlash)
-        return part.design.controller(
-            plant, worlds=worlds, axis=axis, processor=processor, observer=observer, law=law, sensors=sensors
-        )
+        return part.design.controller(part.plant.interface, worlds=worlds, processor=processor, observer=observer)
 
     def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
         """Join the controllers of the axes."""
@@ -189,7 +169,10 @@ class Experiment:
             return run_batch(self.with_varied(vary), numbers, **options)
         plants = [self.plant] * len(numbers) if plants is None else list(plants)
         require_same_structure(plants, len(numbers), self.plant)
-        controllers = [part.axis_controller(numbers, **plant_options(plants, i)) for i, part in enumerate(self.parts)]
+        controllers = [
+            part.design.controller(batched_interface(part.plant, plants, i), worlds=numbers, axis=i)
+            for i, part in enumerate(self.parts)
+        ]
         return self.simulate(plants, self.of_axes(controllers), **options)
 
     @property
@@ -334,10 +317,10 @@ class Experiment:
         head = "".join(f"# {line}\n" for line in lines) + "\n" if options else ""
         return head + tomli_w.dumps(self.resolved())
 
-    def save(self, path: Path, driver: Driver = "native", world: int = 0) -> None:
+    def save(self, path: Path) -> None:
         """Write it as TOML."""
         with whole_file(path) as temporary:
-            temporary.write_text(self.as_toml(driver, world), encoding="utf-8")
+            temporary.write_text(self.as_toml(), encoding="utf-8")
 
 
 def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None = None) -> Experiment:
@@ -411,8 +394,10 @@ def batch_inputs(
         law, sensors, pushes = batched(
             [(one.design.fresh_law(), one.scenario.sensors, tuple(one.scenario.push)) for one in parts]
         )
-        options = plant_options(plants, i)
-        controllers.append(part.axis_controller(worlds, observer=observer, law=law, sensors=sensors, **options))
+        interface = batched_interface(part.plant, plants, i)
+        controllers.append(
+            part.design.controller(interface, worlds=worlds, axis=i, observer=observer, law=law, sensors=sensors)
+        )
     return plants, first.of_axes(controllers), pushes
 
 

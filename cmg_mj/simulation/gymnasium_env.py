@@ -18,6 +18,7 @@ from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.baselines import MEMS_GYRO, References
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
+from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.timing import whole_steps
 from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.experiment import Experiment, prepare
@@ -174,7 +175,9 @@ class ScissoredPairEnv(gymnasium.Env):
             return "fall"
         self._loop.step = self._steps
         _, v = self._physics.state()
-        self._controller.sample(self._steps, self._physics.axis_reading(v))
+        reading = self._physics.reading(v)
+        assert isinstance(reading, IdealReading)  # of one axis
+        self._controller.sample(self._steps, reading)
         return "end"
 
     @quiet()

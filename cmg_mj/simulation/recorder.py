@@ -7,7 +7,7 @@ from itertools import chain
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Tick
+from cmg_mj.controllers.controller import Controller, Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References
@@ -25,13 +25,10 @@ class TickRecorder:
 
     Args:
         plants: The rigs, one a world.
-        observers: The observer in the loop, then the open-loop observers.
-        extras: What each of them estimates beyond x.
+        observers: Names of the observer in the loop, then of the open-loop observers.
+        controller: The controller whose ticks they are: floats of one world, or arrays (n_worlds,).
         metrics: Takes every piece.
-        references: What the estimates are judged beside.
-        dt: Control period [s].
         keep: Whether to keep the pieces for a trajectory.
-        single: Whether the ticks hold floats (one world) or arrays (n_worlds,).
         joints: Whether to keep the joints.
     """
 
@@ -39,26 +36,24 @@ class TickRecorder:
         self,
         plants: Sequence[Plant],
         observers: Sequence[str],
-        extras: Sequence[Sequence[str]],
+        controller: Controller,
         metrics: Metrics,
-        references: References,
-        dt: float,
         *,
         keep: bool,
-        single: bool,
-        joints: bool = True,
+        joints: bool,
     ) -> None:
         self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
         names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
+        extras, seed, worlds = controller.extra_signals, controller.seed, controller.worlds
         self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), names, kinds)
         self._joints = joints
         self._estimated = [(*ESTIMATES, *names) for names in extras]
-        self._metrics = metrics
-        self._references = references
-        self._dt = dt
+        self.metrics = metrics
+        self._dt = controller.law.dt
+        self._references = References(controller.sensors.mems_gyro, self._dt, seed, worlds, controller.axis)
         self._keep = keep
-        self._single = single
+        self._single = isinstance(worlds, int)
         self._waiting: list[tuple] = []
         self._pieces: list[list[np.ndarray]] = []
 
@@ -82,7 +77,7 @@ class TickRecorder:
             return
         piece = self._piece(self._waiting)
         self._waiting = []
-        self._metrics.update(piece, self._references.rates(piece.x2))
+        self.metrics.update(piece, self._references.rates(piece.x2))
         if self._keep:
             columns, ended = piece.columns, piece.ended
             self._pieces.append(columns if ended is None else [np.where(ended, np.nan, column) for column in columns])
@@ -101,21 +96,9 @@ class TickRecorder:
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)
         named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
-        columns = [
-            x1,
-            x2,
-            x3,
-            y1,
-            y2,
-            acceleration,
-            fog,
-            u,
-            x_e,
-            push,
-            *(part for parts in estimated for part in parts),
-            *(q if self._joints else ()),
-            *(v if self._joints else ()),
-        ]
+        columns = [x1, x2, x3, y1, y2, acceleration, fog, u, x_e, push, *chain.from_iterable(estimated)]
+        if self._joints:
+            columns += [*q, *v]
         return TickBlock(x1, x2, x3, y1, fog, u, named, columns, ended)
 
     def _columns(self, ticks: Sequence) -> np.ndarray:
