@@ -11,8 +11,7 @@ from cmg_mj.controllers.controller import Controller, Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References
-from cmg_mj.results.metrics import Metrics
-from cmg_mj.results.tick_block import TickBlock
+from cmg_mj.results.metrics import Metrics, TickBlock
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.simulation.physics import Joints
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.results.metrics import Metrics
-from cmg_mj.results.tick_block import TickBlock
+from cmg_mj.results.metrics import Metrics, TickBlock
 from cmg_mj.scenario.disturbances import Push, push_windows
 from cmg_mj.scenario.schema import MetricsSettings
 
