@@ -216,7 +216,7 @@ class ScissoredPairEnv(gymnasium.Env):
         plant = self.experiment.plant
         q, v = self._physics.state()
         x1 = plant.axis.line.lean(q) + plant.bias
-        x = (x1, plant.axis.line.rate(v), plant.gimbal_angle(q))
+        x = (x1, plant.axis.line.rate(v), plant.axis.gimbal_angle(q))
         return x if all(abs(value) < MOST for value in x) else (self._fall, 0.0, 0.0)
 
     def _cost(self, u: float) -> float:

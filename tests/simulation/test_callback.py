@@ -356,7 +356,7 @@ def test_commands_reach_the_servos_in_their_directions() -> None:
         assert loop.controller.tick is not None
         u = loop.controller.tick.u
         assert loop.data.ctrl[plant.axis.servos].tolist() == [u, -u]
-        assert loop.data.ctrl[[module.motor for module in plant.modules]].tolist() == [314.0, -314.0]
+        assert loop.data.ctrl[[module.motor for module in plant.axis.modules]].tolist() == [314.0, -314.0]
 
 
 def test_rollout_runs_the_callback() -> None:
@@ -369,7 +369,9 @@ def test_rollout_runs_the_callback() -> None:
         states, _ = rollout.rollout(plant.model, mujoco.MjData(plant.model), start[None], nstep=2000)
     lean = states[0, :, 1 + plant.tilt] - plant.tilt_zero  # after the time
     assert np.abs(np.degrees(lean)).max() < 3.0
-    assert np.abs(states[0, -1, 1 + plant.model.nq + plant.modules[0].flywheel] - plant.modules[0].speed) < 1.0
+    assert (
+        np.abs(states[0, -1, 1 + plant.model.nq + plant.axis.modules[0].flywheel] - plant.axis.modules[0].speed) < 1.0
+    )
 
 
 def test_leaving_steps_out_is_said() -> None:

@@ -162,7 +162,7 @@ def _picture(found: Study) -> Picture:
     free = trajectory_of(found.free["a push of the upright rig"]).world(0)
     plant = experiment([BALANCED]).plant
     t, s, push = one.time_s, free["time_s"], pushed(free)
-    x1, x3 = one.motion.q[:, 0] - plant.tilt_zero, one.motion.q[:, 1] - plant.modules[0].gimbal_zero
+    x1, x3 = one.motion.q[:, 0] - plant.tilt_zero, one.motion.q[:, 1] - plant.axis.modules[0].gimbal_zero
     torques = [
         Line(t, one.torque, "on the bearing", color=1, width=0.5),
         Line(t, found.mean_torque, f"mean of {len(found.locked)} seeds", color=3, width=1.2),

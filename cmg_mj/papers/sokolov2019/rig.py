@@ -53,7 +53,7 @@ def estimator(name: str, prepared: Experiment, **changed: Any) -> Observer:
 def servo_of(plant: Plant) -> Servo:
     """The gimbal servo that the model file describes."""
     (servo,) = plant.axis.servos
-    (module,) = plant.modules
+    (module,) = plant.axis.modules
     dof = int(plant.model.jnt_dofadr[module.gimbal])
     return Servo(
         float(plant.model.actuator_gainprm[servo, 0]),

@@ -234,11 +234,6 @@ def _place(spec: mujoco.MjSpec, root: mujoco.MjsBody, pos: np.ndarray, quat: np.
     root.pos, root.quat = inner_pos, inner_quat
 
 
-def joint_sizes(kind: int) -> tuple[int, int]:
-    """Return how many numbers a joint of a kind has in qpos and in qvel."""
-    return {0: (7, 6), 1: (4, 3)}.get(kind, (1, 1))
-
-
 def pose_of(model: mujoco.MjModel, keyframe: str | None, path: Path) -> np.ndarray:
     """Return the joint positions in which a robot stands.
 
