@@ -3,13 +3,4 @@
 from cmg_mj.observers.protocol import NEEDS, Estimate, Measurement, Observer, needs
 from cmg_mj.observers.registry import OBSERVER_CLASSES, OBSERVERS, make_observer
 
-__all__ = [
-    "NEEDS",
-    "OBSERVERS",
-    "OBSERVER_CLASSES",
-    "Estimate",
-    "Measurement",
-    "Observer",
-    "make_observer",
-    "needs",
-]
+__all__ = ["NEEDS", "OBSERVERS", "OBSERVER_CLASSES", "Estimate", "Measurement", "Observer", "make_observer", "needs"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, Self
 
@@ -277,31 +277,29 @@ class Scenario(BaseModel):
 
         On a rig of several axes it is that of all: what an axis has of another's own goes.
         """
-        common = self.observer.kind
-        axes = {
-            name: settings
-            if settings.observer.get("kind", common) == kind
-            else settings.model_copy(update={"observer": {}})
-            for name, settings in self.axes.items()
-        }
+        common, axes = self.observer.kind, self._axes_with_kind("observer", kind)
         observer = self.observer if kind == common else ObserverSettings(kind=kind)
         return self.model_copy(update={"observer": observer, "axes": axes})
 
     def with_law(self, kind: str) -> Scenario:
         """The same experiment with another control law, with its default parameters, on all axes."""
-        common = self.controller.kind
-        axes = {
-            name: settings
-            if settings.controller.get("kind", common) == kind
-            else settings.model_copy(
-                update={"controller": {n: v for n, v in settings.controller.items() if n in COMMON_LAW_FIELDS}}
-            )
-            for name, settings in self.axes.items()
-        }
+        common, axes = self.controller.kind, self._axes_with_kind("controller", kind, COMMON_LAW_FIELDS)
         if kind == common:
             return self.model_copy(update={"axes": axes})
         fields: dict[str, Any] = {name: getattr(self.controller, name) for name in COMMON_LAW_FIELDS}
         return self.model_copy(update={"controller": ControllerSettings(**fields, kind=kind), "axes": axes})
+
+    def _axes_with_kind(
+        self, section: Literal["observer", "controller"], kind: str, shared: Collection[str] = ()
+    ) -> dict[str, AxisSettings]:
+        """The settings of the axes; of a section of another kind the fields that all kinds share are left."""
+        common, axes = getattr(self, section).kind, dict(self.axes)
+        for name, settings in self.axes.items():
+            fields: dict[str, Any] = getattr(settings, section)
+            if fields.get("kind", common) != kind:
+                fields = {field: value for field, value in fields.items() if field in shared}
+                axes[name] = settings.model_copy(update={section: fields})
+        return axes
 
     def open_loop_names(self) -> list[str]:
         """The open-loop observers, spelled out, without the observer itself."""

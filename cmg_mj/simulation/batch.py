@@ -6,7 +6,7 @@ import copy
 import dataclasses
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,28 +33,17 @@ class KeyPart(NamedTuple):
     """One of the things that worlds of one batch have in common.
 
     Attributes:
-        kind: A field of the scenario, the reduced model, or the noise that an observer or the law gets.
-        name: The field, or the observer.
+        words: A field of the scenario, or the part in words.
         axis: The axis, of several.
+        is_of_observer: Whether the part changes neither the physics nor the sensors nor the law.
     """
 
-    kind: Literal["field", "reduced model", "noise of observer", "noise of law"]
-    name: str = ""
-    axis: str = ""
-
-    @property
-    def is_of_observer(self) -> bool:
-        """Return whether the part changes neither the physics nor the sensors nor the law."""
-        return self.kind == "noise of observer" or (self.kind == "field" and self.name.partition(".")[0] == "observer")
+    words: str
+    axis: str
+    is_of_observer: bool = False
 
     def __str__(self) -> str:
-        words = {
-            "field": self.name,
-            "reduced model": "the reduced model",
-            "noise of observer": f"the sensors' noise, which {self.name} is told,",
-            "noise of law": "the noise that the law is told",
-        }[self.kind]
-        return f"axes.{self.axis}.{words}" if self.axis else words
+        return f"axes.{self.axis}.{self.words}" if self.axis else self.words
 
 
 @dataclass(frozen=True)
@@ -73,13 +62,8 @@ class BatchKey:
         return BatchKey(tuple((part, value) for part, value in self.parts if not part.is_of_observer))
 
 
-class PlantStructure(NamedTuple):
-    """Common properties of the plants of one batch."""
-
-    timestep: float
-    integrator: int
-    joints: tuple[str, ...]
-    joint_kinds: tuple[str, ...]
+PlantStructure = tuple[float, int, tuple[str, ...], tuple[str, ...]]
+"""Common properties of the plants of one batch: physics step, integrator, joints and their kinds."""
 
 
 class AxisPart(NamedTuple):
@@ -100,14 +84,14 @@ def _key_parts(scenario: Scenario, design: Design, axis: str) -> Iterator[tuple[
     law = scenario.controller.kind
     for field, value in _leaves(scenario.as_fields()):
         if field.partition(".")[0] not in UNUSED and not can_vary_in_batch(field, law):
-            yield KeyPart("field", field, axis), hashable(value)
+            yield KeyPart(field, axis, field.partition(".")[0] == "observer"), hashable(value)
     _, model, noise = design.constructor_arguments
-    yield KeyPart("reduced model", axis=axis), model
+    yield KeyPart("the reduced model", axis), model
     for observer in (scenario.observer.kind, *scenario.open_loop_names()):
         if "noise" in OBSERVER_CLASSES.takes(observer):
-            yield KeyPart("noise of observer", observer, axis), noise
+            yield KeyPart(f"the sensors' noise, which {observer} is told,", axis, is_of_observer=True), noise
     if "noise" in LAW_CLASSES.takes(law):
-        yield KeyPart("noise of law", axis=axis), noise
+        yield KeyPart("the noise that the law is told", axis), noise
 
 
 def _leaves(fields: Any, at: str = "") -> Iterator[tuple[str, Any]]:
@@ -161,7 +145,7 @@ def varied_settings(vary: Mapping[str, Sequence[Any] | np.ndarray], scenario: Sc
 def plant_structure(plant: Plant) -> PlantStructure:
     """Find what a plant has in common with all that may run with it."""
     options = plant.model.opt
-    return PlantStructure(options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds)
+    return options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds
 
 
 def batched_interface(plant: Plant, plants: Sequence[Plant], axis: int) -> PlantInterface:

@@ -225,7 +225,7 @@ class ScissoredPairEnv(gymnasium.Env):
 
     def _observed(self) -> tuple[np.ndarray, dict[str, Any]]:
         step, controller = self._loop.step, self._controller
-        forces, encoders, fog, _ = controller.readings(step)
+        forces, encoders, fog = controller.readings(step)
         x1, x2, x3 = self._state()
         tilt = controller.tilt
         extra = {
