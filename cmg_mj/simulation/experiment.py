@@ -41,10 +41,6 @@ from cmg_mj.simulation.batch import (
 from cmg_mj.simulation.prepare import check_axes, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
 
-ON_THE_BOARD = "Run on the emulated board (docs/board.md), whose numbers are not quite the host's."
-ANOTHER_WORLD = "World {world}: its noise is not that of world 0."
-"""Above a scenario that does not rerun to the same numbers by itself."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Experiment:
@@ -78,9 +74,8 @@ class Experiment:
     @property
     def observer_names(self) -> list[str]:
         """The observer in the loop, then the open-loop observers; of several axes the first one's."""
-        if self.axes:
-            return self.axes[0].observer_names
-        return [self.scenario.observer.kind, *self.scenario.open_loop_names()]
+        first = self.parts[0].scenario
+        return [first.observer.kind, *first.open_loop_names()]
 
     def controller(self, worlds: int | Sequence[int] = 0) -> AnyController:
         """Make a fresh controller.
@@ -136,7 +131,6 @@ class Experiment:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
         from cmg_mj.codegen.board import Board
 
-        self.require_single_axis("a board or other processor")
         result = self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
         return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
 
@@ -310,11 +304,14 @@ class Experiment:
 
     def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
         """The resolved scenario: running it again gives the same run; its head says if that needs options."""
-        options = [(ON_THE_BOARD, "--driver board")] if driver == "board" else []
-        options += [(ANOTHER_WORLD.format(world=world), f"--world {world}")] if world else []
-        lines = [" ".join([*(why for why, _ in options), "To the same numbers it runs with"])]
-        lines += [" ".join(["    cmg-mj run scenario.toml", *(option for _, option in options)])]
-        head = "".join(f"# {line}\n" for line in lines) + "\n" if options else ""
+        why, command = "", "cmg-mj run scenario.toml"
+        if driver == "board":
+            why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "
+            command += " --driver board"
+        if world:
+            why += f"World {world}: its noise is not that of world 0. "
+            command += f" --world {world}"
+        head = f"# {why}To the same numbers it runs with\n#     {command}\n\n" if why else ""
         return head + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:
@@ -342,13 +339,13 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
         plant = plant or plant_on_grid(scenario, grid, like)
         check_axes(scenario, plant)
     if len(plant.axes) == 1 and not scenario.axes:
-        return Experiment(scenario, plant, design(scenario, plant.parameters))
-    parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
-    axes = tuple(
-        Experiment(axis_scenario, axis_plant, design(axis_scenario, axis_plant.parameters))
-        for axis_scenario, axis_plant in parts
-    )
+        return _experiment_of_axis(scenario, plant)
+    axes = tuple(_experiment_of_axis(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names)
     return Experiment(scenario, plant, axes[0].design, axes)
+
+
+def _experiment_of_axis(scenario: Scenario, plant: Plant) -> Experiment:
+    return Experiment(scenario, plant, design(scenario, plant.parameters))
 
 
 def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:
