@@ -112,9 +112,8 @@ class Experiment:
 
     def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
         """Join the controllers of the axes."""
-        compensate = self.scenario.controller.compensate_turning
-        several = len(controllers) > 1
-        coupling = self.plant.turning if several and compensate else None
+        compensate = len(controllers) > 1 and self.scenario.controller.compensate_turning
+        coupling = self.plant.turning if compensate else None
         return join_axes(controllers, coupling, self.scenario.sensors.mems_gyro)
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
@@ -214,8 +213,7 @@ class Experiment:
         for name, value in values.items():
             assign(fields, name, value, f"vary: {name!r}")
         settings = ", ".join(f"{name}={value}" for name, value in values.items())
-        scenario = parse_scenario(fields, f"{self.scenario.source} with {settings}".strip())
-        return prepare(scenario, like=self.plant)
+        return prepare(parse_scenario(fields, f"{self.scenario.source} with {settings}".strip()), like=self.plant)
 
     def simulate(
         self,
@@ -383,8 +381,7 @@ def batch_inputs(
         worlds: The worlds' numbers.
         observer: The observer of all worlds instead of the first experiment's.
     """
-    plants = [experiment.plant for experiment in experiments]
-    first = experiments[0]
+    first, plants = experiments[0], [experiment.plant for experiment in experiments]
     controllers, pushes = [], ()
     for i, part in enumerate(first.parts):
         parts = [experiment.parts[i] for experiment in experiments]
