@@ -11,10 +11,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from cmg_mj.controllers.laws.registry import LAW_CLASSES
 from cmg_mj.inputs.bundled import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
-from cmg_mj.observers.registry import OBSERVER_CLASSES
 from cmg_mj.results import markdown
 from cmg_mj.results.summary_keys import (
     AXES,
@@ -191,17 +189,8 @@ def scenario_list() -> str:
     return "\n".join(["Scenarios", *(f"  {name:{width}}  {load_scenario(name).title}" for name in names)])
 
 
-def observer_list() -> str:
-    """List every observer, the defaults of its parameters, and its description."""
-    return _class_list(OBSERVER_CLASSES)
-
-
-def law_list() -> str:
-    """List every control law, the defaults of its parameters, and its description."""
-    return _class_list(LAW_CLASSES)
-
-
-def _class_list(kind: UserClassKind) -> str:
+def class_list(kind: UserClassKind) -> str:
+    """List every observer, or every control law, the defaults of its parameters, and its description."""
     width = max(len(name) for name in kind.known)
     lines = [f"{kind.what.capitalize()}s, and the defaults of their parameters (--set {kind.section}.NAME=VALUE)"]
     for name in kind.known:

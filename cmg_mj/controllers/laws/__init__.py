@@ -2,8 +2,7 @@
 
 from cmg_mj.controllers.laws.protocol import FeedbackState, Law
 from cmg_mj.controllers.laws.registry import LAW_CLASSES, LAWS, make_law
-from cmg_mj.controllers.laws.scaled_gains import scaled_gains
-from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS, StateFeedback, lqr_gains
+from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS, StateFeedback, lqr_gains, scaled_gains
 
 __all__ = [
     "LAWS",
