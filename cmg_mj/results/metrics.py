@@ -25,7 +25,7 @@ class TickBlock(NamedTuple):
         fog: The gyro's rate [rad/s].
         u: Command [rad/s].
         estimates: Signal -> values, for the observer in the loop and each open-loop observer; `x2_rad_s` among them.
-        columns: The trajectory's columns after its time, in its order.
+        columns: The trajectory's columns after its time, by name.
         ended: Which worlds have ended; None for one world.
     """
 
@@ -36,7 +36,7 @@ class TickBlock(NamedTuple):
     fog: np.ndarray
     u: np.ndarray
     estimates: list[dict[str, np.ndarray]]
-    columns: list[np.ndarray]
+    columns: dict[str, np.ndarray]
     ended: np.ndarray | None
 
 

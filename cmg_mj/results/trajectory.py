@@ -84,6 +84,10 @@ class Layout:
         """List all columns after `time_s`, in order."""
         return [*self._signals(), *self.positions(), *self.rates()]
 
+    def named(self, columns: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+        """Name the columns after `time_s`, given in order."""
+        return dict(zip(self.columns(), columns, strict=True))
+
     def _signals(self) -> list[str]:
         """List the columns that are no joints'."""
         if self.axes:

@@ -293,9 +293,10 @@ class Scenario(BaseModel):
         self, section: Literal["observer", "controller"], kind: str, shared: Collection[str] = ()
     ) -> dict[str, AxisSettings]:
         """The settings of the axes; of a section of another kind the fields that all kinds share are left."""
-        common, axes = getattr(self, section).kind, dict(self.axes)
+        is_observer, axes = section == "observer", dict(self.axes)
+        common = self.observer.kind if is_observer else self.controller.kind
         for name, settings in self.axes.items():
-            fields: dict[str, Any] = getattr(settings, section)
+            fields = settings.observer if is_observer else settings.controller
             if fields.get("kind", common) != kind:
                 fields = {field: value for field, value in fields.items() if field in shared}
                 axes[name] = settings.model_copy(update={section: fields})

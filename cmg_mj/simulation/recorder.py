@@ -54,7 +54,7 @@ class TickRecorder:
         self._keep = keep
         self._single = isinstance(worlds, int)
         self._waiting: list[tuple] = []
-        self._pieces: list[list[np.ndarray]] = []
+        self._pieces: list[dict[str, np.ndarray]] = []
 
     def add(self, q: Joints, v: Joints, tick: Tick, torque: Scalar, running: np.ndarray | None) -> None:
         """Take one tick.
@@ -79,7 +79,9 @@ class TickRecorder:
         self.metrics.update(piece, self._references.rates(piece.x2))
         if self._keep:
             columns, ended = piece.columns, piece.ended
-            self._pieces.append(columns if ended is None else [np.where(ended, np.nan, column) for column in columns])
+            if ended is not None:
+                columns = {name: np.where(ended, np.nan, column) for name, column in columns.items()}
+            self._pieces.append(columns)
 
     def _piece(self, waiting: Sequence[tuple]) -> TickBlock:
         qs, vs, ticks, torques, runnings = zip(*waiting, strict=True)
@@ -95,10 +97,9 @@ class TickRecorder:
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)
         named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
-        columns = [x1, x2, x3, y1, y2, acceleration, fog, u, x_e, push, *chain.from_iterable(estimated)]
-        if self._joints:
-            columns += [*q, *v]
-        return TickBlock(x1, x2, x3, y1, fog, u, named, columns, ended)
+        joints = [*q, *v] if self._joints else []
+        signals = [x1, x2, x3, y1, y2, acceleration, fog, u, x_e, push, *chain.from_iterable(estimated), *joints]
+        return TickBlock(x1, x2, x3, y1, fog, u, named, self._layout.named(signals), ended)
 
     def _columns(self, ticks: Sequence) -> np.ndarray:
         """(n_ticks, n_signals[, n_worlds]) -> (n_signals, n_ticks, n_worlds)."""
@@ -122,12 +123,12 @@ class TickRecorder:
             pieces = [*pieces, self._piece(self._waiting).columns]
         return self._joined(pieces, TICKS_A_PIECE * first).from_tick(tick - TICKS_A_PIECE * first)
 
-    def _joined(self, pieces: Sequence[list[np.ndarray]], first: int) -> Trajectory:
+    def _joined(self, pieces: Sequence[Mapping[str, np.ndarray]], first: int) -> Trajectory:
         """Pieces as one trajectory, whose first tick has this number."""
         columns = {}
         names = self._layout.columns()
-        for i, name in enumerate(names):
-            whole = np.concatenate([piece[i] for piece in pieces]) if pieces else np.zeros((0, len(self._bias)))
+        for name in names:
+            whole = np.concatenate([piece[name] for piece in pieces]) if pieces else np.zeros((0, len(self._bias)))
             columns[name] = whole[:, 0] if self._single else whole
         n_ticks = len(columns[names[0]])
         return Trajectory({"time_s": np.arange(first, first + n_ticks) * self._dt, **columns}, layout=self._layout)
