@@ -50,7 +50,7 @@ def generate_code(controller: Controller, precision: Literal["double", "single"]
 
 def write_code(out: Path | RunFolder, code: Code) -> list[Path]:
     """Write the files of a generated code."""
-    from cmg_mj.results.run_folder import claimed, write_text
+    from cmg_mj.results.run_folder.folder import claimed, write_text
 
     with claimed(out, code.files) as folder:
         place = folder.write(
