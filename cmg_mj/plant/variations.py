@@ -30,11 +30,7 @@ YAW_SERVO = "yaw_servo"
 
 
 def vary(
-    model: mujoco.MjModel,
-    settings: PlantSettings,
-    path: Path,
-    axes: Sequence[Axis],
-    held: Sequence[Module] = (),
+    model: mujoco.MjModel, settings: PlantSettings, path: Path, axes: Sequence[Axis], held: Sequence[Module] = ()
 ) -> None:
     """Change a compiled model as its settings say.
 

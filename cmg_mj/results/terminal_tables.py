@@ -146,12 +146,7 @@ def summary_table(summary: Mapping[str, SummaryValue]) -> Group:
     ends = {"done": "stood to the end, {:g} s", "fell": "fell at {:.2f} s"}
     outcome = str(summary["outcome"])
     end = ends.get(outcome, outcome + " at {:g} s").format(summary["end_time_s"])
-    table = Table(
-        title=_title(run_title(summary)),
-        box=box.SIMPLE_HEAD,
-        title_justify="left",
-        show_header=False,
-    )
+    table = Table(title=_title(run_title(summary)), box=box.SIMPLE_HEAD, title_justify="left", show_header=False)
     axes = section(summary, AXES) or {"": summary}
     table.show_header = len(axes) > 1
     table.add_column()

@@ -171,9 +171,7 @@ def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant:
         )
 
 
-def batched(
-    worlds: Sequence[tuple[Law, Sensors, tuple[Push, ...]]],
-) -> tuple[Law, Sensors, tuple[Push, ...]]:
+def batched(worlds: Sequence[tuple[Law, Sensors, tuple[Push, ...]]]) -> tuple[Law, Sensors, tuple[Push, ...]]:
     """Law, sensors and pushes of many worlds as one, with arrays (n_worlds,) where they differ."""
     laws, sensors, pushes = zip(*worlds, strict=True)
     return _batched_law(laws), batch_values(sensors), tuple(batch_values(push) for push in zip(*pushes, strict=True))

@@ -13,10 +13,7 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.plant.mjcf import compile_model, parse
 from cmg_mj.plant.mounting.held_joints import joint_held, unused_name
 
-BAD_CONNECTIONS = {
-    int(mujoco.mjtEq.mjEQ_CONNECT): "connect",
-    int(mujoco.mjtEq.mjEQ_WELD): "weld",
-}
+BAD_CONNECTIONS = {int(mujoco.mjtEq.mjEQ_CONNECT): "connect", int(mujoco.mjtEq.mjEQ_WELD): "weld"}
 UNNAMED = "MuJoCo Model"
 """What MuJoCo calls a model that has no name."""
 NEEDED = {
