@@ -65,13 +65,8 @@ PlantStructure = tuple[float, int, tuple[str, ...], tuple[str, ...]]
 """Common properties of the plants of one batch: physics step, integrator, joints and their kinds."""
 
 
-class AxisPart(NamedTuple):
-    """An axis of an experiment."""
-
-    scenario: Scenario
-    design: Design
-    axis: str
-    """Its name; empty on a plant of one axis."""
+AxisPart = tuple[Scenario, Design, str]
+"""An axis of an experiment: its scenario, its design, its name, which is empty on a plant of one axis."""
 
 
 def batch_key(parts: Sequence[AxisPart]) -> BatchKey:

@@ -13,7 +13,8 @@ import tomli_w
 
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
-from cmg_mj.controllers.make_controller import AnyController, join_axes
+from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.controllers.processor import Processor
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.overrides import assign
@@ -29,7 +30,6 @@ from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.stability_check import hints
 from cmg_mj.scenario.time_grid import time_grid
 from cmg_mj.simulation.batch import (
-    AxisPart,
     BatchKey,
     batch_key,
     batched,
@@ -106,15 +106,15 @@ class Experiment:
         Raises:
             InputError: The plant has several axes.
         """
-        self.require_single_axis("one controller")
-        (part,) = self.parts
+        part = self.require_single_axis("one controller")
         return part.design.controller(part.plant.interface, worlds=worlds, processor=processor, observer=observer)
 
     def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
-        """Join the controllers of the axes."""
-        compensate = len(controllers) > 1 and self.scenario.controller.compensate_turning
-        coupling = self.plant.turning if compensate else None
-        return join_axes(controllers, coupling, self.scenario.sensors.mems_gyro)
+        """Join the controllers of the axes; of one axis its controller itself."""
+        if len(controllers) == 1:
+            return controllers[0]
+        coupling = self.plant.turning if self.scenario.controller.compensate_turning else None
+        return MultiAxisController(controllers, coupling, self.scenario.sensors.mems_gyro)
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world. Options are those of `simulate`."""
@@ -172,7 +172,7 @@ class Experiment:
     def batch_key(self) -> BatchKey:
         """Key that its worlds share with all worlds that may run in one batch with them."""
         return batch_key(
-            [AxisPart(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
+            [(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
         )
 
     @property
@@ -192,10 +192,9 @@ class Experiment:
         Raises:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
-        rows = varied_settings(vary, self.scenario)
-        keys = [hashable(row) for row in rows]
-        experiments = {key: self.with_settings(row) for key, row in dict(zip(keys, rows, strict=True)).items()}
-        return [experiments[key] for key in keys]
+        keyed = [(hashable(row), row) for row in varied_settings(vary, self.scenario)]
+        experiments = {key: self.with_settings(row) for key, row in dict(keyed).items()}
+        return [experiments[key] for key, _ in keyed]
 
     def with_settings(self, values: Mapping[str, Any]) -> Experiment:
         """The same with other values of some fields.
@@ -248,8 +247,8 @@ class Experiment:
             **options,
         )
 
-    def require_single_axis(self, what: str) -> None:
-        """Refuse a plant of several axes.
+    def require_single_axis(self, what: str) -> Experiment:
+        """Return the experiment of the only axis, and refuse a plant of several.
 
         Args:
             what: The operation that takes one axis, for the message.
@@ -263,6 +262,7 @@ class Experiment:
                 f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one; lock the "
                 f'others, as with --set plant.locked_axes=["{names[-1]}"]'
             )
+        return self.parts[0]
 
     @property
     def hints(self) -> list[str]:

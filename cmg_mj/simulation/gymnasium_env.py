@@ -145,9 +145,7 @@ class ScissoredPairEnv(gymnasium.Env):
         return changed
 
     def _start(self, experiment: Experiment, seed: int) -> None:
-        experiment.require_single_axis("an environment")
-        self.experiment = experiment
-        (part,) = experiment.parts
+        self.experiment, part = experiment, experiment.require_single_axis("an environment")
         scenario = part.scenario.model_copy(update={"seed": seed, "open_loop_observers": []})
         plant, timestep = experiment.plant, experiment.plant.timestep
         self._physics = OneWorld(plant)
