@@ -205,6 +205,8 @@ def list_names(what: str | None) -> None:
 
     Parameters are shown with their defaults; change them with --set observer.NAME=VALUE or controller.NAME=VALUE.
     """
+    from cmg_mj.controllers.laws import LAW_CLASSES
+    from cmg_mj.observers import OBSERVER_CLASSES
     from cmg_mj.results import terminal_tables as report
 
     if what in (None, "scenarios"):
@@ -212,11 +214,11 @@ def list_names(what: str | None) -> None:
     if what is None:
         click.echo()
     if what in (None, "observers"):
-        click.echo(report.observer_list())
+        click.echo(report.class_list(OBSERVER_CLASSES))
     if what is None:
         click.echo()
     if what in (None, "laws"):
-        click.echo(report.law_list())
+        click.echo(report.class_list(LAW_CLASSES))
 
 
 @click.command(short_help="Check a scenario file, or a model file, without running it.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from cmg_mj.elementwise import Scalar
@@ -102,10 +103,15 @@ def needs(observer: Observer | type) -> tuple[str, ...]:
     Raises:
         InputError: It names something else.
     """
-    named = tuple(getattr(observer, "needs", ("model", "gimbals")))
+    return check_needs(getattr(observer, "needs", ("model", "gimbals")), NEEDS)
+
+
+def check_needs(names: Iterable[str], known: Sequence[str]) -> tuple[str, ...]:
+    """Refuse what an observer or a law says that it needs if there is no such input."""
+    named = tuple(names)
     for name in named:
-        if name not in NEEDS:
-            raise InputError(f"needs = {named!r}: there is no {name!r}; {nearest(str(name), NEEDS)}")
+        if name not in known:
+            raise InputError(f"needs = {named!r}: there is no {name!r}; {nearest(str(name), known)}")
     return named
 
 

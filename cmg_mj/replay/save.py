@@ -83,7 +83,7 @@ def signals(replayed: ReplayResult) -> Trajectory:
     for kind in names:
         columns |= {f"estimate/{kind}/{name}": values for name, values in replayed.estimates[kind].items()}
     metadata = {"replay": finite(log_figures(replayed))}
-    return Trajectory(columns, metadata, Layout(names, extra))
+    return Trajectory(columns, metadata, Layout(names, extra, ()))
 
 
 def _record(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:

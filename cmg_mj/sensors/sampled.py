@@ -185,18 +185,14 @@ def sampled_sensors(
         return normals(seed, worlds, stream.on_axis(axis), channels) if channels else itertools.repeat(())
 
     pair = sensors.accelerometer
-    drift = (
-        _flicker_source(pair, noise(NoiseStream.FLICKER, len(CORNERS_HZ) * pair.channels))
-        if pair.bias_instability_ug
-        else None
-    )
+    flicker_noise = noise(NoiseStream.FLICKER, len(CORNERS_HZ) * pair.channels)
+    drift = _flicker_source(pair, flicker_noise) if pair.bias_instability_ug else None
     kind = UnevenPair if pair.skew_s or pair.bandwidth_hz else SampledSensor[Forces]
     encoder, fog = sensors.encoder, sensors.fog
-    of_pair = noise(NoiseStream.ACCELEROMETER, pair.channels)
-    of_encoder = noise(NoiseStream.ENCODER, encoder.channels)
-    of_fog = noise(NoiseStream.FOG, fog.channels)
+    pair_noise = noise(NoiseStream.ACCELEROMETER, pair.channels)
+    encoder_noise, fog_noise = noise(NoiseStream.ENCODER, encoder.channels), noise(NoiseStream.FOG, fog.channels)
     return (
-        kind(pair, timestep, of_pair, "sensors.accelerometer", pair.make_reading_function(drift)),
-        SampledSensor(encoder, timestep, of_encoder, "sensors.encoder", encoder.make_reading_function()),
-        SampledSensor(fog, timestep, of_fog, "sensors.fog", fog.make_reading_function()),
+        kind(pair, timestep, pair_noise, "sensors.accelerometer", pair.make_reading_function(drift)),
+        SampledSensor(encoder, timestep, encoder_noise, "sensors.encoder", encoder.make_reading_function()),
+        SampledSensor(fog, timestep, fog_noise, "sensors.fog", fog.make_reading_function()),
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmg_mj.plant.mujoco_state import quiet
-from cmg_mj.results.per_world_table import save_table
+from cmg_mj.results.files import write_parquet
 from cmg_mj.results.result import Driver, Outcome, Result
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
@@ -172,7 +172,7 @@ def save_comparison(
     writers = (
         *(report.trajectory.save for report in reports),
         lambda path: _write_json(path, standings(observers)),
-        lambda path: save_table(path, worlds_table(observers), {"scenario": experiment.resolved()}),
+        lambda path: write_parquet(path, worlds_table(observers), {"scenario": experiment.resolved()}),
         experiment.save,
         lambda path: write_recording(path, header, [run for report in reports for run in report.runs]),
         lambda path: plot_worlds(path, observers, experiment.scenario.title),

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.observers import OBSERVERS, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS
 from cmg_mj.observers.protocol import needs
 from cmg_mj.results.summary_keys import open_loop_figures
 from tests.acceptance.cases import GROUP, closed_loop, open_loop_run
 
 SEED = 7
 ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
-TILT_ONLY = [name for name in OBSERVERS if not needs(observer_class(name))]
+TILT_ONLY = [name for name in OBSERVERS if not needs(OBSERVER_CLASSES.find(name))]
 
 
 def loop(name: str, key: str, reference: str | None = None, worlds: int = GROUP) -> np.ndarray:

@@ -209,7 +209,7 @@ KEYFRAME_ANGLES = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966
         {"rig": ('width="256"', 'width="100000000"')},
         "<texture width='100000000'>: at most 10000",
     ),
-    ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml is not UTF-8 text (at byte "),
+    ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml: not UTF-8 text (at byte "),
 )
 def test_a_model_that_is_set_wrongly(wrong_input: dict[str, Any], fragments: list[str]) -> None:
     assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.observers import BENCH_PARAMETERS, OBSERVERS, Estimate, Measurement
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement
 from tests.observers.reference import DT, PAPER, observer, rough_signals
 from tests.plant import paper_model as paper
 
@@ -162,7 +162,9 @@ def positive_gains() -> list[tuple[str, str]]:
     result = []
     for kind in EVERY:
         estimator: Any = observer(kind)
-        names = [field.name for field in dataclasses.fields(estimator) if field.name not in BENCH_PARAMETERS]
+        names = [
+            field.name for field in dataclasses.fields(estimator) if field.name not in OBSERVER_CLASSES.bench_parameters
+        ]
         result += [
             (kind, name) for name in names if isinstance(value := getattr(estimator, name), float) and value > 0.0
         ]

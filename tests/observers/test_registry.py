@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.simulation.experiment import prepare
@@ -51,7 +51,7 @@ USER_OBSERVER = f"{__name__}:Mine"
 def test_every_name_makes_its_observer(kind: str) -> None:
     result = make_observer(kind, DT, PAPER, NOISE)
     assert f"{type(result).__module__}:{type(result).__name__}" == OBSERVERS[kind]
-    assert observer_class(OBSERVERS[kind]) is type(result)
+    assert OBSERVER_CLASSES.find(OBSERVERS[kind]) is type(result)
 
 
 def test_a_users_class_by_dotted_path() -> None:

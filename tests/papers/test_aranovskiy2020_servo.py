@@ -24,10 +24,10 @@ def test_a_gimbal_with_a_deadband_of_a_tenth(command: float, expected: float) ->
     plant = load_plant(timestep_s=0.001, initial_tilt_deg=0.0, equilibrium_bias_deg=0.0)
     servo.in_velocity_mode(plant, 0.1)
     data = plant.new_data()
-    for module in plant.modules:
+    for module in plant.axis.modules:
         data.ctrl[module.servo] = module.direction * command
     mujoco.mj_step(plant.model, data, 20)
-    for module in plant.modules:
+    for module in plant.axis.modules:
         assert module.direction * data.qvel[module.gimbal] == pytest.approx(expected, abs=0.01)
 
 

@@ -115,7 +115,7 @@ def sinusoidal_commands(n_periods: int, plant: Plant, seed: int) -> np.ndarray:
     time_s = CONTROL_PERIOD_S * np.arange(n_periods)[:, None]
     wave = np.sin(2.0 * math.pi * frequency_hz * time_s + phase)
     amplitude, mean = np.zeros(4), np.zeros(4)
-    for module in plant.modules:
+    for module in plant.axis.modules:
         amplitude[[module.servo, module.motor]] = 1.5, 20.0
         mean[module.motor] = module.speed
     return mean + amplitude * wave
@@ -157,7 +157,7 @@ def work_balance(settings: PlantSettings, duration_s: float, seed: int) -> Balan
     n_periods = round(duration_s / CONTROL_PERIOD_S)
     command = sinusoidal_commands(n_periods, plant, seed)
     qpos, qvel = initial_states(seed)
-    for module in plant.modules:
+    for module in plant.axis.modules:
         qvel[:, module.flywheel] = module.speed
     run = motion(model, qpos, qvel, n_periods * STEPS, np.repeat(command, STEPS, axis=1))
 

@@ -92,7 +92,7 @@ def test_accelerations_are_those_of_euler_lagrange(plant: Plant, rng: np.random.
 def test_reduced_parameters_are_those_of_table_1(plant: Plant) -> None:
     table_1 = ReducedModel(paper.J1, paper.J2, paper.J_d, paper.omega_d, paper.gravity_torque, gimbals=2)
     np.testing.assert_allclose(astuple(plant.reduced), astuple(table_1), rtol=1e-12)
-    assert [module.direction for module in plant.modules] == [1.0, -1.0]
+    assert [module.direction for module in plant.axis.modules] == [1.0, -1.0]
 
 
 # --- the equilibrium bias e ---------------------------------------------------------------------------------

@@ -87,10 +87,10 @@ def swing(plant: Plant, legs: list[tuple[float, float]]) -> Swing:
     samples = []
     for k in range(round(DURATION_S / HALF_STEP_S) + 1):
         u = rates[int(np.searchsorted(ends_s, k * HALF_STEP_S, side="right"))]
-        for module in plant.modules:
+        for module in plant.axis.modules:
             data.ctrl[module.servo], data.ctrl[module.motor] = module.direction * u, module.speed
         mujoco.mj_forward(plant.model, data)
-        module = plant.modules[0]
+        module = plant.axis.modules[0]
         samples.append(
             (
                 data.qpos[plant.tilt] - UPRIGHT,
@@ -175,7 +175,7 @@ def test_linearisation_is_the_slope_of_the_full_model(model: str) -> None:
     directions = np.zeros((3, 2 * n))
     directions[0, plant.tilt] = 1.0
     directions[1, n + plant.tilt] = 1.0
-    for module in plant.modules:
+    for module in plant.axis.modules:
         directions[2, n + module.gimbal] = module.direction
     rows = np.concatenate([qpos, qvel]) + h * np.stack([directions, -directions], axis=1).reshape(6, 2 * n)
     data_at = states(passive(plant), rows[:, :n], rows[:, n:])

@@ -63,11 +63,11 @@ def test_a_servo_by_settings_is_that_of_a_file(tmp_path: Path) -> None:
 def servo_torques(plant: Plant, error: float, rate: float) -> list[float]:
     """Return the torques of both servos with the setpoint ahead of the gimbal, which turns [N m]."""
     data = plant.new_data()
-    for i, module in enumerate(plant.modules):
+    for i, module in enumerate(plant.axis.modules):
         data.act[i] = data.qpos[module.gimbal] + error
         data.qvel[module.gimbal] = rate
     mujoco.mj_forward(plant.model, data)
-    return [float(data.qfrc_actuator[module.gimbal]) for module in plant.modules]
+    return [float(data.qfrc_actuator[module.gimbal]) for module in plant.axis.modules]
 
 
 @pytest.mark.parametrize("arguments", [{}, {"kp": KP}, {"kv": KV}, {"kp": KP, "kv": KV}])
@@ -83,11 +83,11 @@ def test_with_a_gear_they_count_at_the_joint(tmp_path: Path) -> None:
     path = edit(tmp_path, "cube.xml", ('(name="gimbal_servo")', r'\1 gear="2"'))
     plant = load_plant(model=str(path), servo_stiffness_n_m_rad=KP, servo_damping_n_m_s_rad=KV)
     data = plant.new_data()
-    for i, module in enumerate(plant.modules):
+    for i, module in enumerate(plant.axis.modules):
         data.act[i] = 2.0 * (data.qpos[module.gimbal] + 0.02)  # what the servo sees of a turn
         data.qvel[module.gimbal] = 0.3
     mujoco.mj_forward(plant.model, data)
-    assert data.qfrc_actuator[plant.modules[0].gimbal] == pytest.approx(KP * 0.02 - KV * 0.3, rel=1e-12)
+    assert data.qfrc_actuator[plant.axis.modules[0].gimbal] == pytest.approx(KP * 0.02 - KV * 0.3, rel=1e-12)
 
 
 def test_a_stiffer_servo_gets_a_smaller_step() -> None:
@@ -124,19 +124,20 @@ def test_the_momentum_is_inertia_times_speed(model: str) -> None:
     """Turned a quarter back, a wheel spins about the tilt axis: its share of the angular momentum there is J w."""
     J_d, speed = paper.J_d, 123.0
     plant = load_plant(model=model, flywheel_speed_rad_s=speed)
-    assert [abs(module.speed) for module in plant.modules] == [speed] * len(plant.modules)
+    assert [abs(module.speed) for module in plant.axis.modules] == [speed] * len(plant.axis.modules)
     assert plant.reduced.omega_d == pytest.approx(speed, rel=1e-12)
     assert plant.reduced.J_d * plant.reduced.omega_d == pytest.approx(J_d * speed, rel=1e-12)
     default_plant = load_plant(model=model)
-    assert [module.direction for module in plant.modules] == [module.direction for module in default_plant.modules]
+    directions = [[module.direction for module in rig.axis.modules] for rig in (plant, default_plant)]
+    assert directions[0] == directions[1]
     assert replace(plant.reduced, omega_d=default_plant.reduced.omega_d) == default_plant.reduced
     data = plant.new_data()
-    for module in plant.modules:
+    for module in plant.axis.modules:
         data.qpos[module.gimbal] = module.gimbal_zero - module.direction * math.pi / 2.0
     mujoco.mj_forward(plant.model, data)
     mujoco.mj_subtreeVel(plant.model, data)
-    momentum = data.subtree_angmom[plant.frame] @ data.xaxis[plant.tilt]
-    assert momentum == pytest.approx(len(plant.modules) * J_d * speed, rel=1e-12)
+    momentum = data.subtree_angmom[plant.axis.frame] @ data.xaxis[plant.tilt]
+    assert momentum == pytest.approx(len(plant.axis.modules) * J_d * speed, rel=1e-12)
 
 
 def test_a_gimbals_rate_turns_that_much_momentum() -> None:
@@ -145,7 +146,7 @@ def test_a_gimbals_rate_turns_that_much_momentum() -> None:
     for speed in (157.0, 314.0):
         plant = load_plant(equilibrium_bias_deg=0.0, initial_tilt_deg=0.0, flywheel_speed_rad_s=speed)
         data = plant.new_data()
-        for module in plant.modules:
+        for module in plant.axis.modules:
             data.qvel[module.gimbal] = 0.5 * module.direction
         mujoco.mj_forward(plant.model, data)
         torques.append(-float(data.qfrc_bias[plant.tilt]))
@@ -164,7 +165,7 @@ def test_changed_back_it_is_the_rig_it_was() -> None:
     plant = load_plant()
     slow = plant.changed(PlantSettings(flywheel_speed_rad_s=100.0))
     back = slow.changed(PlantSettings())
-    assert (back.modules, back.reduced) == (plant.modules, plant.reduced)
+    assert (back.axis.modules, back.reduced) == (plant.axis.modules, plant.reduced)
     assert slow.reduced.omega_d == pytest.approx(100.0)
     np.testing.assert_array_equal(back.model.key_qvel, plant.model.key_qvel)
 

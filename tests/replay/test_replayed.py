@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
-from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
 from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
 from cmg_mj.replay.logs import Log, ReadOptions, read_log
@@ -103,7 +103,7 @@ def test_who_takes_part(tmp_path: Path) -> None:
             inputs = signals | ({"model"} if model else set())
             result = replay_log(one, model=model)
             for kind in OBSERVERS:
-                missing_inputs = set(needs(observer_class(kind))) - inputs
+                missing_inputs = set(needs(OBSERVER_CLASSES.find(kind))) - inputs
                 assert (kind in result.left_out) == bool(missing_inputs), kind
                 assert (kind in result.estimates) != bool(missing_inputs), kind
     assert "needs a model (--model)" in replay_log(plain).left_out["ltv"]
@@ -119,7 +119,7 @@ def test_of_a_pendulum_without_gimbals_the_model_alone_is_enough(tmp_path: Path)
 def test_observers_that_need_no_model_do_not_look_at_it() -> None:
     """They are given one of NaN; whatever is made of it is no number."""
     for kind in OBSERVERS:
-        if "model" not in needs(observer_class(kind)):
+        if "model" not in needs(OBSERVER_CLASSES.find(kind)):
             observer = make_observer(kind, DT, NO_MODEL, TiltNoise(1e-3, 1.0, 0.5))
             _, estimate = observer.step(observer.init(Measurement(0.1, 0.0, 0.2)), Measurement(0.11, 0.0, 0.2), 0.0)
             assert np.isfinite(list(estimate)).all(), kind

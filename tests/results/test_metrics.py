@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.results.metrics import Metrics
-from cmg_mj.results.tick_block import TickBlock
+from cmg_mj.results.metrics import Metrics, TickBlock
 from cmg_mj.scenario.disturbances import Push, push_windows
 from cmg_mj.scenario.schema import MetricsSettings
 
@@ -50,7 +49,7 @@ def estimates(rates: Iterable[np.ndarray]) -> list[dict[str, np.ndarray]]:
 
 def block(estimates: list[dict[str, np.ndarray]], **signals: np.ndarray) -> TickBlock:
     """Ticks of which nothing but these signals is known."""
-    return TickBlock(**signals, y1=signals["x1"], estimates=estimates, columns=[], ended=None)
+    return TickBlock(**signals, y1=signals["x1"], estimates=estimates, columns={}, ended=None)
 
 
 def summary(run: Metrics, n: int = len(T), fell: bool = False, rates: tuple = (0.0,), **signals: Any) -> dict[str, Any]:

@@ -296,7 +296,7 @@ def test_vibration_of_unbalanced_wheels_at_the_accelerometers() -> None:
         forces = []
         for plant in plants:
             data = plant.new_data()
-            for module in plant.modules:
+            for module in plant.axis.modules:
                 data.qpos[module.flywheel] += math.copysign(angle, module.speed)
             mujoco.mj_forward(plant.model, data)
             forces.append(plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist()).accelerations)

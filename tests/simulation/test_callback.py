@@ -356,7 +356,7 @@ def test_commands_reach_the_servos_in_their_directions() -> None:
         assert loop.controller.tick is not None
         u = loop.controller.tick.u
         assert loop.data.ctrl[plant.axis.servos].tolist() == [u, -u]
-        assert loop.data.ctrl[[module.motor for module in plant.modules]].tolist() == [314.0, -314.0]
+        assert loop.data.ctrl[[module.motor for module in plant.axis.modules]].tolist() == [314.0, -314.0]
 
 
 def test_rollout_runs_the_callback() -> None:
@@ -369,7 +369,9 @@ def test_rollout_runs_the_callback() -> None:
         states, _ = rollout.rollout(plant.model, mujoco.MjData(plant.model), start[None], nstep=2000)
     lean = states[0, :, 1 + plant.tilt] - plant.tilt_zero  # after the time
     assert np.abs(np.degrees(lean)).max() < 3.0
-    assert np.abs(states[0, -1, 1 + plant.model.nq + plant.modules[0].flywheel] - plant.modules[0].speed) < 1.0
+    assert (
+        np.abs(states[0, -1, 1 + plant.model.nq + plant.axis.modules[0].flywheel] - plant.axis.modules[0].speed) < 1.0
+    )
 
 
 def test_leaving_steps_out_is_said() -> None:
@@ -401,3 +403,13 @@ def test_a_start_between_two_samples_of_a_slow_sensor() -> None:
     data = plant.new_data()
     data.time = 0.005
     assert control(plant, controller, data)
+
+
+def test_an_option_that_no_controller_has_is_named_with_those_it_has() -> None:
+    wrong: Any = {"seed": 1, "feedbck": "fog"}
+    with pytest.raises(InputError) as caught:
+        load_plant().controller("linear", **wrong)
+    assert str(caught.value) == (
+        "controller: 'feedbck': no such option; did you mean 'feedback'? "
+        "allowed: angle_source, axis, bias_trim_s, feedback, open_loop_observers, seed, worlds"
+    )

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, nearest
-from cmg_mj.observers.protocol import Estimate, Measurement, State
+from cmg_mj.observers.protocol import Estimate, Measurement, State, check_needs
 
 
 class FeedbackState(Estimate):
@@ -88,8 +87,4 @@ def needs(law: Law | type[Law]) -> tuple[str, ...]:
     Raises:
         InputError: It names something else.
     """
-    named = tuple(getattr(law, "needs", NEEDS))
-    for name in named:
-        if name not in NEEDS:
-            raise InputError(f"needs = {named!r}: there is no {name!r}; {nearest(str(name), NEEDS)}")
-    return named
+    return check_needs(getattr(law, "needs", NEEDS), NEEDS)

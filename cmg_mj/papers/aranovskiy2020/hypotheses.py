@@ -163,10 +163,10 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
     """Judge whether the flywheels' speed is constant."""
     plant, run = runs.plant, trajectory_of(runs.symmetric)
     names = plant.joint_names
-    speeds = np.stack([np.abs(run[f"rate/{names[module.flywheel]}_rad_s"]) for module in plant.modules])
-    nominal = abs(plant.modules[0].speed)
+    speeds = np.stack([np.abs(run[f"rate/{names[module.flywheel]}_rad_s"]) for module in plant.axis.modules])
+    nominal = abs(plant.axis.modules[0].speed)
     speed_error = float(np.abs(speeds - nominal).max())
-    gimbal = max(float(np.abs(run[f"rate/{names[module.gimbal]}_rad_s"]).max()) for module in plant.modules)
+    gimbal = max(float(np.abs(run[f"rate/{names[module.gimbal]}_rad_s"]).max()) for module in plant.axis.modules)
     tilt = float(np.abs(run["x2_rad_s"]).max())
     model = plant.reduced
     spin_up = np.gradient(speeds[0], run["time_s"], axis=0)

@@ -20,21 +20,21 @@ Change = Callable[[Plant, float], None]
 
 def slower_flywheel(plant: Plant, share: float) -> None:
     """Slow the second flywheel down by a share (Hypothesis 2 and 3: unequal speeds)."""
-    module, model = plant.modules[1], plant.model
+    module, model = plant.axis.modules[1], plant.model
     model.key_ctrl[plant.key, module.motor] *= 1.0 - share
     model.key_qvel[plant.key, module.flywheel] *= 1.0 - share
 
 
 def gimbal_offset(plant: Plant, offset_deg: float) -> None:
     """Start the second gimbal off its place (Hypothesis 2)."""
-    module, model = plant.modules[1], plant.model
+    module, model = plant.axis.modules[1], plant.model
     model.key_qpos[plant.key, module.gimbal] += module.direction * math.radians(offset_deg)
     model.key_act[plant.key, model.actuator_actadr[module.servo]] += module.direction * math.radians(offset_deg)
 
 
 def servo_gain(plant: Plant, share: float) -> None:
     """Let the second servo turn its gimbal farther than commanded, by a share (Hypothesis 1)."""
-    module, model = plant.modules[1], plant.model
+    module, model = plant.axis.modules[1], plant.model
     gear = 1.0 / (1.0 + share)
     zero = model.key_qpos[plant.key, module.gimbal]
     # Its setpoint counts in angle times gear, from where the gimbal starts.
@@ -44,7 +44,7 @@ def servo_gain(plant: Plant, share: float) -> None:
 
 def gimbal_friction(plant: Plant, torque_n_m: float) -> None:
     """Give the second gimbal dry friction, the first none (Hypothesis 1)."""
-    plant.model.dof_frictionloss[plant.modules[1].gimbal] = torque_n_m
+    plant.model.dof_frictionloss[plant.axis.modules[1].gimbal] = torque_n_m
 
 
 @dataclass(frozen=True)

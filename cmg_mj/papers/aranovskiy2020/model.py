@@ -93,7 +93,7 @@ def residuals(states: int, seed: int) -> Residuals:
         gimbal_torque_n_m, motor_torque = rng.uniform(-1.0, 1.0), rng.uniform(-0.2, 0.2)
         mujoco.mj_resetDataKeyframe(model, data, plant.key)
         data.qpos[plant.tilt], data.qvel[plant.tilt] = plant.tilt_zero + x1, x2
-        for module in plant.modules:
+        for module in plant.axis.modules:
             data.qpos[module.gimbal], data.qvel[module.gimbal] = (
                 module.gimbal_zero + module.direction * x3,
                 module.direction * u,
@@ -102,7 +102,7 @@ def residuals(states: int, seed: int) -> Residuals:
             data.qfrc_applied[module.gimbal] = module.direction * gimbal_torque_n_m
             data.qfrc_applied[module.flywheel] = math.copysign(1.0, module.speed) * motor_torque
         mujoco.mj_forward(model, data)
-        spin_up = data.qacc[plant.modules[0].flywheel] * math.copysign(1.0, plant.modules[0].speed)
+        spin_up = data.qacc[plant.axis.modules[0].flywheel] * math.copysign(1.0, plant.axis.modules[0].speed)
 
         def f2(J2: float, state: tuple = (x1, x2, x3, u), speed: float = speed) -> float:
             return ReducedModel(reduced.J1, J2, reduced.J_d, speed, reduced.gravity_torque).tilt_acceleration(*state)
@@ -111,7 +111,7 @@ def residuals(states: int, seed: int) -> Residuals:
         # d/dt of J_d omega_d sin x3, of which (3) has the part with x3'.
         by_spin_up = reduced.J_d * math.sin(x3) * float(spin_up) / (reduced.J1 + reduced.J2 * math.sin(x3) ** 2)
         difference, difference_turned = q - f2(reduced.J2), q - f2(-reduced.J2)
-        module = plant.modules[0]
+        module = plant.axis.modules[0]
         turning = module.direction * float(data.qacc[module.gimbal])
         miss = gimbal_torque_n_m - gimbal_torque(x2, x3, turning, speed)
         last = gimbal_torque(x2, x3, 0.0, 0.0)  # that of J2 alone

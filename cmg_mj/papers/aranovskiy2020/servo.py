@@ -45,7 +45,7 @@ def in_velocity_mode(plant: Plant, deadband: float, lag_s: float = LAG_S) -> Non
         lag_s: I/kv [s].
     """
     model = plant.model
-    for module in plant.modules:
+    for module in plant.axis.modules:
         i = module.servo
         dof = int(model.jnt_dofadr[module.gimbal])
         kv = float(model.dof_M0[dof]) / lag_s

@@ -30,7 +30,7 @@ def inertia_of(plant: Plant) -> Inertia:
     mujoco.mj_forward(plant.model, data)
     M = np.zeros((plant.model.nv, plant.model.nv))
     mujoco.mj_fullM(plant.model, data, M)
-    module = plant.modules[0]
+    module = plant.axis.modules[0]
     return Inertia(*(float(M[i, i]) for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
 
 
@@ -43,7 +43,7 @@ def carried_momentum(plant: Plant, trajectory: Trajectory) -> np.ndarray:
     parts, names = inertia_of(plant), plant.joint_names
     tilt = trajectory[f"angle/{names[plant.tilt]}_rad"]
     total = np.zeros_like(tilt)
-    for module in plant.modules:
+    for module in plant.axis.modules:
         angle = trajectory[f"angle/{names[module.gimbal]}_rad"]
         turning = trajectory[f"rate/{names[module.gimbal]}_rad_s"]
         spinning = trajectory[f"rate/{names[module.flywheel]}_rad_s"]
@@ -76,7 +76,7 @@ def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajector
     parts = inertia_of(plant)
     tilt = trajectory[f"angle/{plant.joint_names[plant.tilt]}_rad"]
     x3, turning = trajectory["x3_rad"], np.gradient(trajectory["x3_rad"], trajectory["time_s"], axis=0)
-    h = parts.spin * abs(plant.modules[0].speed) * np.cos(tilt)
+    h = parts.spin * abs(plant.axis.modules[0].speed) * np.cos(tilt)
     if kind == "flywheel speed":
         momentum = size * h * np.cos(x3)
     elif kind == "gimbal offset":

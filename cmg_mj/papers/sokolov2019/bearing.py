@@ -162,7 +162,7 @@ def _picture(runs: Study) -> Picture:
     free = trajectory_of(runs.free["a push of the upright rig"]).world(0)
     plant = experiment([BALANCED]).plant
     t, s, push = example.time_s, free["time_s"], push_intervals(free)
-    x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.modules[0].gimbal_zero
+    x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.axis.modules[0].gimbal_zero
     torques = [
         Line(t, example.torque, "on the bearing", color=1, width=0.5),
         Line(t, runs.mean_torque, f"mean of {len(runs.locked)} seeds", color=3, width=1.2),

@@ -53,7 +53,7 @@ def estimator(name: str, prepared: Experiment, **changes: Any) -> Observer:
 def read_servo(plant: Plant) -> Servo:
     """Read the gimbal servo off the model file."""
     (servo,) = plant.axis.servos
-    (module,) = plant.modules
+    (module,) = plant.axis.modules
     dof = int(plant.model.jnt_dofadr[module.gimbal])
     return Servo(
         float(plant.model.actuator_gainprm[servo, 0]),

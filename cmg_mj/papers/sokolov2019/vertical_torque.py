@@ -32,7 +32,7 @@ class Motion(NamedTuple):
 def vertical_momentum(plant: Plant, motion: Motion) -> np.ndarray:
     """Return H of the module's docstring, (...) [N m s]."""
     r, inertia = plant.reduced, read_servo(plant).inertia
-    q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.modules[0].gimbal_zero
+    q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.axis.modules[0].gimbal_zero
     w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
     spin = r.J_d * w_d * np.cos(x3) - 0.5 * r.J2 * np.sin(2.0 * x3) * w_b
     return np.cos(q_b) * spin - np.sin(q_b) * inertia * w_c
@@ -41,7 +41,7 @@ def vertical_momentum(plant: Plant, motion: Motion) -> np.ndarray:
 def vertical_torque(plant: Plant, motion: Motion) -> np.ndarray:
     """Return dH/dt, (...) [N m]."""
     r, inertia = plant.reduced, read_servo(plant).inertia
-    q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.modules[0].gimbal_zero
+    q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.axis.modules[0].gimbal_zero
     w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
     dw_b, dw_c, dw_d = np.moveaxis(motion.a, -1, 0)
     spin = r.J_d * w_d * np.cos(x3) - 0.5 * r.J2 * np.sin(2.0 * x3) * w_b

@@ -12,7 +12,7 @@ import mujoco
 import tomli_w
 
 from cmg_mj.errors import InputError
-from cmg_mj.observers.registry import observer_class
+from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.plant.mounting import MountedRobot
 from cmg_mj.plant.mounting.mount import mount_on_request
 from cmg_mj.plant.mounting.mounted import check_target, with_scenario
@@ -87,7 +87,7 @@ def mount_and_write(
         InputError: The robot or the request does not allow it, or a file cannot be written.
     """
     robot, file = Path(robot), Path(target).expanduser()
-    observer_class(observer)
+    OBSERVER_CLASSES.find(observer)
     check_target(file, robot.expanduser())
     for path in (file, file.with_suffix(".toml")):
         if path.exists() and not overwrite:

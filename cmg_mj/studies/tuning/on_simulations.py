@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmg_mj.controllers.laws import law_class
+from cmg_mj.controllers.laws import LAW_CLASSES
 from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Observer
@@ -107,7 +107,7 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     period = scenario.plant.timestep_s or common_period(scenario)
     duration = math.ceil(window_of(scenario)[1] / period - 1e-9) * period
     feedback = scenario.controller.feedback
-    if feedback == "observer" and needs(law_class(scenario.controller.kind)):
+    if feedback == "observer" and needs(LAW_CLASSES.find(scenario.controller.kind)):
         feedback = "fog"
     loop = {"feedback": feedback, "bias_trim_s": 0.0}
     return scenario.model_copy(

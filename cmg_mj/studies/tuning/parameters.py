@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.observers import BENCH_PARAMETERS, Observer, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, Observer
 from cmg_mj.replay.parameter_options import ParameterValue
 
 SPAN = 1000.0
@@ -57,8 +57,8 @@ def parameters_of(kind: str, observer: Observer, arguments: ParameterValues) -> 
     Returns:
         Name -> value, without those that cannot be read off the observer.
     """
-    signature = inspect.signature(observer_class(kind)).parameters.values()
-    defaults = {p.name: p.default for p in signature if p.name not in BENCH_PARAMETERS}
+    signature = OBSERVER_CLASSES.takes(kind).values()
+    defaults = {p.name: p.default for p in signature if p.name not in OBSERVER_CLASSES.bench_parameters}
     values = {name: getattr(observer, name, default) for name, default in {**defaults, **arguments}.items()}
     return {name: _as_tuples(value) for name, value in values.items() if value is not inspect.Parameter.empty}
 
@@ -103,11 +103,7 @@ def numbers_of(kind: str, values: ParameterValues, make: MakeObserver, chosen: S
     Raises:
         InputError: A chosen name does not exist, or there is nothing to tune.
     """
-    integers = {
-        p.name
-        for p in inspect.signature(observer_class(kind)).parameters.values()
-        if p.annotation in (int, bool, "int", "bool")
-    }
+    integers = {p.name for p in OBSERVER_CLASSES.takes(kind).values() if p.annotation in (int, bool, "int", "bool")}
     candidates = [
         (name, place, number)
         for name, value in values.items()

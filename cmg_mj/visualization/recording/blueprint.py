@@ -100,7 +100,7 @@ def _all_observers(branch: Branch) -> rrb.Container:
 def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]:
     """Lay out the best runs over each other; then, if there are more, all runs."""
     few = [branch.run.name for branch in branches if branch.entry.is_best]
-    module = plant.modules[0].of_axis
+    module = plant.axis.modules[0].of_axis
     best = [branch for branch in branches if branch.entry.is_best]
     tilt = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_TILT_PLOTS]
     actuators = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_ACTUATOR_PLOTS]

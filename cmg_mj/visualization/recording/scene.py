@@ -50,7 +50,7 @@ def log_poses(rec: rr.RecordingStream, branch: str, plant: Plant, time: np.ndarr
     for body in range(1, plant.model.nbody):
         poses = rr.Transform3D.columns(translation=positions[:, body], quaternion=quaternions[:, body])
         rec.send_columns(body_path(branch, plant, body), [times], poses)
-    for module in plant.modules:
+    for module in plant.axis.modules:
         translation, quaternion = _turn_back(plant, module, qpos)
         poses = rr.Transform3D.columns(translation=translation, quaternion=quaternion)
         rec.send_columns(_slowed_path(branch, plant, module), [times], poses)
@@ -103,7 +103,7 @@ def log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float
     """Record the plant's shapes: one static entity for each geom and site, under its body."""
     model = plant.drawn_model
     parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
-    for module in plant.modules:
+    for module in plant.axis.modules:
         parents[int(model.dof_bodyid[module.flywheel_dof])] = _slowed_path(branch, plant, module)
     for body, name, shape in drawn_shapes(model, radius):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
@@ -128,7 +128,7 @@ def log_torques(
         largest: Result of `largest_torque` [N m].
         radius: Radius of the plant [m].
     """
-    path = f"{body_path(branch, plant, plant.frame)}/push"
+    path = f"{body_path(branch, plant, plant.axis.frame)}/push"
     tip, direction = _edge(plant)
     for time, torque in steps:
         rec.set_time(TIMELINE, duration=instant(time))
@@ -149,6 +149,6 @@ def _edge(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     radial = site - axis * (axis @ site)
     distance = float(np.linalg.norm(radial))
     radial = radial / distance
-    frame_geoms = model.geom_bodyid == plant.frame
+    frame_geoms = model.geom_bodyid == plant.axis.frame
     height = max([distance, *((model.geom_pos[frame_geoms] - anchor) @ radial).tolist()])
     return anchor + radial * height, np.cross(axis, radial)

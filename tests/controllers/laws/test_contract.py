@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, load_scenario, prepare, sweep
-from cmg_mj.controllers.laws import LAWS, FeedbackState, Law, law_class, make_law
+from cmg_mj.controllers.laws import LAW_CLASSES, LAWS, FeedbackState, Law, make_law
 from cmg_mj.controllers.laws.protocol import feedback_state, needs
-from cmg_mj.controllers.laws.registry import BENCH_PARAMETERS
 from cmg_mj.observers import Measurement
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.studies.tuning.on_simulations import tuning_scenario
@@ -51,7 +50,7 @@ def commands(control_law: Law, arguments: list[tuple[Measurement, FeedbackState]
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_every_parameter_is_documented(kind: str) -> None:
-    cls = law_class(kind)
+    cls = LAW_CLASSES.find(kind)
     for name in inspect.signature(cls).parameters:
         assert f"{name}: " in (cls.__doc__ or "")
 
@@ -134,8 +133,8 @@ def test_worlds_of_other_limits_share_a_batch(kind: str) -> None:
 
 def test_what_the_bench_gives_is_no_parameter() -> None:
     for kind in EVERY:
-        arguments: dict[str, Any] = dict.fromkeys(BENCH_PARAMETERS)
-        assert {"dt", "rate_limit"} <= arguments.keys() & inspect.signature(law_class(kind)).parameters.keys()
+        arguments: dict[str, Any] = dict.fromkeys(LAW_CLASSES.bench_parameters)
+        assert {"dt", "rate_limit"} <= arguments.keys() & inspect.signature(LAW_CLASSES.find(kind)).parameters.keys()
 
 
 def test_a_law_that_uses_the_noise_keeps_worlds_of_other_noise_apart() -> None:

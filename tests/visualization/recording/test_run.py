@@ -244,7 +244,7 @@ def test_bodies_stand_where_kinematics_puts_them(path: Path, run: Run, experimen
 @pytest.mark.parametrize("module", [0, 1])
 def test_flywheels_are_drawn_slowed(path: Path, run: Run, experiment: Experiment, module: int) -> None:
     plant = experiment.plant
-    joint, k = plant.modules[module].flywheel, 30
+    joint, k = plant.axis.modules[module].flywheel, 30
     name = plant.model.body(plant.model.jnt_bodyid[joint]).name.replace("/", ".")
     _, true_place, true_turn = pose(path, f"/homogeneous/rig/{name}", k)
     time, place, turn = pose(path, f"/homogeneous/rig/{name}/slowed", k)

@@ -54,7 +54,7 @@ def test_studios_mouse_reaches_the_rig_and_adds_up_with_a_push() -> None:
     def tilts(button: float, mouse: float) -> np.ndarray:
         with session("push=[]") as studio:
             force = np.zeros((studio.live.model.nbody, 6))
-            force[studio.live.plant.frame, 4] = mouse  # about y, the tilt's axis, in the world's directions
+            force[studio.live.plant.axis.frame, 4] = mouse  # about y, the tilt's axis, in the world's directions
             state = int(mujoco.mjtState.mjSTATE_XFRC_APPLIED)
             studio.run(0.5)
             if button:

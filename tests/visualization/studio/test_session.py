@@ -95,7 +95,7 @@ def test_reset_is_the_scenarios_start_with_the_wheels_at_speed(key: int | None) 
         studio.stepping.rows.clear()
         studio.send(messages.ResetEvent(key=key))
         assert studio.data.time == 0.0
-        for module in studio.live.plant.modules:
+        for module in studio.live.plant.axis.modules:
             assert studio.data.qvel[module.flywheel] == module.speed != 0.0
         studio.run(3.0)
         same(studio.rows, runner_rows("duration_s=4.0"))
