@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import check_observer
+from cmg_mj.cli.arguments import observer_option
 from cmg_mj.cli.terminal import note, note_hints, own_stdout, users_code
 from cmg_mj.errors import InputError
 
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 )
 @click.option("--release", multiple=True, metavar="JOINT", help="Joint that nothing holds. May be given again.")
 @click.option("--free-base", is_flag=True, help="Replace the joints of the robot's root by a free joint.")
-@click.option("--observer", default="homogeneous", show_default=True, metavar="NAME", help="Observer in the loop.")
+@observer_option(default="homogeneous")
 @click.option("--json", "as_json", is_flag=True, help="Print the limits as JSON, and nothing else.")
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()
@@ -76,9 +76,9 @@ def mount(
 ) -> None:
     """Mount control moment gyroscopes on a robot, and print the largest pushes it recovers from.
 
-    Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario scales
-    the gains of the papers' Table 2 to the robot. It pushes with 0.6 of the largest push that its controller recovers
-    from.
+    Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario has the
+    gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest push that its controller
+    recovers from.
     """
     from cmg_mj.plant.mounting.request import MountRequest
     from cmg_mj.studies.push_limits.mount_files import mount_and_write
@@ -96,7 +96,6 @@ def mount(
         release,
         "free" if free_base else "as_is",
     )
-    check_observer("--observer", observer)
     result = mount_and_write(robot, request, out, observer, overwrite=overwrite)
     if as_json:
         click.echo(json.dumps(result.figures(), indent=2), file=own_stdout())
