@@ -109,11 +109,11 @@ def number_option(name: str, help: str, largest: int, default: int | None = None
     """Make an option for a number from 0 on; `--help` does not show the largest one."""
 
     def check(context: click.Context, parameter: click.Parameter, number: int | None) -> int | None:
-        if number is not None and number > largest:
+        if number is not None and not 0 <= number <= largest:
             raise click.BadParameter(f"{number} is not in the range 0<=x<={largest}.")
         return number
 
-    return click.option(name, type=click.IntRange(0), metavar="N", default=default, callback=check, help=help)
+    return click.option(name, type=int, metavar="N", default=default, callback=check, help=f"{help}  [x>=0]")
 
 
 def settings_option(
