@@ -22,24 +22,8 @@ MOST_ROWS = 5_000_000
 DELIMITERS = (",", ";", "\t", "|")
 HEAD = 1 << 16
 """Size of the part of a CSV that is searched for its heading, which must end in it [bytes]."""
-MISSING = [
-    "",
-    "nan",
-    "NaN",
-    "NAN",
-    "-nan",
-    "NA",
-    "N/A",
-    "#N/A",
-    "null",
-    "NULL",
-    "None",
-    "none",
-    "inf",
-    "-inf",
-    "Inf",
-    "-Inf",
-]
+NOT_FINITE = ["nan", "NaN", "NAN", "-nan", "inf", "-inf", "Inf", "-Inf"]
+MISSING = ["", "NA", "N/A", "#N/A", "null", "NULL", "None", "none", *NOT_FINITE]
 """Cells that hold no number."""
 COMMENTS = ("#", "%", "//")
 
