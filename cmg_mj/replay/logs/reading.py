@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -77,19 +78,10 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
 
 def _read_run(path: Path, options: ReadOptions) -> Log:
     log = log_of_trajectory(path)
-    refused = {
-        "--units": options.units,
-        "--scale": options.scale,
-        "--offset": options.offset,
-        "--rate": options.rate_hz,
-        "--max-gap": options.max_gap_s,
-        "--delay": options.delay_s,
-        "--radii": options.radii_m,
-        "--time-range": options.time_range_s,
-    }
-    for option, value in refused.items():
-        if value not in (None, 0.0, {}):
-            raise InputError(f"{option}: {path} is a run's own recording; read it with --columns for that")
+    for field in options.as_toml():
+        if field != "windows_s":
+            option = re.sub("_(hz|s|m)$", "", field).replace("_", "-")  # max_gap_s is --max-gap
+            raise InputError(f"--{option}: {path} is a run's own recording; read it with --columns for that")
     if not options.windows_s:
         return log
     return replace(log, windows=windows_inside(path, options.windows_s, log["time_s"]))
