@@ -180,13 +180,12 @@ def replay(
     from dataclasses import replace
 
     from cmg_mj.replay import report
-    from cmg_mj.replay.log_replays import LogReplays, ReplayRequest
+    from cmg_mj.replay.log_replays import LogReplays
     from cmg_mj.replay.parameter_options import parameters_of
     from cmg_mj.replay.user_noise import noise_numbers
 
     options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
-    request = ReplayRequest(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
-    replays = LogReplays(request)
+    replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
     folder = _folder(replays, out)
     total = len(replays.logs)
     with CtrlC() as ctrl_c:
@@ -214,5 +213,5 @@ def _folder(replays: LogReplays, out: str | None) -> RunFolder:
 
     if out is not None:
         return claim_folder(output_path(out), replays.files)
-    toml = replays.request.as_toml()
-    return released_at_the_end(unused_folder(Path("runs"), replays.folder_name, replays.files, toml, SETTINGS))
+    name, files = replays.folder_name, replays.files
+    return released_at_the_end(unused_folder(Path("runs"), name, files, replays.as_toml(), SETTINGS))
