@@ -60,7 +60,7 @@ def compute(
         if number not in experiments:
             try:
                 experiments[number] = base.with_settings(points[number])
-                batch_of[number] = _batch_of(experiments[number])
+                batch_of[number] = experiments[number].batch_key, plant_structure(experiments[number].plant)
             except InputError as error:
                 refused[number] = str(error)
                 continue
@@ -150,11 +150,6 @@ def _monotonic_progress(tick: Callable[[float], None]) -> Callable[[float], None
         tick(latest)
 
     return report
-
-
-def _batch_of(experiment: Experiment) -> BatchId:
-    """Make a key: worlds with the same one can run in one batch."""
-    return experiment.batch_key, plant_structure(experiment.plant)
 
 
 def _identity(study: SweepStudy, chunk: Chunk, world: int) -> Summary:
