@@ -26,7 +26,6 @@ from cmg_mj.errors import InputError
 if TYPE_CHECKING:
     from cmg_mj.results.summary_keys import SummaryValue
     from cmg_mj.studies.sweeps.file import SweepFields
-    from cmg_mj.studies.sweeps.plan import Cost
     from cmg_mj.studies.sweeps.report import SweepTables
     from cmg_mj.studies.sweeps.study import SweepStudy
 
@@ -150,10 +149,9 @@ def _study(
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
     from cmg_mj.studies.sweeps.file import axes_of, design_of, scenario_of, study_file
-    from cmg_mj.studies.sweeps.study import SweepStudy
+    from cmg_mj.studies.sweeps.study import SweepStudy, sampling
 
-    if sample is not None and sobol is not None:
-        raise InputError("--sample and --sobol: one of them")
+    design = sampling(sample, sobol)
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
     fields = study_file(arguments.name)
     settings: SweepFields = {}
@@ -165,13 +163,11 @@ def _study(
             scenario = scenario.model_copy(update={"seed": arguments.seed})
         settings = fields.get("sweep", {})
         axes = axes or axes_of(arguments.name, fields)
-    design, n = design_of(arguments.name, settings)
-    if sample is not None or sobol is not None:
-        design, n = ("sample", sample or 0) if sample is not None else ("sobol", sobol or 0)
     names = observers or settings.get("observers", [scenario.observer.kind])
     expected = settings.get("order", []) if order is None else [name.strip() for name in order.split(",")]
     worlds_per_cell = worlds or settings.get("worlds", WORLDS)
-    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, design, n, tuple(expected))
+    design = design or design_of(arguments.name, settings)
+    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *design, tuple(expected))
 
 
 def _split(setting: str) -> tuple[str, str]:
@@ -192,7 +188,7 @@ def _as_json(tables: SweepTables) -> SummaryValue:
     }
 
 
-def _cost_text(cost: Cost) -> str:
+def _cost_text(cost: dict[str, float]) -> str:
     from cmg_mj.studies.sweeps.study import counted
 
     def count(key: str) -> str:
