@@ -8,11 +8,11 @@ from contextlib import contextmanager
 from typing import ParamSpec, TypedDict, TypeVar
 
 from mujoco.batch import Batch
-from rich import box
 from rich.table import Table
 
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
+from cmg_mj.studies.benchmark import figures_table
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.chunk import compute
 from cmg_mj.studies.sweeps.study import SweepStudy
@@ -45,7 +45,7 @@ class ChunkCost(TypedDict):
 
 
 class SweepCost(TypedDict):
-    """The cost of a sweep, as `bench --sweep --json` prints it."""
+    """The cost of a sweep, as `cmg-mj bench sweep --json` prints it."""
 
     scenario: str
     duration_s: float
@@ -93,15 +93,10 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
 
 def table(cost: SweepCost) -> Table:
     """Make the table that `cmg-mj bench sweep` prints."""
-    rows = Table(
-        title=f"{cost['scenario']}, {cost['duration_s']:g} s, on one thread: processor time of all by that "
-        "in MuJoCo's batch",
-        box=box.SIMPLE_HEAD,
-        title_justify="left",
+    rows = figures_table(
+        f"{cost['scenario']}, {cost['duration_s']:g} s, on one thread: processor time of all by that in MuJoCo's batch",
+        ("rigs", "trials", "stood", "all [s]", "batch [s]", "ratio", "trials\na second"),
     )
-    rows.add_column("observer", vertical="bottom")
-    for heading in ("rigs", "trials", "stood", "all [s]", "batch [s]", "ratio", "trials\na second"):
-        rows.add_column(heading, justify="right", vertical="bottom")
     for row in cost["figures"]:
         counts = (str(row[key]) for key in ("rigs", "trials", "stood"))
         rate = row["trials"] / row["cpu_s"]
