@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 from cmg_mj.errors import InputError
@@ -105,6 +104,4 @@ def _run_noise(log: Log, scenario: Scenario, plant: PlantParameters, noises: Map
         return noise_of(log, noises) if noises else None
     if len(noises) > 1:
         raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
-    sensors = scenario.sensors
-    accelerometer = replace(sensors.accelerometer, noise_density_ug_rthz=noises["accelerometer"])
-    return plant.noise(replace(sensors, accelerometer=accelerometer))
+    return plant.noise(scenario.sensors.with_noise_density(noises["accelerometer"]))
