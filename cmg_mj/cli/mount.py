@@ -81,8 +81,7 @@ def mount(
     recovers from.
     """
     from cmg_mj.plant.mounting.request import MountRequest
-    from cmg_mj.studies.push_limits.mount_files import mount_and_write
-    from cmg_mj.studies.push_limits.mount_report import mount_report_lines
+    from cmg_mj.studies.push_limits.mount_files import mount_and_write, mount_report_lines
 
     request = MountRequest(
         body,
