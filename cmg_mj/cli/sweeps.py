@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -58,18 +58,7 @@ if TYPE_CHECKING:
 )
 @click.option("--yes", is_flag=True, help="Run the sweep even if it is very large.")
 @users_code()
-def sweep(
-    arguments: RunArguments,
-    varied: tuple[str, ...],
-    observers: list[str] | None,
-    worlds: int | None,
-    sample: int | None,
-    sobol: int | None,
-    order: str | None,
-    dry_run: bool,
-    cluster: str | None,
-    yes: bool,
-) -> None:
+def sweep(arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool, **design: Any) -> None:
     """Run SCENARIO, or the study file of a sweep, in many worlds with every observer at every varied value.
 
     World i has the same noise for every observer and value. An interrupted sweep resumes when the same command runs
@@ -92,7 +81,7 @@ def sweep(
         from cmg_mj.studies.sweeps.dask_cluster import local_workers
 
         local_workers(cluster)
-    study = _study(arguments, varied, observers, worlds, sample, sobol, order)
+    study = _study(arguments, **design)
     check_values(study)
     if dry_run:
         cost = estimate_cost(study)
@@ -146,6 +135,7 @@ def _study(
     sobol: int | None,
     order: str | None,
 ) -> SweepStudy:
+    """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
     from cmg_mj.studies.sweeps.file import axes_of, design_of, scenario_of, study_file
