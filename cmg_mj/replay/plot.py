@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from cmg_mj.visualization.plots.run_plot import (
     pyplot,
     save_figure,
 )
+
+if TYPE_CHECKING:
+    from cmg_mj.visualization.plots.run_plot import Axes
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""
@@ -107,12 +110,14 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     save_figure(path, figure, describe_log(log), dpi=110)
 
 
-def _line(axes: Any, replayed: ReplayResult, values: np.ndarray, **style: Any) -> None:
-    axes.plot(*replayed.log.broken(values), **style)
+def _line(
+    axes: Axes, replayed: ReplayResult, values: np.ndarray, color: str, linewidth: float, label: str | None = None
+) -> None:
+    axes.plot(*replayed.log.broken(values), color=color, linewidth=linewidth, label=label)
 
 
 def _draw_small(
-    axes: Any,
+    axes: Axes,
     replayed: ReplayResult,
     name: str,
     label: str,
