@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.replay.logs.acceleration_checks import implausible_acceleration
+from cmg_mj.replay.logs.acceleration_checks import TiltMotion, implausible_acceleration
 from cmg_mj.replay.logs.checks import (
     accelerometer_geometry,
     check_assumed,
@@ -69,8 +69,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     slices = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
     notes = list(rows.notes)
     if "acceleration" in has:
-        tilt, acceleration = joined["y1_rad"], joined["acceleration_rad_s2"]
-        notes += implausible_acceleration(rows.columns, rows.signals, tilt, acceleration, slices, dt, rows.tilt)
+        motion = TiltMotion(joined["y1_rad"], joined["acceleration_rad_s2"], slices, dt)
+        notes += implausible_acceleration(rows.columns, rows.signals, motion, rows.tilt)
     units = {role: column.unit for role, column in rows.columns.items()}
     options = replace(options, units=units)
     return Log(path.stem, dt, joined, slices, has, rows.tilt, windows, tuple(notes), options, None, sampler.period)
