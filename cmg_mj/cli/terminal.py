@@ -126,7 +126,7 @@ def end_interrupted(message: str) -> NoReturn:
 
 def final_path(folder: RunFolder, place: Path) -> str:
     """Return the path of a result, with the reason if it is not the requested folder."""
-    return str(place) if place == folder.path else f"{place}; what {folder.path} has held stays as it was"
+    return str(place) if place == folder.path else f"{place}; the earlier files in {folder.path} stay as they were"
 
 
 def say_written(folder: RunFolder, place: Path, open_it: str, as_json: bool) -> None:
@@ -205,7 +205,7 @@ class ProgressRate:
     """The mean rate of a progress since its beginning.
 
     Args:
-        unit: What is counted, such as `trials`.
+        unit: Plural of the counted things, such as `trials`.
         total: The total count.
         before: The count at the beginning.
         clock: Returns the time [s].

@@ -66,12 +66,13 @@ def tune(
     ranges: tuple[str, ...],
     noise_levels: str,
 ) -> None:
-    """Fit an observer's parameters to the gyro, as section V of aranovskiy2020 does in the scenario observer_tuning.
+    """Fit an observer's parameters to the gyro of a scenario, as section V of aranovskiy2020 does.
 
-    The loop is closed on the gyro, whatever the scenario says, and its recording is replayed through the observer. The
-    score is the RMS of the estimated rate less the gyro's, from each push to one second after it, on held-out worlds.
-    It is compared with the score of the observer's parameters as given (by default, the paper's). With several noise
-    levels the command reports at which one the given parameters are best.
+    The bundled scenario observer_tuning is the experiment of that paper. The loop is closed on the gyro, whatever the
+    scenario says, and its recording is replayed through the observer. The score is the RMS of the estimated rate less
+    the gyro's, from each push to one second after it, on held-out worlds. It is compared with the score of the
+    observer's parameters as given (by default, the paper's). With several noise levels the command reports at which
+    one the given parameters are best.
 
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """

@@ -63,7 +63,7 @@ class Log:
         columns: `time_s`, `y1_rad`, `y2_rad`, `u_rad_s`, `acceleration_rad_s2`, `reference_rad_s`, each (n,). Where
             the log lacks a signal, y2 and u are zero, the others NaN.
         parts: Slices without a gap; the observers start at the beginning of each.
-        has: Those of "gimbals" (y2 and u), "acceleration" and "reference" that the log has.
+        has: Signals of the log among "gimbals" (y2 and u), "acceleration" and "reference".
         tilt: Geometry of the two accelerometers, if they measure the tilt.
         windows: Windows that are scored separately [s].
         notes: Changes to the rows that were not requested, and likely mistakes, a line each.

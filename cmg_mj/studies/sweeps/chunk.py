@@ -20,7 +20,7 @@ REFUSED = "refused"
 """Outcome of a trial whose values do not fit each other: it never begins."""
 
 BatchId = tuple[BatchKey, PlantStructure]
-"""What worlds of one batch have in common."""
+"""Key that the worlds of one batch share."""
 
 
 def compute(
