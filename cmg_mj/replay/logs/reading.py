@@ -56,9 +56,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     rows = _convert(path, options)
     if options.time_range_s is not None:
         rows = _cut(path, rows, options.time_range_s, options.rate_hz)
-    sampler = Sampler(str(path), options.rate_hz, options.max_gap_s, rows.notes)
+    sampler = Sampler(str(path), options.rate_hz, options.max_gap_s, rows.notes, held=("u_rad_s",))
     measured = _measured(rows)
-    dt, parts = sampler.parts(rows.time, measured, held=("u_rad_s",))
+    dt, parts = sampler.parts(rows.time, measured)
     joined = _join(parts, rows, options)
     check_motion(path, joined, rows.reference is not None)
     has = _signals_in(measured, rows)
