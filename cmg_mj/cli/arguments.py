@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 from cmg_mj.errors import InputError, nearest
 
@@ -58,11 +57,8 @@ class RunArguments:
         self, label: str, names: Sequence[str], experiment: Experiment, driver: Driver = "native", world: int = 0
     ) -> RunFolder:
         """Claim the folder for files: --out, or one in runs/ named for the scenario, the label and the settings."""
-        from cmg_mj.results.run_folder import unused_folder
         from cmg_mj.scenario.differences import folder_suffix, safe_name
 
-        if self.out is not None:
-            return claim_folder(output_path(self.out), names)
         label = safe_name(label) + ("-board" if driver == "board" else "")
         parts = (
             safe_name(Path(self.name).stem),
@@ -71,7 +67,7 @@ class RunArguments:
             *([f"world{world}"] if world else []),
         )
         name = "-".join(parts) + folder_suffix(experiment.differences)
-        return released_at_the_end(unused_folder(Path("runs"), name, names, experiment.as_toml(driver, world)))
+        return claim_output(self.out, name, names, experiment.as_toml(driver, world))
 
 
 def _as_utf8(argument: str) -> str:
@@ -172,42 +168,29 @@ with_json = click.option("--json", "as_json", is_flag=True, help="Print only the
 with_markdown = click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 
 
-def claim_output(out: str | None, default: str, names: Sequence[str]) -> RunFolder:
-    """Claim the folder that `--out` names, or by default one in runs/."""
-    return claim_folder(Path("runs") / default if out is None else output_path(out), names)
-
-
-def claim_folder(path: Path, names: Sequence[str] = ()) -> RunFolder:
-    """Claim a folder for a command's files; no other may write to it until the command is done."""
-    from cmg_mj.results.run_folder import RunFolder
-
-    return released_at_the_end(RunFolder(path, names))
-
-
-def released_at_the_end(folder: RunFolder) -> RunFolder:
-    """Release a folder when the command is done; a new folder without files is removed then."""
-    click.get_current_context().call_on_close(folder.release)
-    return folder
-
-
-def refuse_unused(names: Sequence[str], why: str) -> None:
-    """Refuse options of the current command that are on the command line and would be ignored.
+def claim_output(out: str | None, default: str, names: Sequence[str], *request: str) -> RunFolder:
+    """Claim the folder that `--out` names, or by default one in runs/, until the command is done.
 
     Args:
-        names: Names of the command's parameters.
-        why: The purpose of these options, for the message.
+        out: `--out`.
+        default: Name of the folder in runs/.
+        names: The files that the command may write.
+        request: TOML of the request, and the file that holds it. With them a folder in runs/ that another request has
+            written is not taken.
+
+    Returns:
+        The folder, to which no other command may write; a new one without files is removed in the end.
     """
-    context = click.get_current_context()
-    for parameter in context.command.params:
-        if parameter.name in names and context.get_parameter_source(parameter.name) == ParameterSource.COMMANDLINE:
-            raise InputError(f"{max(parameter.opts, key=len)}: {why}")
+    from cmg_mj.results.run_folder import RunFolder, unused_folder
 
-
-def output_path(out: str) -> Path:
-    """Return the folder that `--out` names."""
     if out == "":
         raise InputError("--out '': name a folder, . for the current one")
-    return Path(out)
+    if out is None and request:
+        folder = unused_folder(Path("runs"), default, names, *request)
+    else:
+        folder = RunFolder(Path("runs") / default if out is None else Path(out), names)
+    click.get_current_context().call_on_close(folder.release)
+    return folder
 
 
 def names_in(text: str) -> list[str]:

@@ -7,8 +7,9 @@ import os
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
-from cmg_mj.cli.arguments import all_of, refuse_unused
+from cmg_mj.cli.arguments import all_of
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ def live_run(
         InputError: There is no viewer, or the options exclude each other.
     """
     if not live and connect is None:
-        refuse_unused(["pace"], "goes with --live or --connect; without a viewer a run goes as fast as it can")
+        if click.get_current_context().get_parameter_source("pace") == ParameterSource.COMMANDLINE:
+            raise InputError("--pace: goes with --live or --connect; without a viewer a run goes as fast as it can")
         return None
     if live and connect is not None:
         raise InputError("--live starts a viewer, --connect takes one that runs already: give one of them")

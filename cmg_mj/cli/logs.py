@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,10 +11,8 @@ import click
 from cmg_mj.cli.arguments import (
     Command,
     all_of,
-    claim_folder,
+    claim_output,
     observers_option,
-    output_path,
-    released_at_the_end,
     settings_option,
     with_json,
     with_markdown,
@@ -26,9 +23,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.results.summary_keys import finite
 
 if TYPE_CHECKING:
-    from cmg_mj.replay.log_replays import LogReplays
     from cmg_mj.replay.logs import ReadOptions
-    from cmg_mj.results.run_folder import RunFolder
 
 LOG_OPTIONS = all_of(
     click.option(
@@ -182,11 +177,12 @@ def replay(
     from cmg_mj.replay import report
     from cmg_mj.replay.log_replays import LogReplays
     from cmg_mj.replay.parameter_options import parameters_of
+    from cmg_mj.replay.save import SETTINGS
     from cmg_mj.replay.user_noise import noise_numbers
 
     options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
     replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
-    folder = _folder(replays, out)
+    folder = claim_output(out, replays.folder_name, replays.files, replays.as_toml(), SETTINGS)
     total = len(replays.logs)
     with CtrlC() as ctrl_c:
         try:
@@ -204,14 +200,3 @@ def replay(
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", as_json)
     if ctrl_c.noted or not replays.complete:
         end_interrupted(f"interrupted; {len(replays.results)} of {total} logs are in {final_path(folder, place)}")
-
-
-def _folder(replays: LogReplays, out: str | None) -> RunFolder:
-    """Claim the folder that `--out` names, or a new one named for the logs."""
-    from cmg_mj.replay.save import SETTINGS
-    from cmg_mj.results.run_folder import unused_folder
-
-    if out is not None:
-        return claim_folder(output_path(out), replays.files)
-    name, files = replays.folder_name, replays.files
-    return released_at_the_end(unused_folder(Path("runs"), name, files, replays.as_toml(), SETTINGS))
