@@ -187,7 +187,7 @@ def tuned_scenario(study: TuningResult, level: NoiseLevelResult) -> Scenario:
     """Return the scenario with the tuned observer in the loop, at the level's sensor noise."""
     return study.scenario.model_copy(
         update={
-            "observer": ObserverSettings(kind=study.kind, **level.parameters),  # type: ignore[arg-type]
+            "observer": ObserverSettings.model_validate({"kind": study.kind, **level.parameters}),
             "sensors": study.scenario.sensors.with_noise_density(level.noise_ug_rthz),
         }
     )
