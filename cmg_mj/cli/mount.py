@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cmg_mj.cli.arguments import observer_option
+from cmg_mj.cli.arguments import observer_option, with_json
 from cmg_mj.cli.terminal import note, note_hints, show, users_code
 from cmg_mj.errors import InputError
 
@@ -82,7 +82,7 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     help="Replace the joints of the robot's root by a free joint.",
 )
 @observer_option(default="homogeneous")
-@click.option("--json", "as_json", is_flag=True, help="Print the limits as JSON, and nothing else.")
+@with_json
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()
 def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, **request: Any) -> None:
