@@ -6,6 +6,7 @@ import itertools
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -42,6 +43,10 @@ class Sensors:
     encoder: Encoder = Field(default_factory=Encoder)
     fog: Fog = Field(default_factory=Fog)
     mems_gyro: MemsGyro = Field(default_factory=MemsGyro)
+
+    def with_noise_density(self, ug_rthz: float) -> Sensors:
+        """Return the sensors with another noise density of the accelerometers [ug/sqrt(Hz)]."""
+        return replace(self, accelerometer=replace(self.accelerometer, noise_density_ug_rthz=ug_rthz))
 
 
 class SampledSensor(Generic[Reading]):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmg_mj.cli.pace import ProgressRate
-from cmg_mj.cli.terminal import progress
+from cmg_mj.cli.terminal import ProgressRate, progress
 
 
 class Clock:

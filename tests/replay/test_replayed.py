@@ -175,7 +175,7 @@ def test_noise_of_two_accelerometers_follows_from_theirs(tmp_path: Path) -> None
     assert noise_of(one).tilt == pytest.approx(np.radians(0.1))
     radial = RadialTilt(0.1, 0.3)
     for density in (1.0, 200.0):
-        noise = noise_of(dataclasses.replace(one, tilt=radial), accelerometer_ug_rthz=density)
+        noise = noise_of(dataclasses.replace(one, tilt=radial), {"accelerometer": density})
         white, step = density * 1e-6 * 9.80665 * np.sqrt(100.0), 9.80665 / 16384.0
         expected = radial.noise(math.hypot(white, step / math.sqrt(12.0)), 9.80665)
         assert noise.tilt == pytest.approx(expected.tilt, rel=1e-12)

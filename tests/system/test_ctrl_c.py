@@ -224,7 +224,7 @@ def test_leaves_the_complete_result_of_a_run_before() -> None:
     outcome = cmg_mj_process("run", write(LONG), "--out", "it", cwd=Path())
     assert outcome.err.splitlines()[-1] == (
         "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it/incomplete; "
-        "what it has held stays as it was"
+        "the earlier files in it stay as they were"
     )
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 20
     assert len(assert_whole("it/incomplete")) == 600

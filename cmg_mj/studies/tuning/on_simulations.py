@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -102,8 +101,7 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     """
     sensors = scenario.sensors
     if noise_ug_rthz is not None:
-        accelerometer = dataclasses.replace(sensors.accelerometer, noise_density_ug_rthz=noise_ug_rthz)
-        sensors = dataclasses.replace(sensors, accelerometer=accelerometer)
+        sensors = sensors.with_noise_density(noise_ug_rthz)
     period = scenario.plant.timestep_s or common_period(scenario)
     duration = math.ceil(window_of(scenario)[1] / period - 1e-9) * period
     feedback = scenario.controller.feedback

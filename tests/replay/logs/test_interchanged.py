@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import ReadOptions, load_scenario, prepare, read_log
-from cmg_mj.replay.logs.acceleration_checks import SWAPPED, interchanged
+from cmg_mj.replay.logs.acceleration_checks import SWAPPED, TiltMotion, interchanged
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
 from cmg_mj.sensors.tilt import RadialTilt
 from tests.replay.logs.motion import DT, write_csv
@@ -72,6 +72,6 @@ def test_the_runs_of_all_scenarios(scenario: str, suspicion: bool) -> None:
     y, a = trajectory["y1_rad"], trajectory["acceleration_rad_s2"]
     everything = [slice(0, len(y))]
     dt = float(trajectory["time_s"][1] - trajectory["time_s"][0])
-    assert not interchanged(y, a, everything, dt, places)
+    assert not interchanged(TiltMotion(y, a, everything, dt), places)
     interchange = y - (places.r_inner + places.r_outer) * a / 9.80665
-    assert interchanged(interchange, -a, everything, dt, places) == suspicion
+    assert interchanged(TiltMotion(interchange, -a, everything, dt), places) == suspicion

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
-from cmg_mj.studies.sweeps.plot_scales import is_logarithmic, round_values
-from cmg_mj.studies.sweeps.report import PICTURES, pictures_of
+from cmg_mj.studies.sweeps.pictures import is_logarithmic, pictures_of, round_values
+from cmg_mj.studies.sweeps.report import PICTURES
 from cmg_mj.visualization.plots.figure_spec import Map, Picture
 from cmg_mj.visualization.plots.map_plot import edges
 from cmg_mj.visualization.plots.run_plot import draw

@@ -94,7 +94,7 @@ def test_every_observer_takes_over_without_a_bump() -> None:
             same(rows[: 124 + 20], undisturbed)
             alone = i == list(OBSERVERS).index("homogeneous")
             assert np.array_equal(rows[:, U], undisturbed[: len(rows), U]) == alone, kind
-            assert studio.settings()[OBSERVER] == kind
+            assert studio.settings().observer == kind
 
 
 def test_the_scenarios_observer_has_its_parameters_again() -> None:
@@ -114,7 +114,7 @@ def test_gains_and_feedback() -> None:
         studio.run(1.0)
         state = studio.session_state()
         assert state.settings is not None
-        assert (state.law, state.settings[FEEDBACK]) == ("LQR", "truth")
+        assert (state.law, state.settings.feedback) == ("LQR", "truth")
         same(studio.rows, runner_rows("controller.lqr.state_cost=[1,1,1,1]", "controller.feedback=truth"))
         studio.send(ChangeSettings(laws["Table 2"]))
         assert studio.session_state().gains == (35.0, 4.0, -1.0, 0.3)

@@ -176,13 +176,13 @@ def test_history_brings_back_what_was_chosen() -> None:
         studio.run(1.0, every_s=0.004)
         rows = studio.rows
         studio.scrub(-50)  # 2.5 s
-        assert studio.settings()[FEEDBACK] == "truth"
+        assert studio.settings().feedback == "truth"
         studio.scrub(-125)  # 1.75 s
         time = studio.data.time
         settings = studio.settings()
-        assert (settings[OBSERVER], settings[FEEDBACK]) == ("adaptive", "observer")
+        assert (settings.observer, settings.feedback) == ("adaptive", "observer")
         studio.scrub(-50)
-        assert studio.settings()[FEEDBACK] == "truth"  # and forward again: nothing is forgotten by looking
+        assert studio.settings().feedback == "truth"  # and forward again: nothing is forgotten by looking
         studio.scrub(-125)
         del studio.stepping.rows[:]
         studio.pause(False)

@@ -52,7 +52,7 @@ def test_a_push_by_button_is_about_the_axis_that_is_shown() -> None:
         studio.send(ShowAxis("pitch"), PushRequest(-0.8, 0.2))
         state = studio.session_state()
         assert state.settings is not None
-        assert (state.axes, state.axis, state.settings[BIAS]) == (("roll", "pitch"), "pitch", -0.3)
+        assert (state.axes, state.axis, state.settings.bias_deg) == (("roll", "pitch"), "pitch", -0.3)
         studio.run(1.0)
         rows = studio.rows
         expected = runner("duration_s=2.0", 'push=[{start_s=1.0, duration_s=0.2, torque_n_m=-0.8, axis="pitch"}]')
