@@ -69,7 +69,7 @@ class LiveRun(ViewerStream):
     """One run, streamed to a viewer while it runs. Streaming changes no number.
 
     Use it as a context manager around the run, which takes its `options`, and the writing of the files. Afterwards
-    `lost` is the reason why the viewer has not received every tick, or empty.
+    `failure` is the reason why the viewer has not received every tick, or empty.
 
     Args:
         experiment: The experiment that runs.

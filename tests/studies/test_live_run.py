@@ -139,7 +139,7 @@ def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: 
         result = experiment.run(**view.options())
         view.ended(report_run(experiment, result))
         save_run(RunFolder(Path("it"), []), report_run(experiment, result))
-    assert view.lost == ""
+    assert view.failure == ""
     assert_received(Path("received.rrd"))
 
 
