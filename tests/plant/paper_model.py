@@ -106,10 +106,10 @@ class Lagrangian:
         steps = 1j * STEP * np.eye(len(self.q))
 
         def bias(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-            turning = momenta(q + 1j * STEP * dq, dq).imag / STEP
+            turning = np.imag(momenta(q + 1j * STEP * dq, dq)) / STEP
             stepped = q[..., None, :] + steps
             lagrangian = kinetic(stepped, np.broadcast_to(dq[..., None, :], stepped.shape)) - potential(stepped)
-            return turning - lagrangian.imag / STEP
+            return turning - np.imag(lagrangian) / STEP
 
         return bias
 
