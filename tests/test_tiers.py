@@ -35,6 +35,7 @@ def toy(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Py
     monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
     monkeypatch.setattr(tiers, "PAPERS", pytester.path / "papers")
     monkeypatch.setattr(cpu_limit, "warm_up", lambda: None)
+    monkeypatch.setenv(cpu_limit.ALONE, "1")
     monkeypatch.setattr(footprint, "ROOT", pytester.path)
     pytester.makeini("[pytest]\nmarkers =\n  daily\n  slow\n  papers\n")
     pytester.mkpydir("papers")
@@ -143,6 +144,21 @@ def test_a_slow_machine_has_a_higher_limit(toy: pytest.Pytester, monkeypatch: py
     toy.runpytest_inprocess(
         "-p", "tests.tiers", "-p", "tests.cpu_limit", "--cpu-limit=0.05", "test_c.py"
     ).assert_outcomes(passed=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("always", [True, False])
+def test_a_test_that_is_over_the_limit_has_a_second_try(
+    toy: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, always: bool
+) -> None:
+    """In a process of its own, where nothing else has raised its time."""
+    monkeypatch.delenv(cpu_limit.ALONE)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    toy.makeconftest("pytest_plugins = ['tests.tiers', 'tests.cpu_limit']")
+    code = "for _ in range(20): burn()" if always else "Path('first').exists() or [burn() for _ in range(20)]"
+    toy.makepyfile(test_c=f"from pathlib import Path\n{BURN}def test_it():\n    {code}\n    Path('first').touch()\n")
+    result = toy.runpytest_inprocess("--cpu-limit=0.8", "test_c.py::test_it")
+    result.assert_outcomes(passed=1, errors=int(always))
 
 
 @pytest.mark.parametrize(

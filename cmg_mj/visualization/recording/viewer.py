@@ -116,9 +116,9 @@ def start_viewer(options: Sequence[str] = ()) -> Viewer:
         InputError: The viewer does not start, for instance because there is no screen.
     """
     # A viewer listens before it looks for its screen: a busy machine may take longer over that than `STAYS_S`.
-    if not options and sys.platform == "linux" and not any(os.environ.get(name) for name in SCREENS):
-        raise _no_viewer(f"neither {' nor '.join(SCREENS)} is set")
-    for port in (PORT, 0, 0):
+    no_screen = not options and sys.platform == "linux" and not any(map(os.environ.get, SCREENS))
+    complaint = f"neither {' nor '.join(SCREENS)} is set"
+    for port in () if no_screen else (PORT, 0, 0):
         viewer = _start(_free_port(port), options)
         with viewer.errors:  # the viewer has an end of its own
             if _starts_listening(viewer) and _stays(viewer):
@@ -129,11 +129,7 @@ def start_viewer(options: Sequence[str] = ()) -> Viewer:
             complaint = viewer.complaint()
         if status != 0:  # 0: another viewer has been quicker to take the port
             break
-    raise _no_viewer(complaint)
-
-
-def _no_viewer(complaint: str) -> InputError:
-    return InputError(
+    raise InputError(
         f"--live: no viewer could be started: {complaint}. Where there is no screen: "
         "start rerun where there is one and name its address with --connect, or leave --live out"
     )
