@@ -71,6 +71,10 @@ def test_a_sweep_keeps_what_it_needs_and_no_more(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(store_module, "compute", make_rows)
     monkeypatch.setattr(study_module, "CHUNK", 256)
     monkeypatch.setattr(cells_module, "BLOCK", 256)
+    (tmp_path / "first").mkdir()
+    first = Store(tmp_path / "first", study(1))
+    first.open()
+    run(first)  # what it imports is there
     sweep = study(TRIALS)
     store = Store(tmp_path, sweep)
     store.open()
