@@ -1,4 +1,4 @@
-"""What an observer is: a frozen value with `init` and `step`, discrete in time, elementwise in the worlds."""
+"""The protocol of an observer: a frozen value with `init` and `step`, discrete in time, elementwise in the worlds."""
 
 from __future__ import annotations
 
@@ -85,12 +85,12 @@ class Observer(Protocol):
 
 
 NEEDS = ("model", "gimbals", "acceleration")
-"""What an observer may need beside y1: the reduced model, y2 and u, the angular acceleration."""
+"""Inputs that an observer may need beside y1: the reduced model, y2 and u, the angular acceleration."""
 
 BIAS = "bias_rad"
 """The extra signal of an observer that estimates e, the equilibrium bias [rad]."""
 TORQUE = "torque_n_m"
-"""That of one that estimates a tilting torque on the whole rig [N m]."""
+"""The extra signal of an observer that estimates a tilting torque on the whole rig [N m]."""
 
 RESERVED = ("x1_rad", "x2_rad_s", "x3_rad")
 

@@ -1,4 +1,4 @@
-"""What a control law is: a frozen value with `init` and `step`, discrete in time, elementwise in the worlds."""
+"""The protocol of a control law: a frozen value with `init` and `step`, discrete in time, elementwise in the worlds."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Law(Protocol):
 
 
 NEEDS = ("estimate",)
-"""What a law may need beside y: what the observer, or in its place the gyro, says."""
+"""Inputs that a law may need beside y: the estimate, which the observer or in its place the gyro gives."""
 
 
 def needs(law: Law | type[Law]) -> tuple[str, ...]:
