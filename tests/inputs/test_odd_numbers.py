@@ -10,7 +10,7 @@ import numpy as np
 from cmg_mj.replay.alignment import alignment
 from tests.command import cmg_mj
 from tests.inputs.complaints import assert_in_order, table
-from tests.inputs.test_model_file import edited
+from tests.inputs.test_model_file import check_edited
 from tests.plant.mounting.robots import EXAMPLES
 
 TORSO = (EXAMPLES / "torso.xml").read_text(encoding="utf-8")
@@ -56,7 +56,7 @@ def test_of_a_mount(wrong_input: list[str], fragments: list[str]) -> None:
 
 def test_a_rig_that_runs_away_within_a_sample() -> None:
     beyond = "plant.model = 'rig.xml': its reduced model runs beyond all numbers within a sample of 0.005 s; gravity, "
-    assert beyond in edited(rig=("0 0 -9.81", "0 0 -1e10")).complaint
+    assert beyond in check_edited(rig=("0 0 -9.81", "0 0 -1e10")).complaint
     for command in (("check", "rig.xml"), ("run", "push_recovery", "--set", "plant.model=rig.xml")):
         assert beyond in cmg_mj(*command).complaint
 
