@@ -12,7 +12,7 @@ import mujoco
 
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.includes import check_files
-from cmg_mj.plant.mjcf import check_rig
+from cmg_mj.plant.mjcf import as_mjcf, check_rig
 from cmg_mj.results.files import whole_file
 
 
@@ -36,7 +36,7 @@ class MountedRobot:
         """Write the robot as MJCF, which plain MuJoCo loads and `plant.model` takes; whole or not at all.
 
         Args:
-            path: The file. It refers to meshes and textures by relative paths; they are not copied.
+            path: The file, in any folder. It refers to meshes and textures by relative paths; they are not copied.
 
         Returns:
             The file.
@@ -47,11 +47,13 @@ class MountedRobot:
         target = Path(path).expanduser()
         check_target(target, self.path)
         spec = self.spec.copy()
+        folder = Path(os.path.abspath(target.parent))
         for field in ("meshdir", "texturedir"):
-            setattr(spec, field, _relative_assets(target.resolve().parent, spec.modelfiledir, getattr(spec, field)))
+            setattr(spec, field, _relative_assets(folder, spec.modelfiledir, getattr(spec, field)))
+        spec.modelfiledir = f"{folder}{os.sep}"  # MuJoCo opens the meshes to write them
         try:
             with whole_file(target, ".xml") as temporary:
-                temporary.write_text(spec.to_xml(), encoding="utf-8")
+                temporary.write_text(as_mjcf(spec, self.path), encoding="utf-8")
                 check_rig(temporary, target)
         except OSError as error:
             raise InputError(f"-o {path}: cannot be written: {error.strerror}") from error
@@ -113,5 +115,10 @@ def with_scenario(target: Path) -> Iterator[Path]:
 
 
 def _relative_assets(folder: Path, model_folder: str, assets: str) -> str:
-    """Return the path of a robot's folder of assets, relative to another folder."""
-    return os.path.relpath(Path(model_folder or ".").resolve() / assets, folder)
+    """Return the path of a robot's folder of assets, relative to another folder.
+
+    It is absolute where a symbolic link makes the relative path depend on how the model is opened.
+    """
+    path = os.path.abspath(os.path.join(model_folder, assets))
+    relative = os.path.relpath(path, folder)
+    return relative if relative == os.path.relpath(os.path.realpath(path), os.path.realpath(folder)) else path
