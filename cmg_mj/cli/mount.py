@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 )
 @click.option("--release", multiple=True, metavar="JOINT", help="Joint that nothing holds. May be given again.")
 @click.option("--free-base", is_flag=True, help="Replace the joints of the robot's root by a free joint.")
-@click.option("--observer", default="homogeneous", show_default=True, metavar="NAME", help="Observer in the loop.")
+@click.option("--observer", default="gyro_free", show_default=True, metavar="NAME", help="Observer in the loop.")
 @click.option("--json", "as_json", is_flag=True, help="Print the limits as JSON, and nothing else.")
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()

@@ -4,7 +4,7 @@ python docs/studies/mounted_robots.py [ROBOT ...] (about six minutes on a quiet 
 python docs/studies/mounted_robots.py --commands (with what each is mounted)
 
 The robots are those of tests/plant/mounting/robots.py; ROBOT is a part of a name. Ten worlds each, the sensors of the
-datasheets, `homogeneous`; from the smaller of a degree and a quarter of the ceiling, 30 s, alone and with a push of
+datasheets, `gyro_free`; from the smaller of a degree and a quarter of the ceiling, 30 s, alone and with a push of
 0.6 E at 10 s. The simulated E is the largest push, in steps of 0.05 E, up to which at least half of the worlds stand.
 """
 
@@ -47,8 +47,8 @@ def simulated(experiment: Experiment, torque: float) -> float:
 def row(name: str, robot: Robot, folder: Path) -> list[str]:
     """All of one robot."""
     model = mount(robot.path, **robot.options).save(folder / "balanced.xml")
-    can = prospects(write_scenario(model, robot.path, "homogeneous"))
-    pushed = write_scenario(model, robot.path, "homogeneous", can).with_settings({"duration_s": 30.0})
+    can = prospects(write_scenario(model, robot.path, "gyro_free"))
+    pushed = write_scenario(model, robot.path, "gyro_free", can).with_settings({"duration_s": 30.0})
     torque = can.push_margin.median_impulse / PUSH_S
     figures = can.figures()
     return [

@@ -30,7 +30,7 @@ def resting(
     """A robot with its pair, what its reduced model says, its name."""
     robot = ROBOTS[request.param]
     model = mount(robot.path, **robot.options).save(tmp_path_factory.mktemp("robot") / "balanced.xml")
-    experiment = write_scenario(model, robot.path, "homogeneous")
+    experiment = write_scenario(model, robot.path, "gyro_free")
     return experiment, ceiling(experiment.plant.axis.reduced, experiment.law.rate_limit), request.param
 
 
@@ -39,7 +39,7 @@ def mounted(resting: tuple[Experiment, RecoverableLimit, str]) -> tuple[Experime
     """The same with all that `mount` says of it."""
     experiment, _, name = resting
     can = prospects(experiment)
-    return write_scenario(experiment.plant.path, ROBOTS[name].path, "homogeneous", can), can, name
+    return write_scenario(experiment.plant.path, ROBOTS[name].path, "gyro_free", can), can, name
 
 
 def pushed(
@@ -57,7 +57,7 @@ def pushed(
 
 @pytest.mark.slow
 def test_it_stands_thirty_seconds(mounted: tuple[Experiment, Prospects, str]) -> None:
-    """Ten seeds, default sensors, `homogeneous`, from the smaller of a degree and a quarter of the ceiling."""
+    """Ten seeds, default sensors, `gyro_free`, from the smaller of a degree and a quarter of the ceiling."""
     experiment, can, _ = mounted
     tilt = min(1.0, 0.25 * math.degrees(can.limit.tilt))
     assert pushed(experiment, 0.0, 30.0, tilt).all()
@@ -115,7 +115,7 @@ def test_where_the_pair_is_too_small_it_says_which_is_not(tmp_path: Path) -> Non
 
     def tilt_at(scale: float) -> float:
         model = mount(robot.path, **{**robot.options, "scale": scale}).save(tmp_path / f"{scale}.xml")
-        return prospects(write_scenario(model, model, "homogeneous")).limit.tilt
+        return prospects(write_scenario(model, model, "gyro_free")).limit.tilt
 
     assert math.degrees(tilt_at(1.0)) < 2.0
     assert smallest_sufficient_scale(tilt_at, 1.0) == robot.options["scale"]

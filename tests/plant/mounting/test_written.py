@@ -111,6 +111,19 @@ def test_a_command_of_the_document() -> None:
     assert result.read_bytes() == Path("a.xml").read_bytes()
 
 
+def test_the_loop_is_closed_with_gyro_free_unless_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def note(robot: object, request: object, out: object, observer: str, **_: object) -> None:
+        asked.append(observer)
+        raise InputError("noted")
+
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.mount_and_write", note)
+    for options in ((), ("--observer", "homogeneous")):
+        assert "noted" in cmg_mj(*GIVEN, *options).complaint
+    assert asked == ["gyro_free", "homogeneous"]
+
+
 def test_a_larger_pair_that_has_no_room_is_none_that_suffices() -> None:
     def tilt_at(scale: float) -> float:
         if scale > 1.3:
