@@ -17,7 +17,7 @@ from cmg_mj.plant.mounting.attach import add_sensors, attach_modules, module_nam
 from cmg_mj.plant.mounting.axes import AxisLike
 from cmg_mj.plant.mounting.clearance import check_room
 from cmg_mj.plant.mounting.existing_axes import ExistingAxes, find_existing_axes
-from cmg_mj.plant.mounting.fall_check import TRIED_DEG, simulated_pole
+from cmg_mj.plant.mounting.fall_check import TRIED_DEG, overlap, simulated_pole
 from cmg_mj.plant.mounting.held_joints import Hold, hold_joints
 from cmg_mj.plant.mounting.keyframes import Poses, as_qpos, pop_keyframes, poses_of, write_keyframe
 from cmg_mj.plant.mounting.mounted import MountedRobot
@@ -132,8 +132,11 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     add_sensors(spec, body, request.prefix, turn.T @ (under - origin), turn.T @ axes_along(direction), height)
     model = _with_keyframes(spec, names, qpos, [(name, poses | gimbals) for name, poses in keyframes], existing, path)
     key = model.key(EQUILIBRIUM_KEY).id
-    if not simulated_pole(model, key, find_axis(model, key, request.name, axes_of(model)[request.name]).line):
-        raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: it stands by itself")
+    line = find_axis(model, key, request.name, axes_of(model)[request.name]).line
+    if not simulated_pole(model, key, line):
+        touching = overlap(model, key, line, pole=0.0)
+        reason = f"{touching}; let them not collide (<exclude>)" if touching else "it stands by itself"
+        raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: {reason}")
     return MountedRobot(spec, path, tuple(held), tuple(notes))
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from cmg_mj.plant.tilt_line import HingeLine
-from cmg_mj.studies.push_limits.largest_push import PUSH_S
+from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.mount_files import MountResult
 from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG
+from cmg_mj.studies.push_limits.simulated_push import LEAST, LONGEST_S, UNPUSHED_S, SimulatedPush
 
 
 def mount_report_lines(result: MountResult) -> Iterator[str]:
@@ -34,15 +36,47 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
         f"{figures['momentum_n_m_s']:.4g} N m s, falls with {figures['pole_1_s']:.3g} 1/s"
     )
     yield (
-        f"  any controller: recovers from at most {figures['limit_tilt_deg']:.3g} deg, or a push of "
-        f"{figures['limit_push_torque_n_m']:.3g} N m for {PUSH_S:g} s"
+        f"  any controller, from upright gimbals (linear model): recovers from at most {figures['limit_tilt_deg']:.3g} "
+        f"deg, or a push of {figures['limit_push_torque_n_m']:.3g} N m for {PUSH_S:g} s"
     )
-    yield (
-        f"  this controller: recovers from a push of {figures['push_margin_torque_n_m']:.3g} N m for {PUSH_S:g} s (E = "
-        f"{figures['push_margin_impulse_n_m_s']:.3g} N m s, {result.prospects.fraction_of_limit:.0%} of that)"
+    margin = result.prospects.push_margin.median_impulse
+    reduced = (
+        f"by its reduced model E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
+        f"{result.prospects.fraction_of_limit:.0%} of that"
     )
-    scale = result.sufficient_scale
+    yield f"  {result.observer}: {_simulated(result.simulated)}{reduced}"
+    yield from _scale(result)
+
+
+def _simulated(simulated: SimulatedPush | None) -> str:
+    """Describe what the robot stands in MuJoCo, up to the words on the reduced model."""
+    if simulated is None:
+        return "not tried in MuJoCo; "
+    if simulated.standing is None:
+        return f"in MuJoCo nothing found within {LONGEST_S:g} s; "
+    if simulated.falls:
+        fallen = WORLDS - simulated.standing
+        return f"does not stand: in MuJoCo {fallen} of {WORLDS} worlds fall within {UNPUSHED_S:g} s, unpushed; "
+    if not simulated.impulse:
+        reason = f"not even {LEAST:.0%} of that" if simulated.complete else f"none found within {LONGEST_S:g} s"
+        return f"stands in MuJoCo only unpushed ({reason}); "
+    more = "" if simulated.complete else f", or more: {LONGEST_S:g} s did not suffice"
+    return (
+        f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
+        f"worlds, less a tenth{more}); "
+    )
+
+
+def _scale(result: MountResult) -> Iterator[str]:
+    """Say whether the pair is too small, and which scale was tried that is not."""
+    simulated, scale = result.simulated, result.sufficient_scale
+    low = math.degrees(result.prospects.limit.tilt) < LOW_LIMIT_DEG
+    if not (low or (simulated and simulated.falls)):
+        return
+    reason = f"any controller recovers less than {LOW_LIMIT_DEG:g} deg" if low else "it does not stand"
     if scale is not None:
-        yield f"  a pair of this size recovers less than {LOW_LIMIT_DEG:g} deg: --scale {scale:g} suffices"
-    elif figures["limit_tilt_deg"] < LOW_LIMIT_DEG:
-        yield f"  a pair recovers less than {LOW_LIMIT_DEG:g} deg at any scale that it has room for"
+        yield f"  with a pair of this size {reason}; with --scale {scale:g}, tried in MuJoCo, it stands"
+    elif simulated is None:
+        yield f"  with a pair of this size {reason}; --quick tries no larger --scale"
+    else:
+        yield f"  with a pair of this size {reason}; no larger --scale was found with which it stands"

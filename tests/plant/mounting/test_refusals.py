@@ -160,7 +160,7 @@ def test_nobodys_file_is_overwritten() -> None:
 
 @pytest.mark.slow
 def test_a_file_is_overwritten_if_it_is_asked_for() -> None:
-    arguments = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3", "-o", "mine.xml")
+    arguments = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3", "-o", "mine.xml", "--quick")
     Path("mine.toml").write_text("mine", encoding="utf-8")
     assert cmg_mj(*arguments, "--overwrite").status == 0
     assert Path("mine.toml").read_text(encoding="utf-8") != "mine"
