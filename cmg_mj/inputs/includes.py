@@ -87,6 +87,11 @@ def _text(path: Path, root: Path) -> str:
             raise InputError(f"{root}: {path.name} is larger than {LARGEST // 1_000_000} MB")
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
+        if path.suffix.lower() == ".mjb":
+            raise InputError(
+                f"{root}: is a model that MuJoCo has compiled, whose parts cannot be told apart any more; give the "
+                "MJCF that it was made from (.xml)"
+            ) from error
         raise InputError(f"{root}: {path.name} is not UTF-8 text (at byte {error.start})") from error
     except OSError as error:
         raise InputError(f"{root}: {path.name} cannot be read: {error.strerror}") from error

@@ -62,8 +62,8 @@ class Prospects:
         hints = []
         if not abs(self.pole / self.limit.pole - 1.0) < POLE_DIFFERENCE:
             reason = self.overlap or (
-                "what it stands on gives way (soft contacts, or joints held softly), or the hinge that it tilts about "
-                "has a spring or damping"
+                "what it stands on rolls or gives way (soft contacts, or joints held softly), or the hinge that it "
+                "tilts about has a spring or damping"
             )
             hints.append(
                 f"the robot starts to fall with a pole of {self.pole:.3g} 1/s, its reduced model's is "
