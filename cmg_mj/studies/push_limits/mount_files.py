@@ -22,6 +22,7 @@ from cmg_mj.results.files import whole_file
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
+from cmg_mj.studies.push_limits.pair_demands import PairDemands, pair_demands
 from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG, Prospects, prospects, smallest_sufficient_scale
 from cmg_mj.studies.push_limits.simulated_push import (
     OutOfTimeError,
@@ -49,6 +50,7 @@ class MountResult:
         observer: Name of the observer in the loop.
         prospects: Limits of the pair on this robot, of the reduced model.
         simulated: The push that the robot stands in MuJoCo; None if that was not tried.
+        demands: Demands of the pair on the robot.
         sufficient_scale: A scale that was tried, with which the robot stands and the ceiling is `LOW_LIMIT_DEG` or
             more; None if the pair's own suffices, or if none was found that does.
     """
@@ -59,6 +61,7 @@ class MountResult:
     observer: str
     prospects: Prospects
     simulated: SimulatedPush | None
+    demands: PairDemands
     sufficient_scale: float | None
 
     @property
@@ -75,6 +78,9 @@ class MountResult:
             "stands_push_impulse_n_m_s": simulated and simulated.impulse,
             "stands_push_torque_n_m": simulated and simulated.impulse / PUSH_S,
             "stands_push_complete": simulated and simulated.complete,
+            "servo_peak_torque_n_m": simulated and simulated.servo_torque,
+            "servo_peak_rate_rad_s": simulated and simulated.servo_rate,
+            **self.demands.figures(),
             "observer": self.observer,
             "model": str(self.path),
             "held": list(self.mounted.held),
@@ -128,7 +134,8 @@ def mount_and_write(
         text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated)
         model.with_suffix(".toml").write_text(text, encoding="utf-8")
     plant = experiment.plant.single_axis(request.name)
-    return MountResult(mounted, file, plant, observer, limits, simulated, sufficient)
+    demands = pair_demands(plant, experiment.law.rate_limit, request.scale)
+    return MountResult(mounted, file, plant, observer, limits, simulated, demands, sufficient)
 
 
 def _mount(robot: Path, request: MountRequest) -> MountedRobot:

@@ -9,7 +9,7 @@ from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.mount_files import MountResult
 from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG
-from cmg_mj.studies.push_limits.simulated_push import LEAST, LONGEST_S, UNPUSHED_S, SimulatedPush
+from cmg_mj.studies.push_limits.simulated_push import LEAST, LONGEST_S, OTHER_WORLDS, UNPUSHED_S, SimulatedPush
 
 
 def mount_report_lines(result: MountResult) -> Iterator[str]:
@@ -46,6 +46,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
     )
     yield f"  {result.observer}: {_simulated(result.simulated)}{reduced}"
     yield from _scale(result)
+    yield from _demands(result)
 
 
 def _simulated(simulated: SimulatedPush | None) -> str:
@@ -60,10 +61,10 @@ def _simulated(simulated: SimulatedPush | None) -> str:
     if not simulated.impulse:
         reason = f"not even {LEAST:.0%} of that" if simulated.complete else f"none found within {LONGEST_S:g} s"
         return f"stands in MuJoCo only unpushed ({reason}); "
-    more = "" if simulated.complete else f", or more: {LONGEST_S:g} s did not suffice"
+    more = f"and all of {OTHER_WORLDS} others" if simulated.complete else f"{LONGEST_S:g} s did not suffice for others"
     return (
         f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
-        f"worlds, less a tenth{more}); "
+        f"worlds, less a tenth; {more}); "
     )
 
 
@@ -80,3 +81,20 @@ def _scale(result: MountResult) -> Iterator[str]:
         yield f"  with a pair of this size {reason}; --quick tries no larger --scale"
     else:
         yield f"  with a pair of this size {reason}; no larger --scale was found with which it stands"
+
+
+def _demands(result: MountResult) -> Iterator[str]:
+    """Say what the pair weighs, what its servos have to do and what its wheels take."""
+    demands, simulated = result.demands, result.simulated
+    taken = ""
+    if simulated is not None and simulated.servo_torque is not None and simulated.servo_rate is not None:
+        taken = f"; the push takes up to {simulated.servo_torque:.2g} N m and {simulated.servo_rate:.2g} rad/s"
+    yield (
+        f"  the pair weighs {demands.mass_kg:.3g} kg, {demands.mass_kg / demands.robot_mass_kg:.0%} of the robot's "
+        f"{demands.robot_mass_kg:.3g} kg; its servos have {demands.servo_torque_n_m:.3g} N m and "
+        f"{demands.servo_rate_rad_s:.3g} rad/s{taken}"
+    )
+    yield (
+        f"  its wheels hold {demands.spin_up_energy_j:.3g} J, {demands.spin_up_power_w:.2g} W for a minute to spin up, "
+        f"and take {demands.holding_power_w:.2g} W to keep turning (assumed: two 608 bearings each, by SKF's friction)"
+    )

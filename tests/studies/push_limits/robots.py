@@ -103,7 +103,7 @@ ROBOTS: dict[str, tuple[str, dict[str, Any]]] = {
     "two wheels": (TWO_WHEELS, {"body": "frame", "position": (0.0, 0.0, 0.3)}),
     "bicycle": (
         bicycle(half_width=0.003, tyre='margin="0.02"'),
-        {"body": "frame", "axis": "x", "position": (0.0, 0.0, 0.4)},
+        {"body": "frame", "axis": "x", "position": (0.0, 0.0, 0.4), "scale": 1.4},
     ),
     "leg": (LEG, {"body": "torso", "axis": "x", "base": "free", "scale": 1.6}),
 }
