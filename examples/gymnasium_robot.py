@@ -23,4 +23,4 @@ print(f"falls with {can.limit.pole:.2f} 1/s; any controller recovers at most {ca
 for share in (0.6, 1.8):
     push = {"push.0.torque_n_m": share * can.push_margin.median_impulse / 0.1}
     stood = experiment.with_settings(push).run_many(5, keep_trajectory=False).stood.sum()
-    print(f"pushed with {share} of what it bears: {stood} of 5 stood")
+    print(f"pushed with {share} of E: {stood} of 5 stood")
