@@ -34,7 +34,5 @@ with tempfile.TemporaryDirectory() as folder:
     can = prospects(write_scenario(model, model, "gyro_free"))
     experiment = write_scenario(model, model, "gyro_free", can)  # pushes with 0.6 of E
 outcome = experiment.run().outcomes[0]
-print(
-    f"held: {', '.join(mounted.held)}; by its reduced model it recovers from {can.fraction_of_limit:.0%} of what any law could"
-)
+print(f"held: {', '.join(mounted.held)}; E is {can.fraction_of_limit:.0%} of what any law could recover from")
 print(f"pushed with 0.6 of that: {'fell at' if outcome.fell else 'stood until'} {outcome.time_s:g} s")
