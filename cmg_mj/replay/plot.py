@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from cmg_mj.replay.log_replay import ReplayResult, describe_log
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
-from cmg_mj.results.files import whole_file
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import (
@@ -23,7 +22,11 @@ from cmg_mj.visualization.plots.run_plot import (
     SMALL_HEIGHT,
     fit,
     pyplot,
+    save_figure,
 )
+
+if TYPE_CHECKING:
+    from cmg_mj.visualization.plots.run_plot import Axes
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""
@@ -58,7 +61,6 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         path: The PNG to write.
         replayed: The replay.
     """
-    plt = pyplot()
     log, names = replayed.log, list(replayed.estimates)
     few, referred = shown_first(replayed), "reference" in log.has
     others = [name for name in names if name not in few]
@@ -67,7 +69,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     small = [others[i : i + SMALL_COLUMNS] for i in range(0, len(others), SMALL_COLUMNS)]
     tall = 4 if referred else 3
     heights = [PANEL_HEIGHT] * tall + [SMALL_HEIGHT] * len(small)
-    figure = plt.figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
+    figure = pyplot().figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
     grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
     panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
     start, end = liveliest_span(replayed)
@@ -105,18 +107,17 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
     panels[-1].set_xlabel(f"time [s], {DETAIL_S:g} s in detail" if end - start < log.duration_s else "time [s]")
     figure.align_ylabels(panels)
-    figure.suptitle(describe_log(log), x=0.01, ha="left", parse_math=False)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=110, format="png")
-    plt.close(figure)
+    save_figure(path, figure, describe_log(log), dpi=110)
 
 
-def _line(axes: Any, replayed: ReplayResult, values: np.ndarray, **style: Any) -> None:
-    axes.plot(*replayed.log.broken(values), **style)
+def _line(
+    axes: Axes, replayed: ReplayResult, values: np.ndarray, color: str, linewidth: float, label: str | None = None
+) -> None:
+    axes.plot(*replayed.log.broken(values), color=color, linewidth=linewidth, label=label)
 
 
 def _draw_small(
-    axes: Any,
+    axes: Axes,
     replayed: ReplayResult,
     name: str,
     label: str,

@@ -11,7 +11,7 @@ from cmg_mj.observers.protocol import BIAS
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import replay_markdown, shown_first
-from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, colours
+from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour, colours
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.recording.legend import numbered_parts
 from cmg_mj.visualization.recording.replay_recording import LogSeries, write_logs
@@ -47,8 +47,10 @@ def series(replayed: ReplayResult) -> list[Series]:
     """Return all time series of one log: angles in degrees, rates in rad/s."""
     log = replayed.log
 
-    def row(path: str, name: str, values: np.ndarray, color: tuple, width: float = 1.5, **more: object) -> Series:
-        return Series(path, name, *log.broken(values), color, width, **more)  # type: ignore[arg-type]
+    def row(
+        path: str, name: str, values: np.ndarray, color: Colour, width: float = 1.5, whole: bool = True, by: str = ""
+    ) -> Series:
+        return Series(path, name, *log.broken(values), color, width, whole, by)
 
     rows = [row("tilt/measured", "measured", np.degrees(log["y1_rad"]), BASELINE_COLOURS["gyro"])]
     if "reference" in log.has:
@@ -63,7 +65,7 @@ def series(replayed: ReplayResult) -> list[Series]:
         if BIAS in estimates:
             signals["bias"] = np.degrees(estimates[BIAS])
         for folder, values in signals.items():
-            rows.append(row(f"{folder}/{part}", labels[name], values, color, whole=False, observer=name))
+            rows.append(row(f"{folder}/{part}", labels[name], values, color, whole=False, by=name))
     if "acceleration" in log.has:
         measured = log["acceleration_rad_s2"]
         rows.append(row("acceleration/measured", "measured", measured, BASELINE_COLOURS["gyro"], 1.0, whole=False))

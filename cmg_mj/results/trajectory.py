@@ -6,12 +6,13 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, NotRequired, TypedDict
+from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.results.files import write_parquet
+from cmg_mj.results.files import METADATA_KEY, write_parquet
 
 SIGNALS = (
     "x1_rad",
@@ -46,17 +47,6 @@ RATES["free"] = (*(f"velocity/{{}}/{part}_m_s" for part in "xyz"), *RATES["ball"
 """Columns of a joint by its kind, in the order of qvel; angular velocities are in the body's own axes."""
 
 
-class StoredLayout(TypedDict):
-    """A `Layout` as JSON has it."""
-
-    observers: list[str]
-    extra_signals: list[list[str]]
-    joints: list[str]
-    kinds: NotRequired[list[str]]
-    axes: NotRequired[list[StoredLayout]]
-    name: NotRequired[str]
-
-
 @dataclass(frozen=True)
 class Layout:
     """The observers, joints and axes that a trajectory has columns of.
@@ -70,9 +60,9 @@ class Layout:
         name: The axis' name.
     """
 
-    observers: tuple[str, ...] = ()
-    extra_signals: tuple[tuple[str, ...], ...] = ()
-    joints: tuple[str, ...] = ()
+    observers: tuple[str, ...]
+    extra_signals: tuple[tuple[str, ...], ...]
+    joints: tuple[str, ...]
     kinds: tuple[str, ...] = ()
     axes: tuple[Layout, ...] = ()
     name: str = ""
@@ -94,6 +84,10 @@ class Layout:
         """List all columns after `time_s`, in order."""
         return [*self._signals(), *self.positions(), *self.rates()]
 
+    def named(self, columns: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+        """Name the columns after `time_s`, given in order."""
+        return dict(zip(self.columns(), columns, strict=True))
+
     def _signals(self) -> list[str]:
         """List the columns that are no joints'."""
         if self.axes:
@@ -104,18 +98,6 @@ class Layout:
             for name in (*ESTIMATES, *more)
         ]
         return [*SIGNALS, *estimates]
-
-    @staticmethod
-    def loaded(stored: StoredLayout) -> Layout:
-        """Make a layout from what `asdict`, then JSON made of one."""
-        return Layout(
-            tuple(stored["observers"]),
-            tuple(map(tuple, stored["extra_signals"])),
-            tuple(stored["joints"]),
-            tuple(stored.get("kinds", ())),
-            tuple(map(Layout.loaded, stored.get("axes", ()))),
-            stored.get("name", ""),
-        )
 
 
 @dataclass(frozen=True)
@@ -131,7 +113,7 @@ class Trajectory:
 
     columns: dict[str, np.ndarray]
     metadata: Mapping[str, Any] = field(default_factory=dict)
-    layout: Layout = field(default_factory=Layout)
+    layout: Layout = Layout((), (), ())
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -220,9 +202,7 @@ class Trajectory:
         """Write one world's trajectory as Parquet, whole or not at all."""
         import pyarrow as pa
 
-        stored = {"layout": asdict(self.layout), **self.metadata}
-        metadata = {b"cmg_mj": json.dumps(stored).encode()}
-        write_parquet(path, pa.table(self.columns).replace_schema_metadata(metadata))
+        write_parquet(path, pa.table(self.columns), {"layout": asdict(self.layout), **self.metadata})
 
     @staticmethod
     def load(path: Path) -> Trajectory:
@@ -245,12 +225,12 @@ class Trajectory:
                 table = pq.read_table(file)
         except (OSError, pa.ArrowException) as error:
             raise InputError(f"{path}: not a trajectory: {' '.join(str(error).split())}") from error
-        text = (table.schema.metadata or {}).get(b"cmg_mj")
+        text = (table.schema.metadata or {}).get(METADATA_KEY)
         if text is None or "time_s" not in table.column_names:
             raise InputError(f"{path}: a Parquet file, but not a trajectory written by cmg-mj")
         try:
             stored = json.loads(text)
-            layout = Layout.loaded(stored.pop("layout"))
+            layout = TypeAdapter(Layout).validate_python(stored.pop("layout"))
         except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InputError(
                 f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"

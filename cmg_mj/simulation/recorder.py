@@ -7,12 +7,11 @@ from itertools import chain
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Tick
+from cmg_mj.controllers.controller import Controller, Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References
-from cmg_mj.results.metrics import Metrics
-from cmg_mj.results.tick_block import TickBlock
+from cmg_mj.results.metrics import Metrics, TickBlock
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.simulation.physics import Joints
 
@@ -25,13 +24,10 @@ class TickRecorder:
 
     Args:
         plants: The rigs, one a world.
-        observers: The observer in the loop, then the open-loop observers.
-        extras: What each of them estimates beyond x.
+        observers: Names of the observer in the loop, then of the open-loop observers.
+        controller: The controller whose ticks they are: floats of one world, or arrays (n_worlds,).
         metrics: Takes every piece.
-        references: What the estimates are judged beside.
-        dt: Control period [s].
         keep: Whether to keep the pieces for a trajectory.
-        single: Whether the ticks hold floats (one world) or arrays (n_worlds,).
         joints: Whether to keep the joints.
     """
 
@@ -39,28 +35,26 @@ class TickRecorder:
         self,
         plants: Sequence[Plant],
         observers: Sequence[str],
-        extras: Sequence[Sequence[str]],
+        controller: Controller,
         metrics: Metrics,
-        references: References,
-        dt: float,
         *,
         keep: bool,
-        single: bool,
-        joints: bool = True,
+        joints: bool,
     ) -> None:
         self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
         names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
+        extras, seed, worlds = controller.extra_signals, controller.seed, controller.worlds
         self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), names, kinds)
         self._joints = joints
         self._estimated = [(*ESTIMATES, *names) for names in extras]
-        self._metrics = metrics
-        self._references = references
-        self._dt = dt
+        self.metrics = metrics
+        self._dt = controller.law.dt
+        self._references = References(controller.sensors.mems_gyro, self._dt, seed, worlds, controller.axis)
         self._keep = keep
-        self._single = single
+        self._single = isinstance(worlds, int)
         self._waiting: list[tuple] = []
-        self._pieces: list[list[np.ndarray]] = []
+        self._pieces: list[dict[str, np.ndarray]] = []
 
     def add(self, q: Joints, v: Joints, tick: Tick, torque: Scalar, running: np.ndarray | None) -> None:
         """Take one tick.
@@ -82,10 +76,12 @@ class TickRecorder:
             return
         piece = self._piece(self._waiting)
         self._waiting = []
-        self._metrics.update(piece, self._references.rates(piece.x2))
+        self.metrics.update(piece, self._references.rates(piece.x2))
         if self._keep:
             columns, ended = piece.columns, piece.ended
-            self._pieces.append(columns if ended is None else [np.where(ended, np.nan, column) for column in columns])
+            if ended is not None:
+                columns = {name: np.where(ended, np.nan, column) for name, column in columns.items()}
+            self._pieces.append(columns)
 
     def _piece(self, waiting: Sequence[tuple]) -> TickBlock:
         qs, vs, ticks, torques, runnings = zip(*waiting, strict=True)
@@ -101,22 +97,9 @@ class TickRecorder:
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)
         named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
-        columns = [
-            x1,
-            x2,
-            x3,
-            y1,
-            y2,
-            acceleration,
-            fog,
-            u,
-            x_e,
-            push,
-            *(part for parts in estimated for part in parts),
-            *(q if self._joints else ()),
-            *(v if self._joints else ()),
-        ]
-        return TickBlock(x1, x2, x3, y1, fog, u, named, columns, ended)
+        joints = [*q, *v] if self._joints else []
+        signals = [x1, x2, x3, y1, y2, acceleration, fog, u, x_e, push, *chain.from_iterable(estimated), *joints]
+        return TickBlock(x1, x2, x3, y1, fog, u, named, self._layout.named(signals), ended)
 
     def _columns(self, ticks: Sequence) -> np.ndarray:
         """(n_ticks, n_signals[, n_worlds]) -> (n_signals, n_ticks, n_worlds)."""
@@ -140,12 +123,12 @@ class TickRecorder:
             pieces = [*pieces, self._piece(self._waiting).columns]
         return self._joined(pieces, TICKS_A_PIECE * first).from_tick(tick - TICKS_A_PIECE * first)
 
-    def _joined(self, pieces: Sequence[list[np.ndarray]], first: int) -> Trajectory:
+    def _joined(self, pieces: Sequence[Mapping[str, np.ndarray]], first: int) -> Trajectory:
         """Pieces as one trajectory, whose first tick has this number."""
         columns = {}
         names = self._layout.columns()
-        for i, name in enumerate(names):
-            whole = np.concatenate([piece[i] for piece in pieces]) if pieces else np.zeros((0, len(self._bias)))
+        for name in names:
+            whole = np.concatenate([piece[name] for piece in pieces]) if pieces else np.zeros((0, len(self._bias)))
             columns[name] = whole[:, 0] if self._single else whole
         n_ticks = len(columns[names[0]])
         return Trajectory({"time_s": np.arange(first, first + n_ticks) * self._dt, **columns}, layout=self._layout)

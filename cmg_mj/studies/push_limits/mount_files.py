@@ -6,13 +6,12 @@ import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypedDict
 
 import mujoco
 import tomli_w
 
 from cmg_mj.errors import InputError
-from cmg_mj.observers.registry import observer_class
+from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.plant.mounting import MountedRobot
 from cmg_mj.plant.mounting.mount import mount_on_request
 from cmg_mj.plant.mounting.mounted import check_target, with_scenario
@@ -115,7 +114,7 @@ def mount_and_write(
         InputError: The robot or the request does not allow it, or a file cannot be written.
     """
     robot, file = Path(robot), Path(target).expanduser()
-    observer_class(observer)
+    OBSERVER_CLASSES.find(observer)
     check_target(file, robot.expanduser())
     for path in (file, file.with_suffix(".toml")):
         if path.exists() and not overwrite:
@@ -198,13 +197,6 @@ def write_scenario(
     return prepare(load_scenario(str(path)))
 
 
-class _Push(TypedDict, total=False):
-    axis: str
-    start_s: float
-    duration_s: float
-    torque_n_m: float
-
-
 def scenario_text(
     model: str,
     robot: Path,
@@ -216,12 +208,12 @@ def scenario_text(
     """Return the scenario that `write_scenario` writes, as TOML."""
     start = {"initial_tilt_deg": limits.start_tilt_deg if limits else 0.0}
     plant = {"model": model, "equilibrium_bias_deg": 0.0, **({"initial_tilt_deg": 0.0} if axis else start)}
-    pushes: list[_Push] = []
+    pushes: list[dict[str, str | float]] = []
     largest = simulated.impulse if simulated else limits.push_margin.median_impulse if limits else 0.0
     if largest:
         torque = float(f"{PUSH_SHARE * largest / PUSH_S:.3g}")
-        push: _Push = {"start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}
-        pushes = [{"axis": axis, **push} if axis else push]
+        pushed_axis = {"axis": axis} if axis else {}
+        pushes = [{**pushed_axis, "start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}]
     return tomli_w.dumps(
         {
             "title": f"{robot.stem}, balanced",

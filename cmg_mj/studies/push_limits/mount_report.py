@@ -25,7 +25,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
     line = plant.axis.line
     joint = plant.model.joint(line.joint).name
     about = f"the hinge {joint!r}" if isinstance(line, HingeLine) else "the line that it stands on"
-    body = plant.model.body(plant.frame).name
+    body = plant.model.body(plant.axis.frame).name
     yield f"{mounted.path}: {len(plant.axis.modules)} modules on {body!r}; tilts about {about}"
     if mounted.held:
         yield f"  held where they stand: {', '.join(mounted.held)}"

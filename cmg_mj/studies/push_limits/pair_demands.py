@@ -64,9 +64,9 @@ def pair_demands(plant: Plant, rate_limit: float, scale: float) -> PairDemands:
     Returns:
         The demands.
     """
-    model, modules = plant.model, plant.modules
+    model, modules = plant.model, plant.axis.modules
     mass = sum(float(model.body_subtreemass[model.body(f"{module.name}/half").id]) for module in modules)
-    robot = float(model.body_subtreemass[model.body_rootid[plant.frame]]) - mass
+    robot = float(model.body_subtreemass[model.body_rootid[plant.axis.frame]]) - mass
     speeds = [abs(module.speed) for module in modules]
     moment = BEARINGS * 0.5 * FRICTION * 0.1 * RATING_N * BORE_M * scale**3
     return PairDemands(
@@ -74,6 +74,6 @@ def pair_demands(plant: Plant, rate_limit: float, scale: float) -> PairDemands:
         robot,
         min(float(model.actuator_forcerange[module.servo, 1]) for module in modules),
         rate_limit,
-        sum(0.5 * plant.reduced.J_d * speed**2 for speed in speeds),
+        sum(0.5 * plant.axis.reduced.J_d * speed**2 for speed in speeds),
         sum(moment * speed for speed in speeds),
     )

@@ -213,7 +213,7 @@ def _attempt(
     period = controller.period
     steps = period * math.ceil(duration_s / (period * plant.timestep))
     instants = sampling_instants(steps, controller.steps_per_sample, [push], plant.timestep, plant.axis_names)
-    modules = plant.single_axis(axis).modules
+    modules = plant.single_axis(axis).axis.modules
     servos, gimbals = [module.servo for module in modules], [module.gimbal_dof for module in modules]
     torque = rate = 0.0
     with set_control_callback(None), np.errstate(all="ignore"):

@@ -10,7 +10,7 @@ from cmg_mj.visualization.recording.branch import make_branches
 from cmg_mj.visualization.recording.run import RecordingHeader, Run
 from cmg_mj.visualization.recording.scene import log_rig
 from cmg_mj.visualization.recording.signals import log_lane, log_phases, log_series, phase_steps
-from cmg_mj.visualization.recording.stream import application_name, recorded
+from cmg_mj.visualization.recording.stream import application_name, open_recording
 from cmg_mj.visualization.recording.summary import log_results, log_scenario
 
 
@@ -30,7 +30,7 @@ def write_recording(path: Path, header: RecordingHeader, runs: Sequence[Run]) ->
     branches = make_branches(header, runs)
     name = f"{header.title or 'Run'}: {', '.join(branch.label for branch in branches)}"
     application = application_name([run.name for run in runs], branches)
-    with recorded(path, name, application, default_blueprint(header.plant, branches)) as rec:
+    with open_recording(path, name, application, default_blueprint(header.plant, branches)) as rec:
         end = max(run.outcome.time_s for run in runs)
         for branch in branches:
             log_rig(rec, branch)

@@ -264,11 +264,11 @@ def test_a_servo_takes_what_one_world_shows() -> None:
         pushed.plant.timestep,
     )
     loop, torques, rates = ControlLoop(physics, controller, instants, 1.0), [0.0], [0.0]
-    servos = [module.servo for module in pushed.plant.modules]
+    servos = [module.servo for module in pushed.plant.axis.modules]
     for tick in loop.ticks():
         loop.decide()
         loop.advance()
         torques.append(float(np.abs(physics.data.actuator_force[servos]).max()))
-        rates.append(max(abs(float(tick.v[module.gimbal_dof])) for module in pushed.plant.modules))
+        rates.append(max(abs(float(tick.v[module.gimbal_dof])) for module in pushed.plant.axis.modules))
     assert attempt.servo_torque == pytest.approx(max(torques), rel=1e-6)
     assert attempt.servo_rate == pytest.approx(max(rates), rel=1e-6)
