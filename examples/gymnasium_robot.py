@@ -17,10 +17,10 @@ ROBOT = Path(gymnasium.__path__[0]) / "envs" / "mujoco" / "assets" / "inverted_p
 mounted = cmg_mj.mount(ROBOT, body="pole", axis="hinge", release=["slider"])
 with tempfile.TemporaryDirectory() as folder:
     model = mounted.save(Path(folder) / "balanced.xml")
-    can = prospects(write_scenario(model, ROBOT, "homogeneous"))
-    experiment = write_scenario(model, ROBOT, "homogeneous", can)
+    can = prospects(write_scenario(model, ROBOT, "gyro_free"))
+    experiment = write_scenario(model, ROBOT, "gyro_free", can)
 print(f"falls with {can.limit.pole:.2f} 1/s; any controller recovers at most {can.limit.tilt:.3f} rad")
 for share in (0.6, 1.8):
     push = {"push.0.torque_n_m": share * can.push_margin.median_impulse / 0.1}
     stood = experiment.with_settings(push).run_many(5, keep_trajectory=False).stood.sum()
-    print(f"pushed with {share} of what it bears: {stood} of 5 stood")
+    print(f"pushed with {share} of E: {stood} of 5 stood")

@@ -31,8 +31,8 @@ TORSO = f"""
 mounted = cmg_mj.mount(mujoco.MjSpec.from_string(TORSO), body="torso", axis="x", scale=1.3)
 with tempfile.TemporaryDirectory() as folder:
     model = mounted.save(Path(folder) / "balanced.xml")  # plain MuJoCo loads it too
-    can = prospects(write_scenario(model, model, "homogeneous"))
-    experiment = write_scenario(model, model, "homogeneous", can)  # pushes with 0.6 of what it bears
+    can = prospects(write_scenario(model, model, "gyro_free"))
+    experiment = write_scenario(model, model, "gyro_free", can)  # pushes with 0.6 of E
 outcome = experiment.run().outcomes[0]
-print(f"held: {', '.join(mounted.held)}; it bears {can.fraction_of_limit:.0%} of what any law could")
+print(f"held: {', '.join(mounted.held)}; E is {can.fraction_of_limit:.0%} of what any law could recover from")
 print(f"pushed with 0.6 of that: {'fell at' if outcome.fell else 'stood until'} {outcome.time_s:g} s")

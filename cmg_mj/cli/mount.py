@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from cmg_mj.cli.arguments import observer_option, with_json
-from cmg_mj.cli.terminal import note, note_hints, show, users_code
+from cmg_mj.cli.terminal import CtrlC, note, note_hints, progress, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -81,21 +82,28 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     default="as_is",
     help="Replace the joints of the robot's root by a free joint.",
 )
-@observer_option(default="homogeneous")
+@observer_option(default="gyro_free")
+@click.option("--quick", is_flag=True, help="Print E of the reduced model, and try nothing in MuJoCo (up to a minute).")
 @with_json
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount; not what has changed since.")
 @users_code()
-def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, **request: Any) -> None:
-    """Mount control moment gyroscopes on a robot, and print the largest pushes it recovers from.
+def mount(robot: str, out: str, observer: str, quick: bool, as_json: bool, overwrite: bool, **request: Any) -> None:
+    """Mount control moment gyroscopes on a robot, and print the largest push it stands.
 
     Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario has the
-    gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest push that its controller
-    recovers from.
+    gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest that the robot stands in
+    MuJoCo.
     """
     from cmg_mj.plant.mounting.request import MountRequest
-    from cmg_mj.studies.push_limits.mount_files import mount_and_write, mount_report_lines
+    from cmg_mj.studies.push_limits.mount_files import mount_and_write
+    from cmg_mj.studies.push_limits.mount_report import mount_report_lines
+    from cmg_mj.studies.push_limits.simulated_push import LONGEST_S, TimeLimit
 
-    result = mount_and_write(robot, MountRequest(**request), out, observer, overwrite=overwrite)
+    with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", LONGEST_S, ctrl_c) as on_progress:
+        time_limit = None if quick else TimeLimit(on_progress=on_progress)
+        result = mount_and_write(
+            robot, MountRequest(**request), out, observer, overwrite=overwrite, time_limit=time_limit
+        )
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
         note_hints(result.prospects.hints)

@@ -220,7 +220,7 @@ def check(file: str) -> None:
     from cmg_mj.scenario.loading import load_scenario, parse_scenario
     from cmg_mj.simulation.experiment import prepare
 
-    is_model = Path(file).suffix.lower() == ".xml"
+    is_model = Path(file).suffix.lower() in (".xml", ".mjb")
     scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file)
     describe = rig_description if is_model else description
     parts = prepare(scenario).parts

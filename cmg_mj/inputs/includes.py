@@ -45,6 +45,11 @@ def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[Path]
         raise InputError(
             f"{root}: contains itself: {' in '.join(p.name for p in (*within[within.index(here) :], here))}"
         )
+    if path.suffix.lower() == ".mjb":
+        raise InputError(
+            f"{root}: is a model that MuJoCo has compiled, whose parts cannot be told apart any more; give the MJCF "
+            "that it was made from (.xml)"
+        )
     text = _COMMENT.sub("", read_text(path, f"{root}: {path.name}", LARGEST))
     yield path
     for element, name, count in _COUNT.findall(text):

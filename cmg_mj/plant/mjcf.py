@@ -57,6 +57,18 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     return model
 
 
+def as_mjcf(spec: mujoco.MjSpec, path: Path) -> str:
+    """Write a model as MJCF.
+
+    Raises:
+        InputError: MuJoCo cannot write it, or does not find its meshes and textures.
+    """
+    try:
+        return spec.to_xml()
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        raise InputError(f"{path}: MuJoCo cannot write it: {_one_line(error)}") from error
+
+
 class Rig(NamedTuple):
     """A compiled model that has all parts of a plant.
 

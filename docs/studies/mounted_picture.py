@@ -64,8 +64,8 @@ def main() -> None:
     made = mount(ROBOT, "torso", axis="x", scale=1.21)
     with tempfile.TemporaryDirectory() as folder:
         model = made.save(Path(folder) / "balanced.xml")
-        can = prospects(write_scenario(model, ROBOT, "homogeneous"))
-        run = write_scenario(model, ROBOT, "homogeneous", can).run().trajectory
+        can = prospects(write_scenario(model, ROBOT, "gyro_free"))
+        run = write_scenario(model, ROBOT, "gyro_free", can).run().trajectory
     assert run is not None
     time = run["time_s"]
     shown = (time >= SHOWN_S[0]) & (time <= SHOWN_S[1])
@@ -82,8 +82,8 @@ def main() -> None:
     tilt.set_ylabel("tilt [deg]")
     rate = figure.add_subplot(grid[1, 1], sharex=tilt)
     rate.plot(time[shown], run["x2_rad_s"][shown], color=GREY, linewidth=1.8, label="true")
-    estimate = run["estimate/homogeneous/x2_rad_s"][shown]
-    rate.plot(time[shown], estimate, color=hexadecimal(colour("homogeneous")), linewidth=1.0, label="homogeneous")
+    estimate = run["estimate/gyro_free/x2_rad_s"][shown]
+    rate.plot(time[shown], estimate, color=hexadecimal(colour("gyro_free")), linewidth=1.0, label="gyro_free")
     rate.set_ylabel("tilt rate [rad/s]")
     rate.set_xlabel("time [s]")
     torque = float(np.abs(run["push_n_m"]).max())

@@ -17,7 +17,7 @@ from cmg_mj.plant.mounting.attach import add_sensors, attach_modules, module_nam
 from cmg_mj.plant.mounting.axes import AxisLike
 from cmg_mj.plant.mounting.clearance import check_room
 from cmg_mj.plant.mounting.existing_axes import ExistingAxes, find_existing_axes
-from cmg_mj.plant.mounting.fall_check import SLOWEST, TRIED_DEG, simulated_pole
+from cmg_mj.plant.mounting.fall_check import SLOWEST, TRIED_DEG, overlap, simulated_pole
 from cmg_mj.plant.mounting.held_joints import Hold, hold_joints
 from cmg_mj.plant.mounting.keyframes import Poses, as_qpos, pop_keyframes, poses_of, write_keyframe
 from cmg_mj.plant.mounting.mounted import MountedRobot
@@ -132,14 +132,17 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     add_sensors(spec, body, request.prefix, turn.T @ (under - origin), turn.T @ axes_along(direction), height)
     model = _with_keyframes(spec, names, qpos, [(name, poses | gimbals) for name, poses in keyframes], existing, path)
     key = model.key(EQUILIBRIUM_KEY).id
-    pole = simulated_pole(model, key, find_axis(model, key, request.name, axes_of(model)[request.name]).line)
-    if not pole:
-        raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: it stands by itself")
+    line = find_axis(model, key, request.name, axes_of(model)[request.name]).line
+    pole = simulated_pole(model, key, line)
     if pole < SLOWEST:
-        raise InputError(
-            f"{path}: falls too slowly, with {pole:.2g} 1/s; a pair is for what falls with {SLOWEST:.2g} 1/s or faster "
-            "(--position is in metres; a mass far up falls slowly)"
-        )
+        touching = overlap(model, key, line, pole)
+        if pole and not touching:
+            raise InputError(
+                f"{path}: falls too slowly, with {pole:.2g} 1/s; a pair is for what falls with {SLOWEST:.2g} 1/s or "
+                "faster (--position is in metres; a mass far up falls slowly)"
+            )
+        reason = f"{touching}; let them not collide (<exclude>)" if touching else "it stands by itself"
+        raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: {reason}")
     return MountedRobot(spec, path, tuple(held), tuple(notes))
 
 

@@ -14,7 +14,7 @@ from cmg_mj.errors import InputError, shown
 from cmg_mj.inputs.includes import check_files
 from cmg_mj.inputs.paths import expanded
 from cmg_mj.inputs.sanity import is_text
-from cmg_mj.plant.mjcf import check_rig
+from cmg_mj.plant.mjcf import as_mjcf, check_rig
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.signed_text import signed
 
@@ -39,7 +39,7 @@ class MountedRobot:
         """Write the robot as MJCF, which plain MuJoCo loads and `plant.model` takes; whole or not at all.
 
         Args:
-            path: The file. It refers to meshes and textures by relative paths; they are not copied.
+            path: The file, in any folder. It refers to meshes and textures by relative paths; they are not copied.
 
         Returns:
             The file.
@@ -50,11 +50,13 @@ class MountedRobot:
         target = expanded(path, "-o")
         check_target(target, self.path)
         spec = self.spec.copy()
+        folder = Path(os.path.abspath(target.parent))
         for field in ("meshdir", "texturedir"):
-            setattr(spec, field, _relative_assets(target.resolve().parent, spec.modelfiledir, getattr(spec, field)))
+            setattr(spec, field, _relative_assets(folder, spec.modelfiledir, getattr(spec, field)))
+        spec.modelfiledir = f"{folder}{os.sep}"  # MuJoCo opens the meshes to write them
         try:
             with whole_file(target, ".xml") as temporary:
-                temporary.write_bytes(signed(spec.to_xml(), ".xml"))
+                temporary.write_bytes(signed(as_mjcf(spec, self.path), ".xml"))
                 check_rig(temporary, target)
         except OSError as error:
             raise InputError(f"-o {path}: cannot be written: {error.strerror}") from error
@@ -118,5 +120,10 @@ def with_scenario(target: Path) -> Iterator[Path]:
 
 
 def _relative_assets(folder: Path, model_folder: str, assets: str) -> str:
-    """Return the path of a robot's folder of assets, relative to another folder."""
-    return os.path.relpath(Path(model_folder or ".").resolve() / assets, folder)
+    """Return the path of a robot's folder of assets, relative to another folder.
+
+    It is absolute where a symbolic link makes the relative path depend on how the model is opened.
+    """
+    path = os.path.abspath(os.path.join(model_folder, assets))
+    relative = os.path.relpath(path, folder)
+    return relative if relative == os.path.relpath(os.path.realpath(path), os.path.realpath(folder)) else path

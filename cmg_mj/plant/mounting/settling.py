@@ -18,6 +18,8 @@ AT_REST = 1e-4
 """Rates below which a robot rests [m/s, rad/s]."""
 UPRIGHT_DEG = 0.005
 """Largest lean of the mass from above the line [deg]."""
+MOST_ROUNDS = 40
+"""Most rounds of resting and leaning; on flat tyres each takes an eighth off the lean."""
 LARGEST_LEAN_DEG = 20.0
 """A robot whose mass lies farther off what it stands on has fallen, whatever holds it [deg]."""
 STANDS_DEG = 2.0
@@ -61,7 +63,7 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
     mujoco.mj_forward(model, data)
     _touch_down(model, data, joint, path)
     leaned = 0.0
-    for _ in range(8):
+    for _ in range(MOST_ROUNDS):
         _rest(model, data, joint, direction, path)
         point, direction = _support(model, data, joint, direction, path)
         body = int(model.jnt_bodyid[joint])
@@ -109,6 +111,14 @@ def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, joint: int, path: Pa
             'floor (<geom type="plane" size="5 5 0.1"/> in the worldbody), and let contacts be on'
         )
     data.qpos[model.jnt_qposadr[joint] + 2] -= min(gaps)
+    mujoco.mj_forward(model, data)
+    # A contact with a margin already pushes at a distance: a robot let down farther is thrown up.
+    depths = [
+        contact.includemargin - contact.dist
+        for contact in data.contact[: data.ncon]
+        if tree[model.geom_bodyid[contact.geom1]] != tree[model.geom_bodyid[contact.geom2]] and contact.includemargin
+    ]
+    data.qpos[model.jnt_qposadr[joint] + 2] += max(depths, default=0.0)
     mujoco.mj_forward(model, data)
 
 
@@ -163,11 +173,9 @@ def _support(
         raise InputError(f"{path}: does not come to rest on anything")
     places = np.array(points)
     middle = np.average(places, axis=0, weights=loads)
-    ends = places[np.argmax(places @ direction)] - places[np.argmin(places @ direction)]
-    ends[2] = 0.0
-    length = float(np.linalg.norm(ends))
-    if length > LONG_M and float(ends @ direction) > math.cos(math.radians(LARGEST_LEAN_DEG)) * length:
-        direction = ends / length
+    along = _longest_direction(places - middle, np.array(loads), direction)
+    if float(np.ptp(places @ along)) > LONG_M and float(along @ direction) > math.cos(math.radians(LARGEST_LEAN_DEG)):
+        direction = along
     width = float(np.ptp(places @ np.cross(direction, UP)))
     height = float(data.subtree_com[int(model.jnt_bodyid[joint])][2] - middle[2])
     if math.degrees(math.atan2(0.5 * width, max(height, 1e-9))) > STANDS_DEG:
@@ -176,6 +184,17 @@ def _support(
             "stands on a line or a point (another --axis?)"
         )
     return middle, direction
+
+
+def _longest_direction(arms: np.ndarray, loads: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Return the horizontal direction in which loads lie farthest apart, (3,), to the side of the given one.
+
+    It is the principal axis of the loads. A line through the two contacts farthest apart would go through opposite
+    corners of flat tyres.
+    """
+    level = arms[:, :2]
+    axis = np.append(np.linalg.eigh(level.T @ (loads[:, None] * level))[1][:, 1], 0.0)
+    return axis * math.copysign(1.0, float(axis @ direction))
 
 
 def _turn(

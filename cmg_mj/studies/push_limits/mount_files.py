@@ -1,10 +1,9 @@
-"""A robot with a pair mounted on it, written as a model and a scenario to run, and the report on it."""
+"""A robot with a pair mounted on it, written as a model and a scenario to run."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,22 +18,26 @@ from cmg_mj.plant.mounting.mount import mount_on_request
 from cmg_mj.plant.mounting.mounted import check_target, with_scenario
 from cmg_mj.plant.mounting.request import MountRequest
 from cmg_mj.plant.mounting.target import check_replaceable, claimed_target
-from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.plant.tilt_line import HingeLine
+from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.signed_text import signed
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.push_limits.largest_push import PUSH_S
+from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
+from cmg_mj.studies.push_limits.pair_demands import PairDemands, pair_demands
 from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG, Prospects, prospects, smallest_sufficient_scale
-from cmg_mj.studies.push_limits.recoverable_states import ceiling
+from cmg_mj.studies.push_limits.simulated_push import (
+    OutOfTimeError,
+    SimulatedPush,
+    TimeLimit,
+    simulated_push,
+    standing_unpushed,
+)
 
-START_DEG, START_SHARE = 1.0, 0.25
-"""A run starts with one degree of tilt, or with a quarter of the recoverable tilt if that is less."""
 PUSH_SHARE = 0.6
-"""A run is pushed with this share of the push margin."""
+"""A run is pushed with this share of the push that the robot stands in MuJoCo, or of E if that is not known."""
 PUSHED_AT_S, DURATION_S = 10.0, 20.0
-"""The gimbals come back from the first tilt before the push: the margin E is that of upright gimbals. On a slow robot,
+"""The gimbals come back from the first tilt before the push: both limits are those of upright gimbals. On a slow robot,
 whose pole is 3 1/s, that takes so long."""
 
 
@@ -46,15 +49,21 @@ class MountResult:
         mounted: The robot with its pair.
         path: The model's file; the scenario lies beside it.
         plant: The plant of the pair's axis.
-        prospects: Limits of the pair on this robot.
-        sufficient_scale: A scale with which the robot recovers `LOW_LIMIT_DEG`; None if the pair's own does, or if no
-            scale that has room does.
+        observer: Name of the observer in the loop.
+        prospects: Limits of the pair on this robot, of the reduced model.
+        simulated: The push that the robot stands in MuJoCo; None if that was not tried.
+        demands: Demands of the pair on the robot.
+        sufficient_scale: A scale that was tried, with which the robot stands and the ceiling is `LOW_LIMIT_DEG` or
+            more; None if the pair's own suffices, or if none was found that does.
     """
 
     mounted: MountedRobot
     path: Path
     plant: Plant
+    observer: str
     prospects: Prospects
+    simulated: SimulatedPush | None
+    demands: PairDemands
     sufficient_scale: float | None
 
     @property
@@ -64,8 +73,17 @@ class MountResult:
 
     def figures(self) -> dict[str, float | str | list[str] | None]:
         """Return the figures that `cmg-mj mount --json` prints."""
+        simulated = self.simulated
         return {
             **self.prospects.figures(),
+            "stand_unpushed_of_10": simulated and simulated.standing,
+            "stands_push_impulse_n_m_s": simulated and simulated.impulse,
+            "stands_push_torque_n_m": simulated and simulated.impulse / PUSH_S,
+            "stands_push_complete": simulated and simulated.complete,
+            "servo_peak_torque_n_m": simulated and simulated.servo_torque,
+            "servo_peak_rate_rad_s": simulated and simulated.servo_rate,
+            **self.demands.figures(),
+            "observer": self.observer,
             "model": str(self.path),
             "held": list(self.mounted.held),
             "scale_that_suffices": self.sufficient_scale,
@@ -73,7 +91,13 @@ class MountResult:
 
 
 def mount_and_write(
-    robot: str | Path, request: MountRequest, target: str | Path, observer: str, *, overwrite: bool = False
+    robot: str | Path,
+    request: MountRequest,
+    target: str | Path,
+    observer: str,
+    *,
+    overwrite: bool = False,
+    time_limit: TimeLimit | None = None,
 ) -> MountResult:
     """Mount a pair on a robot, find its limits, and write the model with a scenario beside it.
 
@@ -83,6 +107,8 @@ def mount_and_write(
         target: The model's file, `.xml`; the scenario gets the same name with `.toml`.
         observer: Observer in the scenario's loop.
         overwrite: Whether the files of an earlier mount are replaced. Others never are.
+        time_limit: The time to try in MuJoCo what the robot stands, and a larger scale if it does not; None to leave
+            that out.
 
     Returns:
         The robot, its files and its limits.
@@ -94,26 +120,30 @@ def mount_and_write(
     OBSERVER_CLASSES.find(observer)
     check_target(file, expanded(robot, "ROBOT"))
     with claimed_target(file, overwrite=overwrite):
-        return _mount_and_write(robot, request, file, observer, overwrite=overwrite)
+        return _mount_and_write(robot, request, file, observer, overwrite=overwrite, time_limit=time_limit)
 
 
-def _mount_and_write(robot: Path, request: MountRequest, file: Path, observer: str, *, overwrite: bool) -> MountResult:
+def _mount_and_write(
+    robot: Path, request: MountRequest, file: Path, observer: str, *, overwrite: bool, time_limit: TimeLimit | None
+) -> MountResult:
     """See `mount_and_write`; the files are claimed."""
     mounted = _mount(robot, request)
     with with_scenario(file) as model:
         mounted.save(model)
-        limits = prospects(write_scenario(model, mounted.path, observer, axis=request.name), request.name)
-        experiment = write_scenario(model, mounted.path, observer, limits, request.name)
-        sufficient = None
-        if math.degrees(limits.limit.tilt) < LOW_LIMIT_DEG:
-            trial = model.with_suffix(".trial.xml")
-            sufficient = smallest_sufficient_scale(
-                lambda scale: _recoverable_tilt(robot, request, scale, trial, experiment.law.rate_limit), request.scale
-            )
-        scenario = scenario_text(file.name, mounted.path, observer, limits, request.name)
-        model.with_suffix(".toml").write_bytes(signed(scenario, ".toml"))
+        experiment = write_scenario(model, mounted.path, observer, axis=request.name)
+        limits = prospects(experiment, request.name)
+        simulated = sufficient = None
+        if time_limit is not None:
+            simulated = simulated_push(experiment, limits, request.name, time_limit)
+            if math.degrees(limits.limit.tilt) < LOW_LIMIT_DEG or simulated.falls:
+                trial = model.with_name(f".{file.stem}.trial.xml")
+                sufficient = _sufficient_scale(robot, request, trial, observer, time_limit)
+        text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated)
+        model.with_suffix(".toml").write_bytes(signed(text, ".toml"))
         check_replaceable(file, overwrite=overwrite)  # also what has come meanwhile
-    return MountResult(mounted, file, experiment.plant.single_axis(request.name), limits, sufficient)
+    plant = experiment.plant.single_axis(request.name)
+    demands = pair_demands(plant, experiment.law.rate_limit, request.scale)
+    return MountResult(mounted, file, plant, observer, limits, simulated, demands, sufficient)
 
 
 def _mount(robot: Path, request: MountRequest) -> MountedRobot:
@@ -126,17 +156,36 @@ def _mount(robot: Path, request: MountRequest) -> MountedRobot:
         raise InputError(f"{robot}: MuJoCo cannot put a pair on it: {message}") from error
 
 
-def _recoverable_tilt(robot: Path, request: MountRequest, scale: float, trial: Path, rate_limit: float) -> float:
-    """Return the largest tilt that a pair of another scale recovers from [rad]."""
-    model = _mount(robot, dataclasses.replace(request, scale=scale)).save(trial)
+def _sufficient_scale(
+    robot: Path, request: MountRequest, trial: Path, observer: str, time_limit: TimeLimit
+) -> float | None:
+    """Try larger scales until the ceiling is `LOW_LIMIT_DEG` or more and the robot stands in MuJoCo."""
+
+    def suffices(scale: float) -> bool:
+        time_limit.check(f"--scale {scale:g}")
+        model = _mount(robot, dataclasses.replace(request, scale=scale)).save(trial)
+        try:
+            experiment = write_scenario(model, robot, observer, axis=request.name)
+            limits = prospects(experiment, request.name, with_margin=False)
+            enough = math.degrees(limits.limit.tilt) >= LOW_LIMIT_DEG
+            return enough and standing_unpushed(experiment, limits, request.name, time_limit) == WORLDS
+        finally:
+            for file in (model, model.with_suffix(".toml")):
+                file.unlink(missing_ok=True)
+
     try:
-        return ceiling(load_plant(model=str(model)).single_axis(request.name).reduced, rate_limit).tilt
-    finally:
-        model.unlink()
+        return smallest_sufficient_scale(suffices, request.scale)
+    except OutOfTimeError:
+        return None
 
 
 def write_scenario(
-    model: Path, robot: Path, observer: str, limits: Prospects | None = None, axis: str = ""
+    model: Path,
+    robot: Path,
+    observer: str,
+    limits: Prospects | None = None,
+    axis: str = "",
+    simulated: SimulatedPush | None = None,
 ) -> Experiment:
     """Write a scenario beside a model that carries a pair.
 
@@ -146,24 +195,32 @@ def write_scenario(
         observer: Observer in the loop.
         limits: Limits of the pair, which set the first tilt and the push; without them there is neither.
         axis: Name of the axis that the limits are of.
+        simulated: The push that the robot stands in MuJoCo, which then sets the push.
 
     Returns:
         The prepared experiment.
     """
     path = model.with_suffix(".toml")
     with whole_file(path) as temporary:
-        temporary.write_bytes(signed(scenario_text(model.name, robot, observer, limits, axis), ".toml"))
+        temporary.write_bytes(signed(scenario_text(model.name, robot, observer, limits, axis, simulated), ".toml"))
     return prepare(load_scenario(str(path)))
 
 
-def scenario_text(model: str, robot: Path, observer: str, limits: Prospects | None, axis: str) -> str:
+def scenario_text(
+    model: str,
+    robot: Path,
+    observer: str,
+    limits: Prospects | None,
+    axis: str,
+    simulated: SimulatedPush | None = None,
+) -> str:
     """Return the scenario that `write_scenario` writes, as TOML."""
-    tilt = min(START_DEG, START_SHARE * math.degrees(limits.limit.tilt)) if limits else 0.0
-    start = {"initial_tilt_deg": float(f"{tilt:.3g}")}
+    start = {"initial_tilt_deg": limits.start_tilt_deg if limits else 0.0}
     plant = {"model": model, "equilibrium_bias_deg": 0.0, **({"initial_tilt_deg": 0.0} if axis else start)}
     pushes: list[dict[str, str | float]] = []
-    if limits and limits.push_margin.median_impulse:
-        torque = float(f"{PUSH_SHARE * limits.push_margin.median_impulse / PUSH_S:.3g}")
+    largest = simulated.impulse if simulated else limits.push_margin.median_impulse if limits else 0.0
+    if largest:
+        torque = float(f"{PUSH_SHARE * largest / PUSH_S:.3g}")
         pushed_axis = {"axis": axis} if axis else {}
         pushes = [{**pushed_axis, "start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}]
     return tomli_w.dumps(
@@ -177,41 +234,3 @@ def scenario_text(model: str, robot: Path, observer: str, limits: Prospects | No
             **({"push": pushes} if pushes else {}),
         }
     )
-
-
-def mount_report_lines(result: MountResult) -> Iterator[str]:
-    """Describe a mounted robot and the limits of its pair, line by line.
-
-    Args:
-        result: The mounted robot.
-
-    Yields:
-        Lines.
-    """
-    mounted, plant, figures = result.mounted, result.plant, result.prospects.figures()
-    line = plant.axis.line
-    joint = plant.model.joint(line.joint).name
-    about = f"the hinge {joint!r}" if isinstance(line, HingeLine) else "the line that it stands on"
-    body = plant.model.body(plant.axis.frame).name
-    yield f"{mounted.path}: {len(plant.axis.modules)} modules on {body!r}; tilts about {about}"
-    if mounted.held:
-        yield f"  held where they stand: {', '.join(mounted.held)}"
-    for note in mounted.notes:
-        yield f"  {note}"
-    yield (
-        f"  inertia {figures['inertia_kg_m2']:.4g} kg m^2, gravity {figures['gravity_torque_n_m']:.4g} N m, momentum "
-        f"{figures['momentum_n_m_s']:.4g} N m s, falls with {figures['pole_1_s']:.3g} 1/s"
-    )
-    yield (
-        f"  any controller: recovers from at most {figures['limit_tilt_deg']:.3g} deg, or a push of "
-        f"{figures['limit_push_torque_n_m']:.3g} N m for {PUSH_S:g} s"
-    )
-    yield (
-        f"  this controller: recovers from a push of {figures['push_margin_torque_n_m']:.3g} N m for {PUSH_S:g} s (E = "
-        f"{figures['push_margin_impulse_n_m_s']:.3g} N m s, {result.prospects.fraction_of_limit:.0%} of that)"
-    )
-    scale = result.sufficient_scale
-    if scale is not None:
-        yield f"  a pair of this size recovers less than {LOW_LIMIT_DEG:g} deg: --scale {scale:g} suffices"
-    elif figures["limit_tilt_deg"] < LOW_LIMIT_DEG:
-        yield f"  a pair recovers less than {LOW_LIMIT_DEG:g} deg at any scale that it has room for"

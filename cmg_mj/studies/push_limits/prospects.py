@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from cmg_mj.errors import InputError
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.plant.mounting.fall_check import simulated_pole
+from cmg_mj.plant.mounting.fall_check import overlap, simulated_pole
 from cmg_mj.plant.mounting.request import SCALES
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.simulation.experiment import Experiment
@@ -17,6 +17,8 @@ from cmg_mj.studies.push_limits.recoverable_states import RecoverableLimit, ceil
 
 LOW_LIMIT_DEG = 2.0
 """A pair that recovers less tilt is too small for the robot [deg]."""
+START_DEG, START_SHARE = 1.0, 0.25
+"""A run starts with one degree of tilt, or with a quarter of the recoverable tilt if that is less."""
 POLE_DIFFERENCE = 0.1
 """Relative difference of the simulated pole from the reduced model's, from which the robot is unlike that model."""
 
@@ -30,12 +32,14 @@ class Prospects:
         limit: Limits for any controller.
         push_margin: Pushes that the scenario's law, observer and sensors recover from.
         pole: Unstable pole of the simulated robot, uncontrolled and with its flywheels at rest [1/s].
+        overlap: Clause on geoms that overlap where it stands; "" if there are none.
     """
 
     reduced: ReducedModel
     limit: RecoverableLimit
     push_margin: PushMargin
     pole: float
+    overlap: str = ""
 
     @property
     def limit_push_impulse(self) -> float:
@@ -48,14 +52,22 @@ class Prospects:
         return self.push_margin.median_impulse / self.limit_push_impulse
 
     @property
+    def start_tilt_deg(self) -> float:
+        """The tilt that a run of the robot starts with [deg]."""
+        return float(f"{min(START_DEG, START_SHARE * math.degrees(self.limit.tilt)):.3g}")
+
+    @property
     def hints(self) -> list[str]:
         """Clauses on what is likely to make the robot fall, though it is no mistake."""
         hints = []
         if not abs(self.pole / self.limit.pole - 1.0) < POLE_DIFFERENCE:
+            reason = self.overlap or (
+                "what it stands on rolls or gives way (soft contacts, or joints held softly), or the hinge that it "
+                "tilts about has a spring or damping"
+            )
             hints.append(
                 f"the robot starts to fall with a pole of {self.pole:.3g} 1/s, its reduced model's is "
-                f"{self.limit.pole:.3g}: what it stands on gives way (soft contacts, or joints held softly), or "
-                "the hinge that it tilts about has a spring or damping"
+                f"{self.limit.pole:.3g}: {reason}"
             )
         if self.push_margin.median_impulse == 0.0:
             hints.append("with this controller it falls without a push")
@@ -81,12 +93,13 @@ class Prospects:
         }
 
 
-def prospects(experiment: Experiment, axis: str = "") -> Prospects:
-    """Find the limits of a pair on a robot.
+def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = True) -> Prospects:
+    """Find the limits of a pair on a robot, by its reduced model.
 
     Args:
         experiment: The robot and its controller.
         axis: Name of the axis, if there are several.
+        with_margin: Whether to find E, which takes longest; otherwise it is 0.
 
     Returns:
         The limits.
@@ -97,14 +110,16 @@ def prospects(experiment: Experiment, axis: str = "") -> Prospects:
     limit = ceiling(plant.reduced, experiment.law.rate_limit)
     with set_control_callback(None), quiet():
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
-    return Prospects(plant.reduced, limit, push_margin(experiment.scenario, experiment.design), pole)
+        touching = overlap(plant.model, plant.key, plant.axis.line, pole)
+    margin = push_margin(experiment.scenario, experiment.design) if with_margin else PushMargin(0.0, 0.0)
+    return Prospects(plant.reduced, limit, margin, pole, touching)
 
 
-def smallest_sufficient_scale(tilt_at: Callable[[float], float], scale: float) -> float | None:
-    """Return a scale of the modules with which a robot recovers `LOW_LIMIT_DEG`, in steps of a tenth.
+def smallest_sufficient_scale(suffices: Callable[[float], bool], scale: float) -> float | None:
+    """Return a scale of the modules that suffices for a robot, in steps of a tenth.
 
     Args:
-        tilt_at: Scale -> largest tilt that any controller recovers from [rad].
+        suffices: Tries a scale.
         scale: A scale that does not suffice.
 
     Returns:
@@ -112,9 +127,8 @@ def smallest_sufficient_scale(tilt_at: Callable[[float], float], scale: float) -
     """
     while (scale := round(1.1 * scale, 2)) <= SCALES[1]:
         try:
-            tilt = tilt_at(scale)
+            if suffices(scale):
+                return scale
         except InputError:  # no room for it, say
             return None
-        if tilt >= math.radians(LOW_LIMIT_DEG):
-            return scale
     return None

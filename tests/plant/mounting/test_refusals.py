@@ -11,6 +11,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mounting import mount
+from cmg_mj.plant.plant import load_plant
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import EXAMPLES
 
@@ -145,6 +146,15 @@ def test_a_file_that_is_no_robot() -> None:
     for name, complaint in (("none.xml", "no such file"), ("broken.xml", "syntax error"), ("empty.xml", "not a model")):
         assert complaint in cmg_mj("mount", name, "--body", "torso").complaint
     assert not Path("balanced.xml").exists()
+
+
+def test_a_compiled_model_is_said_to_be_one() -> None:
+    mujoco.mj_saveModel(mujoco.MjModel.from_xml_path(str(TORSO)), "rig.mjb")
+    message = "rig.mjb: is a model that MuJoCo has compiled, .* give the MJCF that it was made from"
+    with pytest.raises(InputError, match=message):
+        load_plant(model="rig.mjb")
+    for arguments in (("mount", "rig.mjb", "--body", "torso"), ("check", "rig.mjb")):
+        assert "is a model that MuJoCo has compiled" in cmg_mj(*arguments).complaint
 
 
 def test_nobodys_file_is_overwritten() -> None:

@@ -13,6 +13,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.plant.mounting import MountedRobot, mount
 from cmg_mj.plant.mounting.fall_check import simulated_pole
 from cmg_mj.plant.plant import Plant, load_plant
+from tests.studies.push_limits.robots import CART_POLE, RAIL, bicycle
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -248,3 +249,49 @@ def test_a_free_base_finds_a_name() -> None:
     )
     assert result.spec.joint("t_free_2") is not None
     assert result.held == ("t_free",)
+
+
+FLAT = 0.01, 0.003
+"""Half of the width of flat tyres [m]."""
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.15])
+@pytest.mark.parametrize("beside", [0.0, 0.003])
+@pytest.mark.parametrize("half_width", FLAT)
+def test_flat_tyres_are_as_wide_as_they_are(half_width: float, beside: float, ahead: float) -> None:
+    """The line goes along them, not through opposite corners, and under the mass."""
+    spec = mujoco.MjSpec.from_string(bicycle(half_width, ahead=ahead, beside=beside))
+    model = mount(spec, "frame", axis="x", position=(0.0, 0.0, 0.4)).spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
+    mujoco.mj_forward(model, data)
+    along = data.site("tilt").xmat.reshape(3, 3)[:, 1]
+    wheels = data.xpos[[body for body in range(model.nbody) if model.body(body).name.startswith("body")]]
+    apart = wheels.max(axis=0) - wheels.min(axis=0)
+    assert math.degrees(math.acos(abs(float(along @ apart)) / float(np.linalg.norm(apart)))) < 0.1
+
+
+def test_a_bicycle_that_is_too_low_for_its_tyres_is_told_their_width() -> None:
+    spec = mujoco.MjSpec.from_string(bicycle(0.01, radius=0.16, height=0.05, ahead=0.1, mass=4.0))
+    with pytest.raises(InputError, match=r"stands by itself: what it stands on is 0\.02\d* m wide across the axis"):
+        mount(spec, "frame", axis="x", position=(0.0, 0.0, 0.15))
+
+
+@pytest.mark.parametrize("tyre", ['margin="0.02" solref="0.004 1" solimp="0.99 0.999 0.001"', 'margin="0.001"'])
+def test_stiff_contacts_with_a_margin_do_not_throw_a_robot(tyre: str) -> None:
+    """It stands where its contacts bear it: a margin above the floor."""
+    spec = mujoco.MjSpec.from_string(bicycle(0.003, tyre, ahead=0.17, mass=13.0, start=0.44))
+    model = mount(spec, "frame", axis="x", position=(0.0, 0.0, 0.4)).spec.compile()
+    height = float(model.key("equilibrium").qpos[2])
+    assert height == pytest.approx(0.34 + float(model.geom_margin.max()), abs=2e-3)
+
+
+def test_a_cart_that_its_rail_overlaps_is_told_so() -> None:
+    """Released, the contact with the rail holds the cart; held, the pole falls as if there were no rail."""
+    spec = mujoco.MjSpec.from_string(CART_POLE.format(rails=RAIL))
+    message = (
+        "does not start to fall from a tilt of 0.05 deg: its geoms 'rail' and 'cart' overlap by 20 mm, and contact"
+    )
+    with pytest.raises(InputError, match=message):
+        mount(spec, "pole", axis="hinge", release=["slider"])
+    mount(mujoco.MjSpec.from_string(CART_POLE.format(rails="")), "pole", axis="hinge", release=["slider"])

@@ -19,7 +19,7 @@ from tests.plant.mounting.robots import EXAMPLES, ROBOTS
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 TORSO = EXAMPLES / "torso.xml"
-MOUNT = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3")
+MOUNT = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3", "--quick")
 NO_XML = "must be a file that ends in .xml, such as balanced.xml"
 
 
@@ -113,15 +113,28 @@ def test_a_command_of_the_document(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.BEFORE_S", 0.1)
     monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.AFTER_TIME_CONSTANTS", 3.0)
     words = shlex.split(ROBOTS["bicycle"].command)
-    assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml").status == 0
+    assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml", "--quick").status == 0
     result = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options).save("b.xml")
     assert result.read_bytes() == Path("a.xml").read_bytes()
 
 
+def test_the_loop_is_closed_with_gyro_free_unless_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    observers: list[str] = []
+
+    def note(robot: object, request: object, out: object, observer: str, **_: object) -> None:
+        observers.append(observer)
+        raise InputError("noted")
+
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.mount_and_write", note)
+    for options in ((), ("--observer", "homogeneous")):
+        assert "noted" in cmg_mj(*MOUNT, *options).complaint
+    assert observers == ["gyro_free", "homogeneous"]
+
+
 def test_a_larger_pair_that_has_no_room_is_none_that_suffices() -> None:
-    def tilt_at(scale: float) -> float:
+    def suffices(scale: float) -> bool:
         if scale > 1.3:
             raise InputError("no room")
-        return 0.01
+        return False
 
-    assert smallest_sufficient_scale(tilt_at, 1.0) is None
+    assert smallest_sufficient_scale(suffices, 1.0) is None

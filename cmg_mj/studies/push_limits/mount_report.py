@@ -1,0 +1,100 @@
+"""The report that `cmg-mj mount` prints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from cmg_mj.plant.tilt_line import HingeLine
+from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
+from cmg_mj.studies.push_limits.mount_files import MountResult
+from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG
+from cmg_mj.studies.push_limits.simulated_push import LEAST, LONGEST_S, OTHER_WORLDS, UNPUSHED_S, SimulatedPush
+
+
+def mount_report_lines(result: MountResult) -> Iterator[str]:
+    """Describe a mounted robot and the limits of its pair, line by line.
+
+    Args:
+        result: The mounted robot.
+
+    Yields:
+        Lines.
+    """
+    mounted, plant, figures = result.mounted, result.plant, result.prospects.figures()
+    line = plant.axis.line
+    joint = plant.model.joint(line.joint).name
+    about = f"the hinge {joint!r}" if isinstance(line, HingeLine) else "the line that it stands on"
+    body = plant.model.body(plant.axis.frame).name
+    yield f"{mounted.path}: {len(plant.axis.modules)} modules on {body!r}; tilts about {about}"
+    if mounted.held:
+        yield f"  held where they stand: {', '.join(mounted.held)}"
+    for note in mounted.notes:
+        yield f"  {note}"
+    yield (
+        f"  inertia {figures['inertia_kg_m2']:.4g} kg m^2, gravity {figures['gravity_torque_n_m']:.4g} N m, momentum "
+        f"{figures['momentum_n_m_s']:.4g} N m s, falls with {figures['pole_1_s']:.3g} 1/s"
+    )
+    yield (
+        f"  any controller, from upright gimbals (linear model): recovers from at most {figures['limit_tilt_deg']:.3g} "
+        f"deg, or a push of {figures['limit_push_torque_n_m']:.3g} N m for {PUSH_S:g} s"
+    )
+    margin = result.prospects.push_margin.median_impulse
+    reduced = (
+        f"by its reduced model E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
+        f"{result.prospects.fraction_of_limit:.0%} of that"
+    )
+    yield f"  {result.observer}: {_simulated(result.simulated)}{reduced}"
+    yield from _scale(result)
+    yield from _demands(result)
+
+
+def _simulated(simulated: SimulatedPush | None) -> str:
+    """Describe what the robot stands in MuJoCo, up to the words on the reduced model."""
+    if simulated is None:
+        return "not tried in MuJoCo; "
+    if simulated.standing is None:
+        return f"in MuJoCo nothing found within {LONGEST_S:g} s; "
+    if simulated.falls:
+        fallen = WORLDS - simulated.standing
+        return f"does not stand: in MuJoCo {fallen} of {WORLDS} worlds fall within {UNPUSHED_S:g} s, unpushed; "
+    if not simulated.impulse:
+        reason = f"not even {LEAST:.0%} of that" if simulated.complete else f"none found within {LONGEST_S:g} s"
+        return f"stands in MuJoCo only unpushed ({reason}); "
+    more = f"and all of {OTHER_WORLDS} others" if simulated.complete else f"{LONGEST_S:g} s did not suffice for others"
+    return (
+        f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
+        f"worlds, less a tenth; {more}); "
+    )
+
+
+def _scale(result: MountResult) -> Iterator[str]:
+    """Say whether the pair is too small, and which scale was tried that is not."""
+    simulated, scale = result.simulated, result.sufficient_scale
+    low = math.degrees(result.prospects.limit.tilt) < LOW_LIMIT_DEG
+    if not (low or (simulated and simulated.falls)):
+        return
+    reason = f"any controller recovers less than {LOW_LIMIT_DEG:g} deg" if low else "it does not stand"
+    if scale is not None:
+        yield f"  with a pair of this size {reason}; with --scale {scale:g}, tried in MuJoCo, it stands"
+    elif simulated is None:
+        yield f"  with a pair of this size {reason}; --quick tries no larger --scale"
+    else:
+        yield f"  with a pair of this size {reason}; no larger --scale was found with which it stands"
+
+
+def _demands(result: MountResult) -> Iterator[str]:
+    """Say what the pair weighs, what its servos have to do and what its wheels take."""
+    demands, simulated = result.demands, result.simulated
+    taken = ""
+    if simulated is not None and simulated.servo_torque is not None and simulated.servo_rate is not None:
+        taken = f"; the push takes up to {simulated.servo_torque:.2g} N m and {simulated.servo_rate:.2g} rad/s"
+    yield (
+        f"  the pair weighs {demands.mass_kg:.3g} kg, {demands.mass_kg / demands.robot_mass_kg:.0%} of the robot's "
+        f"{demands.robot_mass_kg:.3g} kg; its servos have {demands.servo_torque_n_m:.3g} N m and "
+        f"{demands.servo_rate_rad_s:.3g} rad/s{taken}"
+    )
+    yield (
+        f"  its wheels hold {demands.spin_up_energy_j:.3g} J, {demands.spin_up_power_w:.2g} W for a minute to spin up, "
+        f"and take {demands.holding_power_w:.2g} W to keep turning (assumed: two 608 bearings each, by SKF's friction)"
+    )
