@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,11 +53,27 @@ def write_parquet(path: Path, table: pa.Table, *, durable: bool = False) -> None
         table: The table.
         durable: Whether the file must outlast a power cut.
     """
+    write_row_groups(path, [table], durable=durable)
+
+
+def write_row_groups(path: Path, tables: Iterable[pa.Table], *, durable: bool = False) -> None:
+    """Write tables with the same columns as one Parquet file, a row group each.
+
+    Args:
+        path: The file.
+        tables: The tables, at least one; each is written before the next is asked for.
+        durable: Whether the file must outlast a power cut.
+    """
     import pyarrow.parquet as pq
 
     # Opened here: Arrow takes no path with bytes that are no UTF-8.
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        pq.write_table(table, file)
+        writer = None
+        for table in tables:
+            writer = writer or pq.ParquetWriter(file, table.schema)
+            writer.write_table(table)
+        assert writer is not None
+        writer.close()
         if durable:
             file.flush()
             os.fsync(file.fileno())

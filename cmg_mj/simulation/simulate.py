@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -45,6 +46,8 @@ class SimulationOptions(TypedDict, total=False):
     """Called after every tick with the simulated time [s]; a KeyboardInterrupt it raises ends the run."""
     on_start: Callable[[Recorder], None] | None
     """Called before the first tick with the recorder, whose `since` shows the ticks meanwhile."""
+    spool: Path
+    """Folder whose disk takes what a long trajectory of one world would need in memory; it is read from there."""
     threads: int
     """On which many worlds are stepped; 0: as many as there are processors."""
 
@@ -113,10 +116,9 @@ class _Simulation:
         self.observers = tuple(observers[names[0]])
         steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
         self.fall_angle = np.radians(settings.fall_angle_deg).item()
-        keep = options.get("keep_trajectory", True)
         pairs = [
             _recorder_and_metrics(
-                plants, name, part, observers[name], pushes, settings, keep=keep, joints=name == names[0]
+                plants, name, part, observers[name], pushes, settings, options, joints=name == names[0]
             )
             for name, part in zip(names, controller.parts, strict=True)
         ]
@@ -195,8 +197,8 @@ def _recorder_and_metrics(
     observers: Sequence[str],
     pushes: Sequence[Push],
     settings: MetricsSettings,
+    options: SimulationOptions,
     *,
-    keep: bool,
     joints: bool,
 ) -> tuple[TickRecorder, Metrics]:
     """Make what records and judges the ticks of one axis."""
@@ -211,7 +213,10 @@ def _recorder_and_metrics(
     baselines = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds, controller.axis)
     single = isinstance(controller.worlds, int)
     extras = controller.extra_signals
-    recorder = TickRecorder(plants, observers, extras, metrics, baselines, dt, keep=keep, single=single, joints=joints)
+    keep, spool = options.get("keep_trajectory", True), options.get("spool")
+    recorder = TickRecorder(
+        plants, observers, extras, metrics, baselines, dt, keep=keep, single=single, joints=joints, spool=spool
+    )
     return recorder, metrics
 
 
