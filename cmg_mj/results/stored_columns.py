@@ -13,6 +13,8 @@ import numpy as np
 
 STRETCH = 32768
 """Number of rows that are written, read or recorded at once: shorter runs are handled whole."""
+LONG = 262144
+"""Number of rows from which columns of a log do not stay in memory, and are handled in stretches of so many rows."""
 
 Reader = Callable[[int, int], np.ndarray]
 """Returns the rows of one column from one row up to another, without the latter."""
@@ -41,6 +43,15 @@ class StoredColumns(Mapping[str, np.ndarray]):
 
     def __contains__(self, name: object) -> bool:
         return name in self._readers
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows."""
+        return self._end - self._first
+
+    def read(self, name: str, rows: slice) -> np.ndarray:
+        """Read successive rows of one column."""
+        return self.rows(rows)[name]
 
     def rows(self, rows: slice) -> StoredColumns:
         """Select successive rows."""
@@ -86,7 +97,7 @@ class _ValueFile:
     """A file of floats without a name, which the system removes with the process."""
 
     def __init__(self, folder: Path) -> None:
-        self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115  (read as long as this lives)
+        self._file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115  (read as long as this lives)
         weakref.finalize(self, self._file.close)
         self._lock = threading.Lock()  # a live view reads in a thread of its own
         self._end = 0
@@ -97,14 +108,15 @@ class _ValueFile:
         with self._lock:
             self._file.seek(8 * offset)
             self._file.write(np.ascontiguousarray(values, dtype=float).data)
-            self._file.flush()
         self._end += values.size
         return offset
 
     def read(self, offset: int, count: int) -> np.ndarray:
+        values = np.empty(count)
         with self._lock:
             self._file.seek(8 * offset)
-            return np.frombuffer(self._file.read(8 * count))
+            self._file.readinto(values.data)
+        return values
 
 
 class ColumnStore:
@@ -170,3 +182,54 @@ class ColumnStore:
             if start < until
         ]
         return np.concatenate(parts) if parts else np.zeros((0, 1))
+
+
+def stored(columns: Mapping[str, np.ndarray]) -> StoredColumns:
+    """Take arrays of equal length as stored columns; those in a file already stay there."""
+    if isinstance(columns, StoredColumns):
+        return columns
+    n_rows = max((len(values) for values in columns.values()), default=0)
+    return StoredColumns({name: _rows_of(values) for name, values in columns.items()}, 0, n_rows)
+
+
+def _rows_of(values: np.ndarray) -> Reader:
+    return lambda start, end: values[start:end]
+
+
+def shelved(values: np.ndarray) -> Reader:
+    """Put a long array into a file of its own; a short one stays in memory."""
+    if len(values) <= LONG:
+        return _rows_of(values)
+    store = ColumnStore(1, Path(tempfile.gettempdir()))
+    for rows in stretches(len(values)):
+        store.append([values[rows, None]])
+    return lambda start, end: store.read(0, start, end)[:, 0]
+
+
+def stretches(n_rows: int, length: int | None = None) -> Iterator[slice]:
+    """Divide rows into stretches of at most `LONG`, or of another length."""
+    length = length or LONG
+    return (slice(start, min(start + length, n_rows)) for start in range(0, n_rows, length))
+
+
+def number_of_rows(columns: Mapping[str, np.ndarray]) -> int:
+    """Return the number of rows, without reading any."""
+    return columns.n_rows if isinstance(columns, StoredColumns) else len(next(iter(columns.values())))
+
+
+def select_rows(columns: Mapping[str, np.ndarray], rows: slice) -> Mapping[str, np.ndarray]:
+    """Select successive rows of each column."""
+    return columns.rows(rows) if isinstance(columns, StoredColumns) else {k: v[rows] for k, v in columns.items()}
+
+
+def masked(columns: Mapping[str, np.ndarray], mask: np.ndarray) -> StoredColumns:
+    """Select rows by a mask, (n_rows,)."""
+    whole = stored(columns)
+    if mask.all():
+        return whole
+    return StoredColumns({name: shelved(values[mask]) for name, values in whole.items()}, 0, int(mask.sum()))
+
+
+def reversed_rows(columns: StoredColumns) -> StoredColumns:
+    """Turn the order of the rows round."""
+    return StoredColumns({name: shelved(values[::-1]) for name, values in columns.items()}, 0, columns.n_rows)

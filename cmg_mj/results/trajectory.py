@@ -12,7 +12,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.results.files import write_row_groups
-from cmg_mj.results.stored_columns import STRETCH, StoredColumns
+from cmg_mj.results.stored_columns import STRETCH, StoredColumns, number_of_rows, select_rows
 
 SIGNALS = (
     "x1_rad",
@@ -138,7 +138,7 @@ class Trajectory:
         return self.columns[name]
 
     def __len__(self) -> int:
-        return len(self.columns["time_s"])
+        return number_of_rows(self.columns)
 
     @property
     def observers(self) -> tuple[str, ...]:
@@ -215,9 +215,7 @@ class Trajectory:
 
     def rows(self, rows: slice) -> Trajectory:
         """Select successive rows."""
-        if isinstance(self.columns, StoredColumns):
-            return replace(self, columns=self.columns.rows(rows))
-        return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
+        return replace(self, columns=select_rows(self.columns, rows))
 
     def stretches(self) -> Iterator[slice]:
         """Divide the rows into stretches to be handled one after the other; there is at least one."""

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.results.stored_columns import number_of_rows, select_rows
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Window
 from cmg_mj.sensors.tilt import RadialTilt
@@ -101,7 +102,7 @@ class Log:
         return self.columns[name]
 
     def __len__(self) -> int:
-        return len(self.columns["time_s"])
+        return number_of_rows(self.columns)
 
     @property
     def duration_s(self) -> float:
@@ -110,7 +111,7 @@ class Log:
 
     def trajectory(self, part: slice) -> Trajectory:
         """Return one part, as `cmg_mj.replay.replay` takes it."""
-        return Trajectory({name: values[part] for name, values in self.columns.items()})
+        return Trajectory(select_rows(self.columns, part))
 
     def scored(self, settle_s: float) -> np.ndarray:
         """Return which samples count: those from `settle_s` after the start of a part on, (n,)."""
@@ -129,5 +130,5 @@ class Log:
         """Return the log's part in a range of rows."""
         start, stop, _ = rows.indices(len(self))
         parts = [slice(max(p.start, start) - start, min(p.stop, stop) - start) for p in self.parts]
-        columns = {name: values[start:stop] for name, values in self.columns.items()}
+        columns = select_rows(self.columns, slice(start, stop))
         return replace(self, columns=columns, parts=[part for part in parts if part.stop - part.start > 1])
