@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
 from cmg_mj.results.files import whole_file
+from cmg_mj.results.stored_columns import LONG, stretches
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import (
@@ -24,6 +26,7 @@ from cmg_mj.visualization.plots.run_plot import (
     fit,
     pyplot,
 )
+from cmg_mj.visualization.plots.thinning import thinned
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""
@@ -34,7 +37,7 @@ def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
     log = replayed.log
     length = max(2, round(DETAIL_S / log.dt))
     liveliest, where = -1.0, (log["time_s"][0], log["time_s"][-1])
-    for part in log.parts:
+    for part in _overlapping(log.parts, length):
         time, tilt = log["time_s"][part], log["y1_rad"][part]
         rise = max(1, length // 20)
         bend = np.zeros(len(tilt))
@@ -49,6 +52,13 @@ def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
             start = int(np.clip(start + middle - n / 2.0, 0, len(time) - n))
             where = float(time[start]), float(time[start + n - 1])
     return where
+
+
+def _overlapping(parts: Sequence[slice], length: int) -> Iterator[slice]:
+    """Divide long parts into stretches that share a span of so many samples, and its bends."""
+    for part in parts:
+        for rows in stretches(part.stop - part.start):
+            yield slice(part.start + rows.start, min(part.stop, part.start + rows.stop + 2 * length))
 
 
 def plot_replay(path: Path, replayed: ReplayResult) -> None:
@@ -75,14 +85,15 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     panels[0].set_ylabel("tilt [deg]")
     rates = None
     for axes in (panels[1], panels[-1]):
+        detail = (start, end) if axes is panels[-1] else None
         if referred:
-            _line(axes, replayed, log[REFERENCE], color=INK, linewidth=1.6, label="reference")
+            _line(axes, replayed, log[REFERENCE], detail, color=INK, linewidth=1.6, label="reference")
         for name in few:
             rate = replayed.estimates[name]["x2_rad_s"]
-            _line(axes, replayed, rate, color=palette[name], linewidth=0.8, label=labels[name].lstrip("_"))
+            _line(axes, replayed, rate, detail, color=palette[name], linewidth=0.8, label=labels[name].lstrip("_"))
         axes.set_ylabel("tilt rate\n[rad/s]")
-        estimates = [replayed.estimates[name]["x2_rad_s"] for name in few]
-        rates = fit(axes, [log[REFERENCE]] if referred else [], estimates)
+        estimates = [_outline(replayed.estimates[name]["x2_rad_s"]) for name in few]
+        rates = fit(axes, [_outline(log[REFERENCE])] if referred else [], estimates)
     if referred:
         panels[2].plot([], [], " ", label="RMS:")
         for name in few:
@@ -90,7 +101,8 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
             error = replayed.estimates[name]["x2_rad_s"] - log[REFERENCE]
             _line(panels[2], replayed, error, color=palette[name], linewidth=0.6, label=text)
         panels[2].set_ylabel("estimate less\nreference [rad/s]")
-        fit(panels[2], [log[REFERENCE]], [replayed.estimates[n]["x2_rad_s"] - log[REFERENCE] for n in few])
+        errors = [_outline(replayed.estimates[n]["x2_rad_s"] - log[REFERENCE]) for n in few]
+        fit(panels[2], [_outline(log[REFERENCE])], errors)
     panels[-1].set_xlim(start, end)
     for axes in panels[:-1]:
         axes.axvspan(start, end, color="0.5", alpha=0.15, linewidth=0, zorder=0)
@@ -111,8 +123,23 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     plt.close(figure)
 
 
-def _line(axes: Any, replayed: ReplayResult, values: np.ndarray, **style: Any) -> None:
-    axes.plot(*replayed.log.broken(values), **style)
+def _line(
+    axes: Any, replayed: ReplayResult, values: np.ndarray, detail: tuple[float, float] | None = None, **style: Any
+) -> None:
+    """Draw a signal; of a long one, the outline, or all of it around the detail."""
+    log = replayed.log
+    if len(log) <= LONG:
+        axes.plot(*log.broken(values), **style)
+    elif detail is None:
+        axes.plot(*thinned(*log.broken(values)), **style)
+    else:
+        first, last = np.searchsorted(log["time_s"], (detail[0] - DETAIL_S, detail[1] + DETAIL_S)).tolist()
+        axes.plot(*log.broken(values[first:last], slice(first, last)), **style)
+
+
+def _outline(values: np.ndarray) -> np.ndarray:
+    """Return enough of a long signal to choose an axis by."""
+    return values if len(values) <= LONG else thinned(np.arange(len(values)), values)[1]
 
 
 def _draw_small(
@@ -125,9 +152,9 @@ def _draw_small(
     span: tuple[float, float],
 ) -> None:
     """Draw another observer in detail, on the axis of the few."""
-    _line(axes, replayed, replayed.estimates[name]["x2_rad_s"], color=color, linewidth=0.7)
+    _line(axes, replayed, replayed.estimates[name]["x2_rad_s"], span, color=color, linewidth=0.7)
     if "reference" in replayed.log.has:
-        _line(axes, replayed, replayed.log[REFERENCE], color=INK, linewidth=0.8)
+        _line(axes, replayed, replayed.log[REFERENCE], span, color=INK, linewidth=0.8)
     text = f"{label} {_rms(replayed.summaries[name])}".strip()
     axes.set_title(text, loc="left", fontsize="small", parse_math=False, pad=2.0)
     axes.set_xlim(*span)

@@ -129,7 +129,7 @@ class ColumnStore:
     """
 
     def __init__(self, n_columns: int, folder: Path | None = None) -> None:
-        self._n_columns = n_columns
+        self.n_columns = n_columns
         self._folder = folder
         self._file: _ValueFile | None = None
         self._pieces: list[_InFile | _InMemory] = []
@@ -162,7 +162,7 @@ class ColumnStore:
     def _write(self, folder: Path) -> None:
         """Move what is in memory to the file."""
         first, n_rows = self._n_written, self._end - self._n_written
-        block = np.stack([self.read(i, first, self._end)[:, 0] for i in range(self._n_columns)])
+        block = np.stack([self.read(i, first, self._end)[:, 0] for i in range(self.n_columns)])
         self._file = self._file or _ValueFile(folder)
         piece = _InFile(self._file, self._file.append(block), n_rows)
         kept = bisect_right(self._starts, first - 1)

@@ -120,11 +120,28 @@ class Log:
             counted[part.start + math.ceil(settle_s / self.dt - 1e-9) : part.stop] = True
         return counted
 
-    def broken(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return times and values with a NaN between two parts, so that no line is drawn across a gap."""
-        time = [np.append(self["time_s"][part], self["time_s"][part][-1] + self.dt) for part in self.parts]
-        drawn = [np.append(values[part], np.nan) for part in self.parts]
-        return np.concatenate(time)[:-1], np.concatenate(drawn)[:-1]
+    def broken(self, values: np.ndarray, rows: slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Return times and values with a NaN between two parts, so that no line is drawn across a gap.
+
+        Args:
+            values: The values in some rows, (n,).
+            rows: These rows.
+
+        Returns:
+            Times [s] and values.
+        """
+        start, stop, _ = rows.indices(len(self))
+        clock = select_rows(self.columns, slice(start, stop))["time_s"]
+        time, drawn = [], []
+        for part in self.parts:
+            some = slice(max(part.start, start) - start, min(part.stop, stop) - start)
+            if some.start < some.stop:
+                time.append(clock[some])
+                drawn.append(values[some])
+                if start + some.stop == part.stop < self.parts[-1].stop:
+                    time.append(clock[some][-1:] + self.dt)
+                    drawn.append(np.array([np.nan]))
+        return np.concatenate(time), np.concatenate(drawn)
 
     def cut(self, rows: slice) -> Log:
         """Return the log's part in a range of rows."""
