@@ -48,7 +48,7 @@ def _against(log: Log, rate: np.ndarray, scored: np.ndarray) -> Figures:
         "velocity_rms_error_rad_s": error,
         "velocity_rms_rad_s": motion,
         "velocity_fit": _fit(error, motion),
-        "lag_s": _lag(log, rate, scored),
+        "lag_s": _lag(log, rate, true, scored),
     }
     if log.windows:
         counted &= inside(log["time_s"], log.windows)
@@ -62,9 +62,9 @@ def _error_and_motion(rate: np.ndarray, true: np.ndarray, counted: np.ndarray) -
     return error, _rms_of(len(true), lambda rows: true[rows][counted[rows]])
 
 
-def _lag(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
+def _lag(log: Log, rate: np.ndarray, true: np.ndarray, scored: np.ndarray) -> float | None:
     """Find the lag of the estimate behind the reference [s]."""
-    true, known = log[REFERENCE], scored & np.isfinite(rate)
+    known = scored & np.isfinite(rate)
     pieces = _pieces(log, scored)
     return lag(
         [_Masked(rate, known, piece) for piece in pieces], [_Masked(true, scored, piece) for piece in pieces], log.dt

@@ -199,7 +199,9 @@ def _measured(rows: _Rows) -> StoredColumns:
         angle = of(np.asarray, "tilt")
         if "acceleration" in signals:
             measured["acceleration_rad_s2"] = of(np.asarray, "acceleration")
-    whole = np.concatenate([angle(part.start, part.stop) for part in stretches(signals.n_rows)])
+    whole = np.empty(signals.n_rows)
+    for some in stretches(signals.n_rows):
+        whole[some] = angle(some.start, some.stop)
     measured = {"y1_rad": shelved(unwrapped(whole, rows.notes)), **measured}
     if "gimbal" in signals:
         measured["y2_rad"] = of(np.asarray, "gimbal")
@@ -230,8 +232,13 @@ def _join(parts: Sequence[Part], rows: _Rows, options: ReadOptions) -> Mapping[s
     absent = {"y2_rad": 0.0, "u_rad_s": 0.0, "acceleration_rad_s2": math.nan}
     columns = {}
     for name in ("y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2"):
-        values = [part.values.get(name, np.full(len(part.time), absent.get(name, 0.0))) for part in parts]
-        columns[name] = shelved(np.concatenate(values))
+        values = np.full(n, absent.get(name, 0.0))
+        start = 0
+        for part in parts:
+            if name in part.values:
+                values[start : start + len(part.time)] = part.values[name]
+            start += len(part.time)
+        columns[name] = shelved(values)
         del values
     columns[REFERENCE] = shelved(_reference(parts, rows, options) if rows.referred else np.full(n, np.nan))
     time = np.concatenate([part.time for part in parts])
@@ -252,11 +259,15 @@ def _reference(parts: Sequence[Part], rows: _Rows, options: ReadOptions) -> np.n
     first = np.concatenate([[True], np.diff(stamps) > SAME_TIME * parts[0].step])
     if not first.all():
         stamps, reference = stamps[first], reference[first]
-    sampled = []
+    sampled = np.empty(sum(len(part.time) for part in parts))
+    start = 0
     for part in parts:
-        when = np.concatenate([part.when(stamps[some]) - options.delay_s for some in stretches(len(stamps))])
-        sampled.append(sampled_where_known(part.time, when, reference))
-    return np.concatenate(sampled)
+        when = np.empty(len(stamps))
+        for some in stretches(len(stamps)):
+            when[some] = part.when(stamps[some]) - options.delay_s
+        sampled[start : start + len(part.time)] = sampled_where_known(part.time, when, reference)
+        start += len(part.time)
+    return sampled
 
 
 def unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:

@@ -75,7 +75,7 @@ def sampled_where_known(grid: np.ndarray, time: np.ndarray, values: np.ndarray) 
         time, values = time[known], values[known]
     if len(time) < FEWEST:
         return np.full(len(grid), np.nan)
-    gap = GAP_PERIODS * float(np.median(np.diff(time)))
+    gap = GAP_PERIODS * float(np.median(np.diff(time), overwrite_input=True))
     if len(grid) > LONG:
         return _in_stretches(lambda some, part, v: _sampled(some, part, v, gap), grid, time, values)
     return _sampled(grid, time, values, gap)

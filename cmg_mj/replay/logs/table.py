@@ -155,8 +155,8 @@ def _of_csv(
             if "onversion error" not in str(error):
                 raise
             torn.clear()
-            table = pa.Table.from_batches(list(_batches(path, read, parse, convert(pa.string()))))
-            n_rows = len(table)
+            texts = pa.Table.from_batches(list(_batches(path, read, parse, convert(pa.string()))))
+            table, n_rows = texts, texts.num_rows
     if torn and not n_rows:
         raise InputError(f"{path}: no line has as many cells as the heading; the first, {torn[0]}")
     if torn:
