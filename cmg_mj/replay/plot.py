@@ -13,7 +13,7 @@ from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
 from cmg_mj.results.files import whole_file
-from cmg_mj.results.stored_columns import LONG, stretches
+from cmg_mj.results.stored_columns import LONG, select_rows, stretches
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import (
@@ -30,6 +30,8 @@ from cmg_mj.visualization.plots.thinning import thinned
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""
+FEW_DRAWN = 1000
+"""Number of samples that are left of a stretch of a long log where its outline is enough."""
 
 
 def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
@@ -38,7 +40,8 @@ def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
     length = max(2, round(DETAIL_S / log.dt))
     liveliest, where = -1.0, (log["time_s"][0], log["time_s"][-1])
     for part in _overlapping(log.parts, length):
-        time, tilt = log["time_s"][part], log["y1_rad"][part]
+        stretch = select_rows(log.columns, part)
+        time, tilt = stretch["time_s"], stretch["y1_rad"]
         rise = max(1, length // 20)
         bend = np.zeros(len(tilt))
         bend[rise:-rise] = (tilt[2 * rise :] - 2.0 * tilt[rise:-rise] + tilt[: -2 * rise]) ** 2
@@ -131,7 +134,8 @@ def _line(
     if len(log) <= LONG:
         axes.plot(*log.broken(values), **style)
     elif detail is None:
-        axes.plot(*thinned(*log.broken(values)), **style)
+        pieces = [thinned(*log.broken(values[rows], rows), FEW_DRAWN) for rows in stretches(len(log))]
+        axes.plot(*(np.concatenate(part) for part in zip(*pieces, strict=True)), **style)
     else:
         first, last = np.searchsorted(log["time_s"], (detail[0] - DETAIL_S, detail[1] + DETAIL_S)).tolist()
         axes.plot(*log.broken(values[first:last], slice(first, last)), **style)
@@ -139,7 +143,9 @@ def _line(
 
 def _outline(values: np.ndarray) -> np.ndarray:
     """Return enough of a long signal to choose an axis by."""
-    return values if len(values) <= LONG else thinned(np.arange(len(values)), values)[1]
+    if len(values) <= LONG:
+        return values
+    return np.concatenate([thinned(values[rows], values[rows], FEW_DRAWN)[1] for rows in stretches(len(values))])
 
 
 def _draw_small(

@@ -21,6 +21,9 @@ from cmg_mj.visualization.recording.legend import numbered_parts
 from cmg_mj.visualization.recording.replay_recording import LogSeries, write_logs
 from cmg_mj.visualization.recording.signals import CONTROLLER, MODULES, Series
 
+FEW_DRAWN = 500
+"""Number of samples that are left of a stretch of a long log where its outline is enough."""
+
 
 def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:
     """Write the replays of some logs as one recording; whole or not at all.
@@ -51,14 +54,18 @@ def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[st
 
 def series(replayed: ReplayResult) -> list[Series]:
     """Return all time series of one log: angles in degrees, rates in rad/s; of a long log, their outlines."""
-    thin = len(replayed.log) > LONG
-    rows = _series(replayed, slice(None))
-    return [replace(row, **_outline(row)) for row in rows] if thin else list(rows)
+    pieces = list(_outlines(replayed)) if len(replayed.log) > LONG else [list(_series(replayed, slice(None)))]
+    rows = []
+    for row in zip(*pieces, strict=True):
+        time, values = (np.concatenate([getattr(piece, name) for piece in row]) for name in ("time", "values"))
+        rows.append(replace(row[0], time=time, values=values))
+    return rows
 
 
-def _outline(row: Series) -> dict[str, np.ndarray]:
-    time, values = thinned(row.time, row.values)
-    return {"time": time, "values": values}
+def _outlines(replayed: ReplayResult) -> Iterator[Sequence[Series]]:
+    for rows in _stretches(replayed):
+        thin = ((row, thinned(row.time, row.values, FEW_DRAWN)) for row in rows)
+        yield [replace(row, time=time, values=values) for row, (time, values) in thin]
 
 
 def _stretches(replayed: ReplayResult) -> Iterator[Sequence[Series]]:

@@ -10,19 +10,20 @@ DRAWN = 8000
 """Number of samples that are left of a long signal: several for each pixel across a plot."""
 
 
-def thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def thinned(time: np.ndarray, values: np.ndarray, drawn: int | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Select the samples that make the outline of a signal: the lowest and the highest of each short span of time.
 
     Args:
         time: Times, (n,) [s].
         values: Values, (n,).
+        drawn: Number of samples to leave of any signal; None to leave `DRAWN` of one longer than `STRETCH`.
 
     Returns:
-        Times and values, all of them if they are at most `STRETCH`.
+        Times and values.
     """
-    if len(time) <= STRETCH:
+    if len(time) <= (drawn or STRETCH):
         return time, values
-    width = -(-2 * len(time) // DRAWN)
+    width = -(-2 * len(time) // (drawn or DRAWN))
     n_spans = len(time) // width
     spans = values[: n_spans * width].reshape(n_spans, width)
     lowest = np.argmin(np.where(np.isnan(spans), np.inf, spans), axis=1)
