@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pyarrow.csv as pacsv
 
 MOST_ROWS = 5_000_000
-"""Most rows of a log; more take hours and gigabytes."""
+"""Most rows of a log; more take hours."""
 DELIMITERS = (",", ";", "\t", "|")
 HEAD = 1 << 16
 """Size of the part of a CSV that is searched for its heading, which must end in it [bytes]."""
